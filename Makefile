@@ -1,0 +1,74 @@
+# Every target makes what it needs, from a fresh clone with Python >= 3.11, make and a C compiler.
+PYTHON ?= python3
+WORKERS ?= 2
+VENV := .venv
+BIN := $(VENV)/bin
+LOCKED := $(VENV)/requirements.stamp
+INSTALLED := $(VENV)/installed.stamp
+CODE := src tests $(wildcard benchmarks examples docs)
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help .venv test test-fast test-slow test-all lint types contract format paper docs bench lock clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z.-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+.venv: $(INSTALLED) ## the local environment, every version and hash pinned
+
+$(LOCKED): requirements/dev.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "printhammer needs Python >= 3.11; set it with make PYTHON=...")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements/dev.txt
+	@touch $@
+
+$(INSTALLED): $(LOCKED) pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+test: lint types contract test-fast ## everything but the slow tests
+
+test-fast: $(INSTALLED) ## the fast tests alone
+	$(BIN)/python -m pytest -n $(WORKERS)
+
+test-slow: $(INSTALLED) ## the slow tests alone
+	$(BIN)/python -m pytest -n $(WORKERS) -m slow
+
+test-all: test test-slow ## everything
+
+lint: $(INSTALLED) ## ruff
+	$(BIN)/ruff check $(CODE)
+	$(BIN)/ruff format --check $(CODE)
+
+types: $(INSTALLED) ## mypy --strict
+	$(BIN)/mypy
+
+contract: $(INSTALLED) ## who may import whom
+	$(BIN)/lint-imports
+
+format: $(INSTALLED) ## sort the imports and lay out the code
+	$(BIN)/ruff check --select I --fix $(CODE)
+	$(BIN)/ruff format $(CODE)
+
+paper: $(INSTALLED) ## every figure and claim of the paper, into build/paper
+	$(BIN)/printhammer paper --out build/paper
+
+docs: $(INSTALLED) ## the documentation, into build/docs
+	$(BIN)/sphinx-build -W --keep-going -b html docs build/docs
+
+bench: $(INSTALLED) ## the benchmark table
+	$(BIN)/python benchmarks/single_run.py
+
+# Resolve again; the files name versions and hashes only, never an address.
+LOCK := build/lock-venv/bin/uv pip compile --quiet --universal --fork-strategy fewest --python-version 3.11 \
+	--generate-hashes --no-emit-index-url --no-emit-find-links --no-header --no-annotate
+
+lock: ## resolve the pinned requirements again (UPGRADE=--upgrade for the newest)
+	$(PYTHON) -m venv build/lock-venv
+	build/lock-venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements/lock.txt
+	$(LOCK) $(UPGRADE) requirements/lock.in --output-file requirements/lock.txt
+	$(LOCK) $(UPGRADE) pyproject.toml requirements/build.in --extra all --output-file requirements/dev.txt
+	$(LOCK) $(UPGRADE) pyproject.toml --constraint requirements/dev.txt --output-file requirements/runtime.txt
+
+clean: ## remove the environment and everything built
+	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -1,0 +1,81 @@
+"""A laboratory for impact print hammers.
+
+Give it a hammer, described by constants that can be measured, and a drive, and it tells how the hammer moves,
+what it prints and when it turns chaotic. Inside, every quantity is in SI.
+
+The public names are imported on first use, so that importing the package costs nothing.
+"""
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from printhammer.drive import Burst, PulseTrain, SineForce
+    from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
+    from printhammer.errors import InputError, PrinthammerError
+    from printhammer.hammer import Hammer, load
+    from printhammer.motion import Motion
+    from printhammer.simulate import simulate
+    from printhammer.waveforms import Waveform
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Burst",
+    "Hammer",
+    "InputError",
+    "Motion",
+    "PrinthammerError",
+    "PulseTrain",
+    "SineForce",
+    "Waveform",
+    "__version__",
+    "equilibria",
+    "holding_margin",
+    "load",
+    "release_current",
+    "rest_state",
+    "simulate",
+]
+
+_HOME = {
+    "Burst": "drive",
+    "Hammer": "hammer",
+    "InputError": "errors",
+    "Motion": "motion",
+    "PrinthammerError": "errors",
+    "PulseTrain": "drive",
+    "SineForce": "drive",
+    "Waveform": "waveforms",
+    "equilibria": "equilibrium",
+    "holding_margin": "equilibrium",
+    "load": "hammer",
+    "release_current": "equilibrium",
+    "rest_state": "equilibrium",
+    "simulate": "simulate",
+}
+
+
+class _Package(ModuleType):
+    def __setattr__(self, name: str, value: object) -> None:
+        # Importing the module `simulate` must not hide the function of that name.
+        if isinstance(value, ModuleType) and _HOME.get(name) == name:
+            value = getattr(value, name)
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value: object = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
