@@ -1,0 +1,160 @@
+"""Measured constants: how a field of a part or waveform says its unit, symbol and meaning.
+
+Parts (`printhammer.parts`) and waveforms are frozen pydantic models whose physical constants are plain SI
+floats. `quantity` declares such a field; `quantities` lists the declarations of a model, which is all that
+the file reader, the JSON schema, the tables of `printhammer hammer show` and the documentation need to know
+about it.
+
+A model that reads a file of its own (a measured table, a sampled waveform) finds the folder of the hammer or
+drive file in `info.context["folder"]` of its validators (a `pathlib.Path`; the working directory when there
+is no context).
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal, cast, get_args
+
+from pydantic import BaseModel, Field, ValidationInfo
+from pydantic_core import PydanticUndefined
+
+Status = Literal["stated", "derived", "reconstructed", "assumed"]
+STATUSES: tuple[str, ...] = get_args(Status)
+
+_KEY = "quantity"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a model field says about a physical constant.
+
+    Attributes
+    ----------
+    si : str
+        SI unit of the stored float, as `printhammer.units` writes it; "1" for a pure number.
+    also : tuple of str
+        Further SI units of other dimension that a file may give instead (a waveform's amplitude: A or N).
+    symbol : str
+        Symbol in the paper or the usual textbook, plain text.
+    meaning : str
+        One phrase for tables and help.
+    gt, ge, lt, le : float or None
+        Bounds of the SI value.
+    required : bool
+        Whether a file must give it.
+    """
+
+    si: str
+    symbol: str
+    meaning: str
+    also: tuple[str, ...] = ()
+    gt: float | None = None
+    ge: float | None = None
+    lt: float | None = None
+    le: float | None = None
+    required: bool = True
+
+
+@dataclass(frozen=True)
+class Constant:
+    """One constant of a hammer as its file gives it, with its SI value beside.
+
+    Attributes
+    ----------
+    key : str
+        Dotted key, such as "magnet.F0".
+    value : float
+        Number as written in the file, in `unit`.
+    unit : str
+        Unit as written in the file.
+    si : float
+        Value in `si_unit`.
+    status : str
+        "stated", "derived", "reconstructed" or "assumed".
+    source : str
+        Where the value comes from.
+    meaning, symbol : str
+        From the field's `Quantity`.
+    si_unit : str
+        SI unit of `si`.
+    """
+
+    key: str
+    value: float
+    unit: str
+    si: float
+    status: str
+    source: str
+    meaning: str
+    symbol: str
+    si_unit: str
+
+
+def quantity(
+    si: str,
+    symbol: str,
+    meaning: str,
+    *,
+    also: tuple[str, ...] = (),
+    gt: float | None = None,
+    ge: float | None = None,
+    lt: float | None = None,
+    le: float | None = None,
+    default: Any = PydanticUndefined,
+) -> Any:
+    """Declare a pydantic field that holds a physical constant in SI.
+
+    Parameters
+    ----------
+    si : str
+        SI unit of the float ("1" for a pure number).
+    symbol, meaning : str
+        Symbol and one phrase for tables and help.
+    also : tuple of str
+        Further SI units a file may give instead.
+    gt, ge, lt, le : float, optional
+        Bounds of the SI value; NaN and infinity are always refused.
+    default : float or None, optional
+        Makes the constant optional.
+
+    Returns
+    -------
+    pydantic field
+        For the right-hand side of a `float` (or `float | None`) annotation.
+    """
+    note = Quantity(si, symbol, meaning, also, gt, ge, lt, le, default is PydanticUndefined)
+    return Field(
+        default,
+        gt=gt,
+        ge=ge,
+        lt=lt,
+        le=le,
+        allow_inf_nan=False,
+        description=meaning,
+        json_schema_extra={_KEY: asdict(note)},
+    )
+
+
+def quantities(model: type[BaseModel]) -> dict[str, Quantity]:
+    """List the physical constants of a model class, field name to `Quantity`, in order of declaration."""
+    found: dict[str, Quantity] = {}
+    for name, field in model.model_fields.items():
+        extra = field.json_schema_extra
+        note = extra.get(_KEY) if isinstance(extra, dict) else None
+        if isinstance(note, dict):
+            found[name] = Quantity(**cast("dict[str, Any]", note))
+    return found
+
+
+def options(model: type[BaseModel]) -> dict[str, Any]:
+    """List the other fields of a model class (choices, switches, file names), field name to annotation."""
+    known = quantities(model)
+    return {name: field.annotation for name, field in model.model_fields.items() if name not in known}
+
+
+def folder_of(info: ValidationInfo) -> Path:
+    """Return the folder against which a file named in a model is resolved."""
+    context = info.context
+    folder = context.get("folder") if isinstance(context, dict) else None
+    return Path(folder) if folder is not None else Path()

@@ -1,0 +1,53 @@
+"""Parts of a hammer, one law a file.
+
+Every module of this package whose name does not start with an underscore is imported and registers its part;
+a part from elsewhere enters with `register`. A module holds, for its role, plain scalar functions (floats in,
+float out, `c` the float64 array of `Part.packed`), written so that numba compiles them; they call nothing but
+`math`:
+
+========  ===================================================================================================
+role      functions
+========  ===================================================================================================
+magnet    ``magnet_force(c, x, current)``, ``magnet_energy(c, x)``
+spring    ``spring_force(c, x)``, ``spring_energy(c, x)``
+pack      ``MEMORY``, ``pack_loading(c, x, v)``, ``pack_memory(c, peak)``, ``pack_unloading(c, x, v, q)``,
+          ``pack_switch(c, x, v)``
+backstop  ``RIGID``, ``backstop_rebound(c, v_in)``, or with w = sqrt(b - x) ``backstop_elastic(c, w)``,
+          ``backstop_viscous(c, w, v)``, ``backstop_energy(c, w)``, ``backstop_switch(c, w, v)``
+========  ===================================================================================================
+
+Minus the slope of an energy is the force, of the magnet at zero current. What a module leaves out comes from
+`printhammer.parts.absent`, the part that is not there. A ``..._switch`` function changes sign where a law has
+a kink inside a contact (an option that forbids a surface to pull), so that an integrator can locate it.
+"""
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+from printhammer.parts.base import (
+    PARTS,
+    ROLES,
+    BackstopPart,
+    MagnetPart,
+    PackPart,
+    Part,
+    SpringPart,
+    laws,
+    register,
+)
+
+for _found in iter_modules(__path__):
+    if not _found.name.startswith("_"):
+        import_module(f"{__name__}.{_found.name}")
+
+__all__ = [
+    "PARTS",
+    "ROLES",
+    "BackstopPart",
+    "MagnetPart",
+    "PackPart",
+    "Part",
+    "SpringPart",
+    "laws",
+    "register",
+]

@@ -1,0 +1,130 @@
+"""What every part is: a frozen set of SI constants, a law, and a place in the registry.
+
+A part is one file. It holds the law as plain scalar functions of the module (see `printhammer.parts`), and a
+`Part` subclass with the constants, marked with `register`. The kernel compiles the functions and hands them
+the floats of `packed` as one float64 array `c`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+ROLES: tuple[str, ...] = ("magnet", "spring", "pack", "backstop")
+
+
+class Part(BaseModel):
+    """A replaceable part of a hammer: constants in SI, and the module that holds its law.
+
+    Attributes
+    ----------
+    role : str
+        "magnet", "spring", "pack" or "backstop".
+    law : str
+        Name of the law in hammer files.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    role: ClassVar[str]
+    law: ClassVar[str]
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return the numbers that the law functions of this part read from `c`.
+
+        Parameters
+        ----------
+        origin : float
+            Position of the backstop, b of equation (4), or 0 without a backstop; m.
+
+        Returns
+        -------
+        tuple of float
+            In SI, in the order that the part's module states.
+        """
+        raise NotImplementedError
+
+    @property
+    def module(self) -> str:
+        """Dotted name of the module that holds the law functions."""
+        return type(self).__module__
+
+
+class MagnetPart(Part):
+    """A magnet: `magnet_force(c, x, current)` and `magnet_energy(c, x)`."""
+
+    role: ClassVar[str] = "magnet"
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """Displacements for which the law holds, `(x_min, x_max)` in m."""
+        return (-math.inf, math.inf)
+
+
+class SpringPart(Part):
+    """A spring: `spring_force(c, x)` and `spring_energy(c, x)`."""
+
+    role: ClassVar[str] = "spring"
+
+
+class PackPart(Part):
+    """Ribbon and paper on the platen: `pack_loading`, `pack_memory`, `pack_unloading` and `MEMORY`.
+
+    A subclass has the constant `front`, the displacement of first touch in m.
+    """
+
+    role: ClassVar[str] = "pack"
+
+    front: float
+
+
+class BackstopPart(Part):
+    """A backstop: `RIGID` and `backstop_rebound`, or `backstop_elastic`, `_viscous` and `_energy`.
+
+    A subclass has the constant `position`, the displacement of first touch in m.
+    """
+
+    role: ClassVar[str] = "backstop"
+
+    position: float
+
+
+PARTS: dict[tuple[str, str], type[Part]] = {}
+
+_P = TypeVar("_P", bound=type[Part])
+
+
+def register(part: _P) -> _P:
+    """Enter a part class in the registry, as a class decorator.
+
+    Parameters
+    ----------
+    part : type of Part
+        Class with `role` and `law`; its module holds the law functions.
+
+    Returns
+    -------
+    type of Part
+        The class itself.
+
+    Raises
+    ------
+    ValueError
+        If the role is unknown or another class has taken the law's name.
+    """
+    if part.role not in ROLES:
+        known = ", ".join(ROLES)
+        raise ValueError(f"part {part.__name__} has the role {part.role!r}, expected one of {known}")
+    key = (part.role, part.law)
+    taken = PARTS.get(key)
+    if taken is not None and (taken.__module__, taken.__qualname__) != (part.__module__, part.__qualname__):
+        raise ValueError(f"the {part.role} law {part.law!r} is already taken by {taken.__module__}")
+    PARTS[key] = part
+    return part
+
+
+def laws(role: str) -> tuple[str, ...]:
+    """List the registered laws of a role, sorted."""
+    return tuple(sorted(law for known, law in PARTS if known == role))
