@@ -1,0 +1,21 @@
+"""Fixtures and settings shared by all tests."""
+
+import os
+
+import pytest
+from hypothesis import settings
+
+import printhammer as ph
+
+os.environ["MPLBACKEND"] = "Agg"
+
+# Compilation makes first examples slow; the same examples on every run make a failure somebody else's too.
+settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
+settings.register_profile("explore", deadline=None, max_examples=1000)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+
+@pytest.fixture(scope="session")
+def hammer() -> "ph.Hammer":
+    """The shipped hammer; frozen, so that all tests can share it."""
+    return ph.load("hendriks-1983")

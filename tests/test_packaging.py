@@ -1,0 +1,172 @@
+"""The package as somebody else gets it: public names, start-up, the built wheel installed elsewhere."""
+
+import re
+import subprocess
+import sys
+import sysconfig
+import time
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import printhammer as ph
+
+ROOT = Path(__file__).parents[1]
+SOURCE = ROOT / "src"
+SCRIPTS = Path(sysconfig.get_path("scripts"))
+HEAVY = {"jinja2", "matplotlib", "numba", "numpy", "pandas", "pint", "pydantic", "scipy", "xarray"}
+START_LIMIT = 0.5  # s
+START_TRIES = 12
+
+
+def output_of(*command: str | Path, cwd: Path) -> str:
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def heavy_after(code: str, cwd: Path) -> set[str]:
+    listing = output_of(sys.executable, "-c", f"{code}\nimport sys\nprint(*sys.modules)", cwd=cwd)
+    return HEAVY & set(listing.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize("name", ph.__all__)
+def test_every_public_name_resolves(name: str) -> None:
+    assert getattr(ph, name) is not None
+    assert name in dir(ph)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = ph.no_such_name
+
+
+def test_simulate_stays_a_function_when_its_module_is_imported(tmp_path: Path) -> None:
+    code = "import printhammer.simulate, printhammer as ph; print(type(ph.simulate).__name__)"
+    assert output_of(sys.executable, "-c", code, cwd=tmp_path).strip() == "function"
+
+
+def test_bad_input_is_a_value_error_of_ours() -> None:
+    assert issubclass(ph.InputError, ValueError)
+    assert issubclass(ph.InputError, ph.PrinthammerError)
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    version = re.escape(ph.__version__)
+    assert re.search(rf"^## {version}\b", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    assert re.search(rf"^version: {version}$", (ROOT / "CITATION.cff").read_text("utf-8"), re.MULTILINE)
+
+
+def test_every_direct_requirement_is_locked() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    (everything,) = extras.pop("all")
+    assert everything == f"printhammer[{','.join(extras)}]"
+    for lock, requirements in {
+        "runtime.txt": project["dependencies"],
+        "dev.txt": [*project["dependencies"], *(name for extra in extras.values() for name in extra)],
+    }.items():
+        locked = (ROOT / "requirements" / lock).read_text("utf-8")
+        names = {re.match(r"[\w-]+", requirement).group() for requirement in requirements}
+        assert {name for name in names if not re.search(rf"^{name}==", locked, re.MULTILINE)} == set()
+
+
+def test_importing_the_package_imports_nothing_heavy(tmp_path: Path) -> None:
+    assert heavy_after("import printhammer, printhammer.errors", tmp_path) == set()
+    assert heavy_after("import numba", tmp_path) >= {"numba", "numpy"}
+
+
+def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
+    call = """
+import sys
+from printhammer.cli.main import main
+sys.argv = ["printhammer", "--help"]
+try:
+    main()
+except SystemExit as end:
+    assert not end.code
+"""
+    assert heavy_after(call, tmp_path) == set()
+
+
+def test_help_is_quick(tmp_path: Path) -> None:
+    # The best of several: other work on the machine only ever adds time.
+    shortest = float("inf")
+    for _ in range(START_TRIES):
+        start = time.perf_counter()
+        text = output_of(SCRIPTS / "printhammer", "--help", cwd=tmp_path)
+        shortest = min(shortest, time.perf_counter() - start)
+        assert "paper" in text
+        if shortest < START_LIMIT:
+            break
+    assert shortest < START_LIMIT
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    target = tmp_path_factory.mktemp("dist")
+    output_of(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", target, cwd=ROOT)
+    (built,) = target.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def elsewhere(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A fresh environment with the wheel, and our locked dependencies by path; its folder of scripts."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    output_of(sys.executable, "-m", "venv", "--without-pip", folder / "venv", cwd=folder)
+    where = {"base": str(folder / "venv"), "platbase": str(folder / "venv")}
+    python = Path(sysconfig.get_path("scripts", "venv", where)) / "python"
+    pip = (sys.executable, "-m", "pip", "--python", python, "--disable-pip-version-check", "--quiet")
+    output_of(*pip, "install", "--no-deps", "--no-index", wheel, cwd=folder)
+    # A path file is not followed further, so our own editable installation stays out of it.
+    packages = Path(sysconfig.get_path("purelib", "venv", where))
+    (packages / "dependencies.pth").write_text(f"{sysconfig.get_path('purelib')}\n", "utf-8")
+    return python.parent
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_every_file_of_the_package_and_no_other(wheel: Path) -> None:
+    ours = {
+        str(path.relative_to(SOURCE))
+        for path in (SOURCE / "printhammer").rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    shipped = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    assert shipped == ours
+    assert {"printhammer/py.typed", "printhammer/hammers/hendriks-1983.toml"} <= shipped
+    assert any(re.fullmatch(r"printhammer/claims/.*\.toml", name) for name in shipped)
+    assert any(re.fullmatch(r"printhammer/.*\.(html|jinja|j2)", name) for name in shipped)
+
+
+@pytest.mark.slow
+def test_the_wheel_runs_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
+    origin = output_of(
+        elsewhere / "python", "-c", "import printhammer; print(printhammer.__file__)", cwd=tmp_path
+    )
+    assert Path(origin.strip()).is_relative_to(elsewhere.parent)
+    assert "paper" in output_of(elsewhere / "printhammer", "--help", cwd=tmp_path)
+    assert "paper" in output_of(elsewhere / "python", "-m", "printhammer", "--help", cwd=tmp_path)
+    assert "hendriks-1983" in output_of(
+        elsewhere / "printhammer", "hammer", "show", "hendriks-1983", cwd=tmp_path
+    )
+
+
+@pytest.mark.slow
+def test_the_readme_works_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
+    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+    dots = output_of(elsewhere / "python", "-c", example, cwd=tmp_path).strip().splitlines()
+    assert len(dots) == 9  # one for each pulse of the example
+
+
+def test_the_readme_names_files_and_targets_that_exist() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert readme.count("\n") <= 60
+    targets = set(re.findall(r"(?:^|`)make ([a-z-]+)", readme, re.MULTILINE))
+    makefile = (ROOT / "Makefile").read_text("utf-8")
+    assert {"paper", "test"} <= targets
+    assert {name for name in targets if not re.search(rf"^{name}:", makefile, re.MULTILINE)} == set()
+    links = re.findall(r"\]\(([^):]+)\)", readme)
+    assert [link for link in links if not (ROOT / link).exists()] == []
