@@ -1,0 +1,249 @@
+"""The only place where units exist: text with a unit to SI and back.
+
+Inside the program every quantity is a float in SI; units are met in hammer files, drives, tables, the command
+line and on the axes of figures. A unit is written as one writes it: "N/m^1.5", "N^0.5 m^0.25/A", "in", "us",
+"lbf", "1" for a pure number; a slash divides by the one factor after it. ``units.txt`` lists the units known.
+
+Conversions are correctly rounded: a float stands for its shortest decimal, factors are exact fractions (60
+digits where an exponent is not whole), and the result is rounded once, so that 0.002 in is 5.08e-05 m to the
+last bit. Units with an offset (a temperature in degC) are not known.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal, localcontext
+from fractions import Fraction
+from functools import lru_cache
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pint import UnitRegistry
+    from pint.util import UnitsContainer
+
+DIMENSIONS: dict[str, str] = {
+    "m": "a length",
+    "kg": "a mass",
+    "s": "a time",
+    "A": "a current",
+    "N": "a force",
+    "Hz": "a frequency",
+    "m/s": "a speed",
+    "m/s^2": "an acceleration",
+    "N/m": "a stiffness",
+    "N s/m": "a linear damping",
+    "N/m^1.5": "a Hertz stiffness",
+    "N s/m^2.5": "a contact damping",
+    "N^0.5 m^0.25": "a root of force times the fourth root of length",
+    "N^0.5 m^0.25/A": "that root per current",
+    "Pa": "a pressure",
+    "J": "an energy",
+    "W": "a power",
+    "V": "a voltage",
+    "ohm": "a resistance",
+    "H": "an inductance",
+    "1": "a pure number",
+}
+"""Names of the dimensions that the program uses, by their SI unit; for messages."""
+
+_UNKNOWN = "the unit {!r} is not known, expected one such as 'us', 'lbf' or 'N s/m^2.5'"
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
+_FACTOR = re.compile(
+    r"\s*(?P<name>[^\W\d_]+|%|1(?![\d.]))"
+    r"(?:\s*(?:\^|\*\*)\s*(?P<power>[+-]?\d{1,2}(?:\.\d{1,4})?|\(\s*[+-]?\d{1,2}(?:/[1-9]\d?)?\s*\)))?"
+    r"\s*(?P<operator>[*/]?)"
+)
+_SIGNS = str.maketrans({"·": "*", "⋅": "*", "²": "^2", "³": "^3"})
+
+
+def to_si(value: float, unit: str, si_unit: str) -> float:
+    """Convert a number to SI.
+
+    Parameters
+    ----------
+    value : float
+        Number in `unit`.
+    unit : str
+        Unit, such as "lbf" or "N/m^1.5"; "1" for a pure number.
+    si_unit : str
+        SI unit of the result.
+
+    Returns
+    -------
+    float
+        Correctly rounded.
+
+    Raises
+    ------
+    InputError
+        If `value` is not a finite number, `unit` is not known, or is of another dimension than `si_unit`.
+    """
+    return _scaled(value, _factor(unit, si_unit), unit)
+
+
+def from_si(value: float, si_unit: str, unit: str) -> float:
+    """Convert a number in SI to a unit.
+
+    Parameters
+    ----------
+    value : float
+        Number in `si_unit`.
+    si_unit : str
+        SI unit of `value`.
+    unit : str
+        Unit of the result.
+
+    Returns
+    -------
+    float
+        Correctly rounded.
+
+    Raises
+    ------
+    InputError
+        As for `to_si`.
+    """
+    return _scaled(value, 1 / _factor(unit, si_unit), si_unit)
+
+
+def parse(text: str, si_unit: str) -> float:
+    """Read a number with its unit, such as "60 lbf", into SI.
+
+    Parameters
+    ----------
+    text : str
+        Number and unit; the unit may be left out only where `si_unit` is "1".
+    si_unit : str
+        SI unit of the result.
+
+    Returns
+    -------
+    float
+        Value in `si_unit`.
+
+    Raises
+    ------
+    InputError
+        If `text` is not a finite number with a known unit of the dimension of `si_unit`.
+    """
+    value, unit = split(text, si_unit)
+    return to_si(value, unit, si_unit)
+
+
+def split(text: str, si_unit: str) -> tuple[float, str]:
+    """Split a number from its unit, "60 lbf" to (60.0, "lbf"), without converting.
+
+    Parameters
+    ----------
+    text : str
+        Number and unit; the unit may be left out only where `si_unit` is "1".
+    si_unit : str
+        SI unit of the quantity, for the message.
+
+    Returns
+    -------
+    value : float
+        The number.
+    unit : str
+        The unit as written; "1" where it is left out.
+
+    Raises
+    ------
+    InputError
+        If `text` does not begin with a finite number, or lacks its unit.
+    """
+    found = _NUMBER.fullmatch(text)
+    value = float(found[1]) if found else math.nan
+    if found is None or not math.isfinite(value):
+        raise InputError(f"{text!r} is not a finite number with a unit, expected {describe(si_unit)}")
+    unit = found[2].strip()
+    if not unit and si_unit != "1":
+        raise InputError(f"{text!r} has no unit, expected {describe(si_unit)}")
+    return value, unit or "1"
+
+
+def describe(si_unit: str) -> str:
+    """Return a phrase for messages, such as "a length (m)"."""
+    return f"{DIMENSIONS[si_unit]} ({si_unit})" if si_unit in DIMENSIONS else f"a quantity in {si_unit}"
+
+
+def _scaled(value: object, factor: Fraction, unit: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(f"{value!r} {unit} is not a number")
+    try:
+        number = float(value)
+        if math.isfinite(number):
+            return float(Fraction(repr(number)) * factor)
+    except OverflowError:
+        pass
+    raise InputError(f"{value!r} {unit} is not a finite number")
+
+
+@lru_cache(maxsize=1024)
+def _factor(unit: str, si_unit: str) -> Fraction:
+    """Return how many `si_unit` one `unit` is."""
+    size, dimension = _measure(unit)
+    si_size, si_dimension = _measure(si_unit)
+    if dimension != si_dimension:
+        known = (name for name in DIMENSIONS if _measure(name)[1] == dimension)
+        found = next(known, None)
+        is_what = f"is {DIMENSIONS[found]}" if found else "is of another dimension"
+        raise InputError(f"the unit {unit!r} {is_what}, expected {describe(si_unit)}")
+    return size / si_size
+
+
+@lru_cache(maxsize=1024)
+def _measure(unit: str) -> tuple[Fraction, UnitsContainer]:
+    """Return the size of a unit in the base units and its dimension."""
+    from pint import UndefinedUnitError
+    from pint.util import UnitsContainer
+
+    registry = _registry()
+    size, dimension = Fraction(1), UnitsContainer({}, non_int_type=Fraction)
+    for name, power in _factors(unit):
+        try:
+            full = registry.get_name("percent" if name == "%" else name)
+        except UndefinedUnitError:
+            raise InputError(_UNKNOWN.format(unit)) from None
+        base = Fraction(str(registry.get_root_units(full)[0]))
+        size *= _power(base, power)
+        dimension *= registry.get_dimensionality(full) ** power
+    return size, dimension
+
+
+def _factors(unit: str) -> Iterator[tuple[str, Fraction]]:
+    """Split a unit into names and powers; a slash divides by the one factor that follows it."""
+    text, position, sign = unit.translate(_SIGNS), 0, 1
+    while found := _FACTOR.match(text, position):
+        if found["name"] != "1":
+            yield found["name"], sign * Fraction((found["power"] or "1").strip("() "))
+        position, sign = found.end(), -1 if found["operator"] == "/" else 1
+        if position == len(text) and not found["operator"]:
+            return
+    raise InputError(_UNKNOWN.format(unit))
+
+
+def _power(base: Fraction, exponent: Fraction) -> Fraction:
+    if exponent.denominator == 1 or base == 1:
+        return base ** int(exponent)
+    with localcontext() as context:
+        context.prec = 60
+        power = Decimal(exponent.numerator) / Decimal(exponent.denominator)
+        root: Decimal = context.power(Decimal(base.numerator) / Decimal(base.denominator), power)
+        return Fraction(root)
+
+
+@lru_cache(maxsize=1)
+def _registry() -> UnitRegistry[Fraction]:
+    from pint import UnitRegistry
+
+    registry: UnitRegistry[Fraction] = UnitRegistry(None, non_int_type=Fraction)
+    lines = files("printhammer").joinpath("units.txt").read_text(encoding="utf-8").splitlines()
+    registry.load_definitions(lines)
+    return registry
