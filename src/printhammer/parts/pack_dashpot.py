@@ -33,10 +33,10 @@ def pack_loading(c: Any, x: float, v: float) -> float:
     Returns
     -------
     float
-        Force, N, negative where it pushes the armature back; 0 for x <= xp.
+        Force, N, negative where it pushes the armature back; 0 for x < xp.
     """
     depth = x - c[2]
-    if depth <= 0.0:
+    if depth < 0.0:
         return 0.0
     push = c[0] * depth + c[1] * v
     if push < 0.0 and c[3] == 0.0:
@@ -59,10 +59,10 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
     Returns
     -------
     float
-        Force, N; 0 for x <= xp.
+        Force, N; 0 for x < xp.
     """
     depth = x - c[2]
-    if depth <= 0.0:
+    if depth < 0.0:
         return 0.0
     push = c[0] * depth + c[1] * v
     if push < 0.0 and c[3] == 0.0:
