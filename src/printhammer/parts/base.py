@@ -8,9 +8,12 @@ the floats of `packed` as one float64 array `c`.
 from __future__ import annotations
 
 import math
-from typing import ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 ROLES: tuple[str, ...] = ("magnet", "spring", "pack", "backstop")
 
@@ -45,6 +48,10 @@ class Part(BaseModel):
             In SI, in the order that the part's module states.
         """
         raise NotImplementedError
+
+    def content(self) -> Mapping[str, Any]:
+        """Return the numbers, read from a file, that belong to the identity of the part."""
+        return {}
 
     @property
     def module(self) -> str:
