@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -34,6 +34,10 @@ POLYNOMIAL: Final = 0
 EXPONENTIAL: Final = 1
 SINE: Final = 2
 COLUMNS: Final = 6
+
+_CHUNK: Final = 1024
+_REFINED: Final = 16
+_ROUNDS: Final = 9
 
 
 def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:
@@ -131,4 +135,40 @@ def largest(segments: FloatArray, until: float = math.inf) -> float:
             else:
                 value = p0 + s * (p1 + s * (p2 + s * p3))
             best = max(best, abs(value))
+    return best
+
+
+def largest_sum(segments: FloatArray, times: FloatArray, value: Callable[[FloatArray], FloatArray]) -> float:
+    """Find the largest absolute value of the sum of pulses fired at the given times.
+
+    Every interval between neighbouring edges, inside which the sum is smooth, is sampled (densely near its
+    start, where exponentials change), and the intervals with the largest samples are refined until the
+    place of their largest value is known to 1e-9 of the interval.
+
+    Parameters
+    ----------
+    segments
+        Segment table with a finite support.
+    times
+        Firing times, s, ascending.
+    value
+        The sum at given times.
+    """
+    fractions = np.union1d(np.linspace(0.0, 1.0, 33), np.geomspace(1e-6, 1.0, 31))
+    edges = np.unique(np.add.outer(times, segments[:, 0]))
+    starts, ends = edges[:-1], np.nextafter(edges[1:], -np.inf)
+    sampled = np.empty(len(starts))
+    for k in range(0, len(starts), _CHUNK):
+        part = slice(k, k + _CHUNK)
+        grid = starts[part, np.newaxis] + (ends - starts)[part, np.newaxis] * fractions
+        sampled[part] = np.abs(value(np.minimum(grid, ends[part, np.newaxis]))).max(axis=1)
+    best = float(sampled.max())
+    for k in np.argsort(sampled)[-_REFINED:]:
+        grid = np.minimum(starts[k] + (ends[k] - starts[k]) * fractions, ends[k])
+        for _ in range(_ROUNDS):
+            heights = np.abs(value(grid))
+            top = int(heights.argmax())
+            best = max(best, float(heights[top]))
+            low, high = grid[max(top - 1, 0)], grid[min(top + 1, len(grid) - 1)]
+            grid = np.minimum(np.linspace(low, high, 33), ends[k])
     return best
