@@ -14,10 +14,15 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
-from pydantic import BaseModel, Field, ValidationInfo
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo
 from pydantic_core import PydanticUndefined
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 Status = Literal["stated", "derived", "reconstructed", "assumed"]
 STATUSES: tuple[str, ...] = get_args(Status)
@@ -158,3 +163,60 @@ def folder_of(info: ValidationInfo) -> Path:
     context = info.context
     folder = context.get("folder") if isinstance(context, dict) else None
     return Path(folder) if folder is not None else Path()
+
+
+def expected(note: Quantity) -> str:
+    """Return what a message says of the bounds of a constant, such as "more than 0 m"."""
+    unit = "" if note.si == "1" else f" {note.si}"
+    bounds = (
+        ("more than ", note.gt, ""),
+        ("", note.ge, " or more"),
+        ("less than ", note.lt, ""),
+        ("", note.le, " or less"),
+    )
+    said = [f"{before}{bound:g}{unit}{after}" for before, bound, after in bounds if bound is not None]
+    return " and ".join(said) or f"a finite number{unit}"
+
+
+def shown(value: object) -> str:
+    """Return the text of a value for a message, on one line and not too long."""
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def sentence(
+    error: ValidationError, model: type[BaseModel], prefix: str = "", written: Mapping[str, str] | None = None
+) -> str:
+    """Tell the first fault of a pydantic validation in one sentence.
+
+    Parameters
+    ----------
+    error : ValidationError
+        From validating `model`.
+    model : type of BaseModel
+        The model class.
+    prefix : str
+        What stands before a field's name in a key, such as "magnet.".
+    written : mapping, optional
+        Text of values as the user wrote them, by field name.
+
+    Returns
+    -------
+    str
+        Key, value and what was expected; the sentence of an `InputError` that a validator raised, as it is.
+    """
+    fault = error.errors(include_url=False)[0]
+    cause = fault.get("ctx", {}).get("error")
+    if isinstance(cause, InputError):
+        return str(cause)
+    name = ".".join(str(step) for step in fault["loc"])
+    if not name:
+        return f"{prefix.rstrip('.')}: {fault['msg'].removeprefix('Value error, ')}".removeprefix(": ")
+    key, kind, note = prefix + name, fault["type"], quantities(model).get(name)
+    wanted = expected(note) if note else fault["msg"].removeprefix("Input should be ")
+    if kind == "missing":
+        return f"{key} is missing, expected {note.meaning if note else 'it'}"
+    text = (written or {}).get(name) or shown(fault["input"])
+    if kind == "extra_forbidden":
+        return f"{key} = {text} is not known, expected one of {', '.join(model.model_fields)}"
+    return f"{key} = {text}: expected {wanted}"

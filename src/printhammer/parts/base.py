@@ -10,7 +10,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from printhammer.constants import sentence
+from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,12 +30,28 @@ class Part(BaseModel):
         "magnet", "spring", "pack" or "backstop".
     law : str
         Name of the law in hammer files.
+
+    Raises
+    ------
+    InputError
+        A constant is missing, unknown, not a finite number or out of its bounds.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     role: ClassVar[str]
     law: ClassVar[str]
+
+    if not TYPE_CHECKING:
+
+        def __init__(self, /, **data: Any) -> None:
+            try:
+                super().__init__(**data)
+            except ValidationError as error:
+                raise InputError(sentence(error, type(self), f"{self.role}.")) from None
+
+        # Lets model_validate keep its context (the folder of the file), which a custom __init__ would lose.
+        __init__.__pydantic_base_init__ = True
 
     def packed(self, origin: float) -> tuple[float, ...]:
         """Return the numbers that the law functions of this part read from `c`.
