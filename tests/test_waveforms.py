@@ -102,10 +102,10 @@ def test_waveforms_are_values() -> None:
     ("shape", "constants", "told"),
     [
         (HalfSine, {"amplitude": 1.0}, "width"),
-        (HalfSine, {"amplitude": 1.0, "width": 0.0}, "width = 0.0.*greater than 0"),
-        (HalfSine, {"amplitude": 1.0, "width": -1.0}, "width = -1.0.*greater than 0"),
+        (HalfSine, {"amplitude": 1.0, "width": 0.0}, "width = 0.0: expected more than 0 s"),
+        (HalfSine, {"amplitude": 1.0, "width": -1.0}, "width = -1.0: expected more than 0 s"),
         (HalfSine, {"amplitude": math.nan, "width": 1.0}, "amplitude = nan.*finite"),
-        (HalfSine, {"amplitude": 1.0, "width": math.inf}, "width = inf.*finite"),
+        (HalfSine, {"amplitude": 1.0, "width": math.inf}, "width = inf"),
         (HalfSine, {"amplitude": 1.0, "width": 1.0, "widht": 1.0}, "widht"),
         (Rectangle, {"amplitude": 1.0, "width": 1.0, "rise": -1.0, "decay": 0.0}, "rise = -1.0"),
         (Trapezoid, {"amplitude": 1.0, "width": 1.0, "rise": 0.0, "fall": "x"}, "x"),

@@ -34,11 +34,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import ValidationError
 
-from printhammer.constants import quantities
+from printhammer.constants import quantities, sentence, shown
 from printhammer.drive import Burst, Drive, PulseTrain, SineForce
 from printhammer.drive_text import FORMAT
 from printhammer.errors import InputError
-from printhammer.waveform_base import QUANTITY_UNITS, Waveform, one_sentence, shown
+from printhammer.waveform_base import QUANTITY_UNITS, Waveform
 from printhammer.waveforms import SHAPES, Sampled
 
 if TYPE_CHECKING:
@@ -254,7 +254,7 @@ def _waveform(table: dict[str, Any], folder: Path) -> Waveform:
     try:
         return model.model_validate(fields, context={"folder": folder})
     except ValidationError as error:
-        raise InputError(one_sentence(error, "waveform.")) from None
+        raise InputError(sentence(error, model, "waveform.")) from None
 
 
 def _samples(data: dict[str, Any]) -> Waveform:

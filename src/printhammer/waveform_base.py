@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from printhammer.constants import quantities
+from printhammer.constants import quantities, sentence
 from printhammer.errors import InputError
 from printhammer.segments import FloatArray, evaluate, largest
 
@@ -17,26 +17,6 @@ if TYPE_CHECKING:
 QuantityName = Literal["current", "force"]
 QUANTITY_UNITS: Final[dict[str, QuantityName]] = {"A": "current", "N": "force"}
 """What a waveform drives, by the SI unit of its amplitude."""
-
-
-def one_sentence(error: ValidationError, prefix: str) -> str:
-    """Tell the first fault of a pydantic validation in one sentence; `prefix` comes before the key."""
-    fault = error.errors(include_url=False)[0]
-    cause = fault.get("ctx", {}).get("error")
-    if isinstance(cause, InputError):
-        return str(cause)
-    key = prefix + ".".join(str(step) for step in fault["loc"])
-    if fault["type"] == "missing":
-        return f"{key} is missing"
-    if fault["type"] == "extra_forbidden":
-        return f"{key} = {shown(fault['input'])} is not known"
-    return f"{key} = {shown(fault['input'])}: {fault['msg'].removeprefix('Input ')}"
-
-
-def shown(value: object) -> str:
-    """Return the text of a value for a message, on one line and not too long."""
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
 
 
 class Waveform(BaseModel):
@@ -62,7 +42,7 @@ class Waveform(BaseModel):
             try:
                 super().__init__(**data)
             except ValidationError as error:
-                raise InputError(one_sentence(error, f"{self.shape} waveform: ")) from None
+                raise InputError(sentence(error, type(self), f"{self.shape} waveform: ")) from None
 
         # Lets model_validate keep its context (the folder of the file), which a custom __init__ would lose.
         __init__.__pydantic_base_init__ = True
