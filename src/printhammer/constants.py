@@ -215,7 +215,7 @@ def sentence(
     key, kind, note = prefix + name, fault["type"], quantities(model).get(name)
     wanted = expected(note) if note else fault["msg"].removeprefix("Input should be ")
     if kind == "missing":
-        return f"{key} is missing, expected {note.meaning if note else 'it'}"
+        return f"{key} is missing, expected {note.meaning} ({note.si})" if note else f"{key} is missing"
     text = (written or {}).get(name) or shown(fault["input"])
     if kind == "extra_forbidden":
         return f"{key} = {text} is not known, expected one of {', '.join(model.model_fields)}"

@@ -286,13 +286,15 @@ class Hammer:
             The file cannot be written, or a table beside it would overwrite another; what was there stays.
         """
         target = Path(path)
+        draft = target.with_name(target.name + ".part")
         try:
-            for name, data in self._tables(target).items():
-                (target.parent / name).write_bytes(data)
-            draft = target.with_name(target.name + ".part")
+            tables = self._tables(target)
             draft.write_bytes(self.to_toml().encode())
+            for name, data in tables.items():
+                (target.parent / name).write_bytes(data)
             draft.replace(target)
         except OSError as error:
+            draft.unlink(missing_ok=True)
             raise InputError(f"{target}: the hammer file cannot be written ({error.strerror})") from None
 
     def _tables(self, target: Path) -> dict[str, bytes]:

@@ -30,7 +30,7 @@ def schema() -> dict[str, Any]:
     Returns
     -------
     dict
-        What a file may hold. Dimensions, positions out of order and what stands in the place of another constant
+        What a file may hold. Dimensions, the order of positions and constants that stand in the place of others
         are left to `printhammer hammer check`.
     """
     properties: dict[str, Any] = {"format": {"const": FORMAT, "description": "version of the file format"}}

@@ -5,7 +5,8 @@
 Source: Hooke's law. With the preload Bs and the stiffness Bs/As this is equation (4) of the paper. A negative
 stiffness describes the pull of a magnet linearised about a point, or a buckled spring; a preload of zero with
 b = 0 is the spring of the textbook impact oscillator.
-Validity: the linear range of the spring; b is the position of the backstop (0 without one).
+Validity: the linear range of the spring; b is the position of the backstop (0 without one). Weakness: neither
+mass nor damping of its own.
 
 Packed constants: c = [preload, stiffness, b].
 """

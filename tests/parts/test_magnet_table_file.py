@@ -1,0 +1,103 @@
+"""Force tables from CSV files: what is read, and what is refused."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from printhammer.errors import InputError
+from printhammer.parts.magnet_table import TableMagnet
+
+GRID = """# measured on 1982-11-03
+displacement [mm],current [A],force [N]
+0.1,0,1
+0.1,1,2
+0.2,0,3
+0.2,1,4.5
+"""
+
+
+def read(path: Path, text: str | bytes) -> TableMagnet:
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return TableMagnet(file=str(path))
+
+
+def test_units_and_order_do_not_matter(tmp_path: Path) -> None:
+    plain = read(tmp_path / "plain.csv", GRID)
+    assert plain.table.x == (1e-4, 2e-4)
+    assert plain.table.current == (0.0, 1.0)
+    assert plain.table.force == ((1.0, 2.0), (3.0, 4.5))
+    assert plain.domain == (1e-4, 2e-4)
+    assert plain.current_range == (0.0, 1.0)
+    other = "\ufeffforce [mN], current [mA] ,displacement [um]\r\n4500,1000,200\r\n\r\n2000,1000,100\r\n"
+    other += "3000,0,200\r\n1000,0,100\r\n"
+    assert read(tmp_path / "other.csv", other).table == plain.table
+
+
+def test_two_tables_are_equal_if_their_points_are(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    first = read(path, GRID)
+    assert read(path, GRID) == first
+    assert read(path, GRID.replace("4.5", "4.6")) != first
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "the file is empty"),
+        ("# nothing\n\n", "the file is empty"),
+        (GRID.replace(" [A]", ""), "column 'current' has no unit"),
+        (GRID.replace("[A]", "[]"), "column 'current []' has no unit"),
+        (GRID.replace("[A]", "[V]"), "the unit 'V' is a voltage, expected a current (A)"),
+        (GRID.replace("[mm]", "[parsec]"), "the unit 'parsec' is not known"),
+        (
+            GRID.replace("current", "voltage"),
+            "the heading is 'displacement [mm],voltage [A],force [N]', expected",
+        ),
+        (GRID.replace(",force [N]", ""), "the heading is 'displacement [mm],current [A]', expected"),
+        (GRID.replace("current [A]", "force [N]"), "the heading is"),
+        (GRID.replace("0.2,0,3\n", ""), "the point 0.0002 m, 0 A is missing, expected a complete grid of 2"),
+        (GRID.replace("0.2,0,3", "0.1,0,3"), "the point 0.0001 m, 0 A is given twice"),
+        (
+            GRID.replace("0.2,0,3\n", "").replace("0.2,1,4.5\n", ""),
+            "1 different displacements, expected at least 2",
+        ),
+        (
+            GRID.replace("0.1,1,2\n", "").replace("0.2,1,4.5\n", ""),
+            "1 different currents, expected at least 2",
+        ),
+        (GRID.replace(",0,", ",3,"), "the currents go from 1 to 3 A, expected a range with 0 A in it"),
+        (GRID.replace("4.5", "four"), "line 6: 'four' is expected to be a finite number"),
+        (GRID.replace("4.5", "nan"), "line 6: 'nan' is expected to be a finite number"),
+        (GRID.replace("4.5", ""), "line 6: '' is expected to be a finite number"),
+        (GRID.replace("4.5", "4.5,6"), "line 6 has 4 cells, expected 3"),
+        (GRID.replace("4.5", "1e308").replace("[N]", "[kN]"), "line 6: 1e+308 kN is not a finite number"),
+        (GRID.replace("4.5", '"4.5'), "expected comma-separated values"),
+        (b"\xff\xfe\x00", "expected to be UTF-8 text"),
+    ],
+)
+def test_a_bad_table_is_refused_in_one_sentence(tmp_path: Path, text: str | bytes, sentence: str) -> None:
+    path = tmp_path / "bad.csv"
+    with pytest.raises(InputError) as caught:
+        read(path, text)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["absent.csv", "."])
+def test_a_table_that_cannot_be_read_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="the force table cannot be read"):
+        TableMagnet(file=str(tmp_path / name))
+
+
+@given(st.text(max_size=60), st.integers(0, len(GRID)))
+def test_any_text_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, text: str, place: int) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    told = ""
+    try:
+        read(path, (GRID[:place] + text + GRID[place:]).encode("utf-8", "replace"))
+    except InputError as error:
+        told = str(error)
+    assert "\n" not in told

@@ -1,0 +1,220 @@
+"""Every part: registered, complete, frozen, compilable by numba, the same in Python and in machine code."""
+
+import inspect
+import pickle
+from importlib import import_module
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from printhammer.constants import options, quantities
+from printhammer.errors import InputError
+from printhammer.parts import (
+    PARTS,
+    ROLES,
+    BackstopPart,
+    MagnetPart,
+    PackPart,
+    Part,
+    SpringPart,
+    laws,
+    register,
+)
+from printhammer.parts.backstop_elastomer import ElastomerBackstop
+from printhammer.parts.backstop_hertz import HertzBackstop
+from printhammer.parts.backstop_rigid import RigidBackstop
+from printhammer.parts.magnet_inverse_root import InverseRootMagnet
+from printhammer.parts.magnet_table import TableMagnet
+from printhammer.parts.pack_dashpot import DashpotPack
+from printhammer.parts.pack_power import PowerPack
+from printhammer.parts.spring_linear import LinearSpring
+from printhammer.parts.spring_preload import PreloadSpring
+from printhammer.units import to_si
+
+ARGUMENTS = {
+    "magnet_force": 3,
+    "magnet_energy": 2,
+    "spring_force": 2,
+    "spring_energy": 2,
+    "pack_loading": 3,
+    "pack_memory": 2,
+    "pack_unloading": 4,
+    "pack_switch": 3,
+    "backstop_elastic": 2,
+    "backstop_viscous": 3,
+    "backstop_energy": 2,
+    "backstop_switch": 3,
+    "backstop_rebound": 2,
+}
+EXAMPLES: list[Part] = [
+    InverseRootMagnet(F0=2.47, Am=0.437, Bm=0.093),
+    TableMagnet.from_arrays(
+        [1e-4, 2e-4, 3e-4, 4e-4],
+        [-1.0, 0.0, 2.0],
+        [[k * j + 0.1 * j * j for j in range(3)] for k in range(4)],
+    ),
+    LinearSpring(Bs=14.0, As=4.7e-4),
+    PreloadSpring(preload=14.0, stiffness=-3e4),
+    PowerPack(stiffness=259.0, front=1.5e-4, thickness=1.8e-4),
+    DashpotPack(stiffness=1e5, damping=2.0, front=1.5e-4),
+    HertzBackstop(position=5e-5, stiffness=1.2e9, damping=4e8),
+    ElastomerBackstop(position=5e-5, stiffness=8e7, relaxation_time=2e-5),
+    RigidBackstop(position=5e-5, restitution=0.4),
+]
+BASES = {"magnet": MagnetPart, "spring": SpringPart, "pack": PackPart, "backstop": BackstopPart}
+
+
+def ids(part: Part) -> str:
+    return f"{part.role}-{part.law}"
+
+
+def functions(module: ModuleType, role: str) -> dict[str, object]:
+    return {
+        name: getattr(module, name) for name in ARGUMENTS if name.startswith(role) and hasattr(module, name)
+    }
+
+
+def test_there_is_an_example_of_every_part() -> None:
+    assert {(part.role, part.law) for part in EXAMPLES} == set(PARTS)
+    assert {role for role, _ in PARTS} == set(ROLES)
+
+
+def test_absent_has_every_law_with_its_arguments() -> None:
+    absent = import_module("printhammer.parts.absent")
+    assert absent.MEMORY is False
+    assert absent.RIGID is False
+    for name, count in ARGUMENTS.items():
+        assert len(inspect.signature(getattr(absent, name)).parameters) == count
+
+
+@pytest.mark.parametrize("part", EXAMPLES, ids=ids)
+def test_part_is_whole(part: Part) -> None:
+    kind = type(part)
+    assert PARTS[part.role, part.law] is kind
+    assert issubclass(kind, BASES[part.role])
+    assert part.law in laws(part.role)
+    assert all(isinstance(number, float) for number in part.packed(5e-5))
+    module = import_module(part.module)
+    assert module.__doc__ is not None
+    assert all(word in module.__doc__ for word in ("Source:", "Validity:", "Weakness:", "Packed constants:"))
+    found = functions(module, part.role)
+    assert found
+    for name, function in found.items():
+        assert len(inspect.signature(function).parameters) == ARGUMENTS[name]  # type: ignore[arg-type]
+    for name, note in quantities(kind).items():
+        assert to_si(1.0, note.si, note.si) == 1.0
+        assert note.meaning
+        assert note.symbol
+        assert note.required == kind.model_fields[name].is_required()
+    assert not set(quantities(kind)) & set(options(kind))
+
+
+@pytest.mark.parametrize("part", EXAMPLES, ids=ids)
+def test_part_is_frozen_and_travels(part: Part) -> None:
+    name = next(iter(type(part).model_fields))
+    with pytest.raises(ValueError, match="frozen"):
+        setattr(part, name, 1.0)
+    again = pickle.loads(pickle.dumps(part))
+    assert again == part
+    assert again.packed(5e-5) == part.packed(5e-5)
+
+
+# Roundings differ where the compiler contracts a product and a sum; a few units in the last place.
+@pytest.mark.parametrize("part", EXAMPLES, ids=ids)
+def test_machine_code_agrees_with_python(part: Part) -> None:
+    import numba
+
+    c = np.array(part.packed(5e-5))
+    values = {"x": 2.3e-4, "current": 0.4, "v": -0.7, "q": 2e5, "peak": 2.9e-4, "w": 3e-3, "v_in": -0.5}
+    for function in functions(import_module(part.module), part.role).values():
+        names = [name for name in inspect.signature(function).parameters if name != "c"]  # type: ignore[arg-type]
+        arguments = [values[name] for name in names]
+        compiled = numba.njit(function)
+        assert compiled(c, *arguments) == pytest.approx(function(c, *arguments), rel=1e-14)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields", "sentence"),
+    [
+        (LinearSpring, {"Bs": -1.0, "As": 1.0}, "spring.Bs = -1.0: expected more than 0 N"),
+        (LinearSpring, {"Bs": 1.0}, "spring.As is missing, expected travel from the backstop"),
+        (
+            LinearSpring,
+            {"Bs": 1.0, "As": 1.0, "Cs": 1.0},
+            "spring.Cs = 1.0 is not known, expected one of Bs, As",
+        ),
+        (LinearSpring, {"Bs": float("nan"), "As": 1.0}, "spring.Bs = nan: expected"),
+        (
+            RigidBackstop,
+            {"position": 0.0, "restitution": 1.5},
+            "restitution = 1.5: expected 0 or more and 1 or less",
+        ),
+        (
+            PowerPack,
+            {"stiffness": 1.0, "front": 0.0, "thickness": 0.0},
+            "thickness = 0.0: expected more than 0 m",
+        ),
+        (HertzBackstop, {"position": 0.0, "damping": 1.0}, "backstop: expected stiffness, or instead"),
+        (HertzBackstop, {"position": 0.0, "stiffness": 1.0}, "backstop: expected damping, or instead"),
+        (
+            HertzBackstop,
+            {"position": 0.0, "stiffness": 1.0, "damping": 1.0, "restitution": 0.5},
+            "backstop: expected damping, or instead",
+        ),
+        (
+            HertzBackstop,
+            {"position": 0.0, "stiffness": 1.0, "restitution": 0.5},
+            "backstop: expected damping, or instead",
+        ),
+        (
+            HertzBackstop,
+            {"position": 0.0, "stiffness": 1.0, "damping": 1.0, "radius2": 1.0},
+            "backstop: expected stiffness, or instead",
+        ),
+        (
+            HertzBackstop,
+            {"position": 0.0, "damping": 1.0, "radius1": 1.0, "youngs_modulus1": 1.0},
+            "backstop: expected stiffness, or instead",
+        ),
+        (
+            InverseRootMagnet,
+            {"F0": 1.0, "Am": 1.0, "Bm": 1.0, "range_min": 2.0, "range_max": 1.0},
+            "magnet: range_min is not below range_max",
+        ),
+    ],
+)
+def test_a_part_refuses_in_one_sentence(kind: type[Part], fields: dict[str, object], sentence: str) -> None:
+    with pytest.raises(InputError) as caught:
+        kind(**fields)
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_part_from_elsewhere_can_register(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("printhammer.parts.base.PARTS", dict(PARTS))
+
+    class Rubber(SpringPart):
+        law = "rubber"
+
+    assert register(Rubber) is Rubber
+    assert "rubber" in laws("spring")
+
+    class Other(SpringPart):
+        law = "rubber"
+
+    with pytest.raises(ValueError, match="already taken"):
+        register(Other)
+
+    class Wheel(Part):
+        role = "wheel"
+        law = "round"
+
+    with pytest.raises(ValueError, match="expected one of magnet, spring, pack, backstop"):
+        register(Wheel)
+
+
+def test_domains() -> None:
+    magnet = InverseRootMagnet(F0=1.0, Am=1.0, Bm=1.0, range_min=1e-5, range_max=5e-4)
+    assert magnet.domain == (1e-5, 5e-4)
+    assert InverseRootMagnet(F0=1.0, Am=1.0, Bm=1.0).domain == (0.0, float("inf"))
