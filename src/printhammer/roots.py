@@ -1,0 +1,154 @@
+"""All roots of a scalar function on an interval, to full double precision.
+
+A function of one variable, smooth between the points of a grid, is searched for changes of sign and for
+pairs of roots between grid points; what is found is narrowed down to neighbouring floating-point numbers by
+bisection.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+_PIECES: Final = 16
+_ROUNDS: Final = 16
+_PROBE: Final = 1e-6
+# Rounding makes a root a short stretch of zeros.
+_FLAT: Final = 1e-12
+
+
+@dataclass(frozen=True)
+class Root:
+    """A root and the sign of the function on either side of it, -1 or 1; 0 at an end of the grid."""
+
+    x: float
+    before: int
+    after: int
+
+
+def bisect(function: Callable[[float], float], low: float, high: float) -> float:
+    """Find a root between two points at which the function has different signs.
+
+    Returns
+    -------
+    Of the two neighbouring floating-point numbers between which the sign changes, the one with the smaller
+    value.
+    """
+    at_low, at_high = function(low), function(high)
+    while True:
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            return low if abs(at_low) <= abs(at_high) else high
+        value = function(middle)
+        if value == 0.0:
+            return middle
+        if (value > 0.0) == (at_low > 0.0):
+            low, at_low = middle, value
+        else:
+            high, at_high = middle, value
+
+
+def roots(function: Callable[[float], float], grid: Sequence[float]) -> list[Root]:
+    """Find the roots of a function on an ascending grid.
+
+    Stretches where the function is NaN are passed over, as are those longer than 1e-12 where it is zero,
+    which hold no isolated root. A pair of roots between two grid points is found where the
+    function comes nearer to zero than at both neighbours; two roots that lie closer together than about
+    1e-8 of their distance from the neighbouring grid points may be missed, or given as one.
+    """
+    found: list[Root] = []
+    points = _with_probes(function, grid)
+    for first, last in _stretches([value for _, value in points]):
+        found += _in_stretch(function, points[first : last + 1])
+    return sorted(found, key=lambda root: root.x)
+
+
+def _with_probes(function: Callable[[float], float], grid: Sequence[float]) -> list[tuple[float, float]]:
+    """Evaluate on the grid, and beside grid points that are roots, to see the signs around them."""
+    points: list[tuple[float, float]] = []
+    for k, x in enumerate(grid):
+        value = function(x)
+        if value == 0.0 and k > 0:
+            before = x - _PROBE * (x - grid[k - 1])
+            points.append((before, function(before)))
+        points.append((x, value))
+        if value == 0.0 and k + 1 < len(grid):
+            after = x + _PROBE * (grid[k + 1] - x)
+            points.append((after, function(after)))
+    return points
+
+
+def _stretches(values: Sequence[float]) -> Iterator[tuple[int, int]]:
+    """Split a grid where the function is NaN."""
+    start = None
+    for k, value in enumerate([*values, math.nan]):
+        if math.isnan(value):
+            if start is not None:
+                yield start, k - 1
+            start = None
+        elif start is None:
+            start = k
+
+
+def _in_stretch(function: Callable[[float], float], points: Sequence[tuple[float, float]]) -> list[Root]:
+    found = []
+    last = len(points) - 1
+    k = 0
+    while k <= last:
+        x, value = points[k]
+        if value == 0.0:
+            first = k
+            while k < last and points[k + 1][1] == 0.0:
+                k += 1
+            alone = points[k][0] - points[first][0] <= _FLAT and not (first == 0 and k == last)
+            if alone:
+                before = points[first - 1][1] if first > 0 else 0.0
+                after = points[k + 1][1] if k < last else 0.0
+                found.append(Root(points[(first + k) // 2][0], _sign(before), _sign(after)))
+        elif k < last:
+            after = points[k + 1][1]
+            if value * after < 0.0:
+                found.append(Root(bisect(function, x, points[k + 1][0]), _sign(value), _sign(after)))
+            before = points[k - 1][1] if k > 0 else 0.0
+            same = value * before > 0.0 and value * after > 0.0
+            if (
+                same
+                and abs(value) <= min(abs(before), abs(after))
+                and abs(value) < max(abs(before), abs(after))
+            ):
+                found += _pair(function, points[k - 1][0], x, points[k + 1][0], _sign(value))
+        k += 1
+    return found
+
+
+def _pair(
+    function: Callable[[float], float], low: float, middle: float, high: float, sign: int
+) -> list[Root]:
+    """Look for a pair of roots around a point where the function comes nearest to zero."""
+    left, best, right = low, middle, high
+    height = sign * function(middle)
+    for _ in range(_ROUNDS):
+        grid = [left + (right - left) * k / _PIECES for k in range(_PIECES + 1)]
+        values = [sign * function(x) for x in grid]
+        k = min(range(_PIECES + 1), key=values.__getitem__)
+        if values[k] < height:
+            best, height = grid[k], values[k]
+        if height <= 0.0:
+            break
+        left, right = grid[max(k - 1, 0)], grid[min(k + 1, _PIECES)]
+    if height > 0.0:
+        return []
+    if height == 0.0:
+        return [Root(best, sign, sign)]
+    return [
+        Root(bisect(function, low, best), sign, -sign),
+        Root(bisect(function, best, high), -sign, sign),
+    ]
+
+
+def _sign(value: float) -> int:
+    return (value > 0.0) - (value < 0.0)

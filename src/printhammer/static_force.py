@@ -1,0 +1,189 @@
+"""The force on an armature at rest, from the laws of the parts of a hammer."""
+
+from __future__ import annotations
+
+import math
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from printhammer.parts import absent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart
+
+FAR: Final = 1.0
+"""Distance from the origin up to which equilibria are sought where the hammer sets no limit, m."""
+
+
+class HammerLike(Protocol):
+    """What this module reads of a hammer."""
+
+    @property
+    def name(self) -> str:
+        """Name, for messages."""
+
+    @property
+    def mass(self) -> float:
+        """Mass of the armature, kg."""
+
+    @property
+    def magnet(self) -> MagnetPart | None:
+        """Magnet."""
+
+    @property
+    def spring(self) -> SpringPart | None:
+        """Spring."""
+
+    @property
+    def pack(self) -> PackPart | None:
+        """Ribbon and paper."""
+
+    @property
+    def backstop(self) -> BackstopPart | None:
+        """Backstop."""
+
+    @property
+    def platen(self) -> float | None:
+        """Position of the platen, m."""
+
+    @property
+    def origin(self) -> float:
+        """Position of the backstop, or 0 without one, m."""
+
+
+class StaticForce:
+    """The force of the parts on an armature at rest at x, and where it is defined.
+
+    Magnet, spring and the elastic force of the backstop are functions of x; the pack acts with the loading
+    branch at rest, as when fresh paper is slowly pressed.
+
+    Attributes
+    ----------
+    rigid : bool
+        Whether the backstop is rigid: positions below it do not exist.
+    limits : tuple of float
+        Where the law of the magnet holds and a rigid backstop lets the armature be, m.
+    low, high : float
+        Where equilibria are sought by default, m: from the lower limit of the magnet's law, or the rigid
+        backstop, up to the platen, or to where the pack ends, or to the upper limit of the magnet's law.
+    """
+
+    def __init__(self, hammer: HammerLike) -> None:
+        self.hammer = hammer
+        self._magnet, self._magnet_constants = _law(hammer, hammer.magnet, "magnet_force")
+        self._spring, self._spring_constants = _law(hammer, hammer.spring, "spring_force")
+        self._pack, self._pack_constants = _law(hammer, hammer.pack, "pack_loading")
+        self._backstop, self._backstop_constants = _law(hammer, hammer.backstop, "backstop_elastic")
+        self._position = hammer.backstop.position if hammer.backstop is not None else -math.inf
+        self.front = hammer.pack.front if hammer.pack is not None else math.inf
+        self.rigid = hammer.backstop is not None and bool(_flag(hammer.backstop, "RIGID"))
+        self.memory = hammer.pack is not None and bool(_flag(hammer.pack, "MEMORY"))
+        self.limits = self._limits()
+        self.low, self.high = self._reach()
+        self.end = self.high
+        if hammer.platen is None and hammer.pack is not None:
+            self.end = min(self.high, self.front + getattr(hammer.pack, "thickness", 0.0))
+
+    def free(self, x: float, current: float = 0.0) -> float:
+        """Net force of magnet and spring, N: no contact; NaN outside the range of the magnet's law."""
+        return self.magnet(x, current) + self.spring(x)
+
+    def total(self, x: float, current: float = 0.0) -> float:
+        """Net force with the contacts, N."""
+        return self.free(x, current) + self.elastic(self._position - x) + self.pack(x)
+
+    def magnet(self, x: float, current: float = 0.0) -> float:
+        """Force of the magnet, N."""
+        return float(self._magnet(self._magnet_constants, x, current))
+
+    def spring(self, x: float) -> float:
+        """Force of the spring, N."""
+        return float(self._spring(self._spring_constants, x))
+
+    def elastic(self, depth: float) -> float:
+        """Elastic force of the backstop compressed by a depth, N."""
+        if depth <= 0.0 or self.rigid:
+            return 0.0
+        return float(self._backstop(self._backstop_constants, math.sqrt(depth)))
+
+    def pack(self, x: float) -> float:
+        """Force of the pack pressed slowly, N."""
+        return float(self._pack(self._pack_constants, x, 0.0)) if x > self.front else 0.0
+
+    def slope(self, x: float, current: float = 0.0) -> float:
+        """Differentiate the force with the contacts by x, N/m.
+
+        Each part is differentiated by itself, within its contact or range; the backstop with respect to
+        sqrt(depth), in which its laws are smooth.
+        """
+        low, high = self.hammer.magnet.domain if self.hammer.magnet is not None else (-math.inf, math.inf)
+        room = min(x - low, high - x)
+        step = 0.05 * room if math.isfinite(room) else 1e-3
+        total = derivative(self.spring, x, 1e-3)
+        if self.hammer.magnet is not None:
+            total += derivative(lambda place: self.magnet(place, current), x, step)
+        depth = self._position - x
+        if depth > 0.0 and not self.rigid:
+            w = math.sqrt(depth)
+            total -= derivative(lambda root: self.elastic(root * root), w, 0.2 * w) / (2.0 * w)
+        if x > self.front:
+            total += derivative(self.pack, x, 0.2 * (x - self.front))
+        return total
+
+    def anchors(self) -> list[float]:
+        """Places about which forces vary on short scales, m."""
+        places = [self.low, self.high, self._position, self.front, self.hammer.origin, 0.0]
+        return sorted({place for place in places if self.low <= place <= self.high})
+
+    def _limits(self) -> tuple[float, float]:
+        magnet = self.hammer.magnet
+        low, high = magnet.domain if magnet is not None else (-math.inf, math.inf)
+        return (max(low, self._position) if self.rigid else low), high
+
+    def _reach(self) -> tuple[float, float]:
+        hammer = self.hammer
+        low, high = self.limits
+        if hammer.platen is not None:
+            high = min(high, hammer.platen)
+        elif hammer.pack is not None:
+            # A pack without thickness is searched as deep as its front is away from the origin.
+            high = min(high, self.front + getattr(hammer.pack, "thickness", abs(self.front - hammer.origin)))
+        return max(low, hammer.origin - FAR), min(high, hammer.origin + FAR)
+
+
+def derivative(function: Callable[[float], float], x: float, step: float) -> float:
+    """Differentiate by central differences extrapolated to step 0.
+
+    C. J. F. Ridders, Adv. Eng. Software 4 (1982) 75.
+    """
+    shrink, size = 1.4, 10
+    best, error = math.nan, math.inf
+    row: list[float] = []
+    for _ in range(size):
+        new = [(function(x + step) - function(x - step)) / ((x + step) - (x - step))]
+        factor = shrink * shrink
+        for k, old in enumerate(row):
+            new.append((new[k] * factor - old) / (factor - 1.0))
+            factor *= shrink * shrink
+            doubt = max(abs(new[k + 1] - new[k]), abs(new[k + 1] - old))
+            if doubt <= error:
+                best, error = new[k + 1], doubt
+        if row and abs(new[-1] - row[-1]) >= 2.0 * error:
+            break
+        row = new
+        step /= shrink
+    return best
+
+
+def _law(hammer: HammerLike, part: Part | None, name: str) -> tuple[Callable[..., float], tuple[float, ...]]:
+    """Return a law function of a part and its packed constants."""
+    standard: Callable[..., float] = getattr(absent, name)
+    if part is None:
+        return standard, ()
+    return getattr(import_module(part.module), name, standard), part.packed(hammer.origin)
+
+
+def _flag(part: Part, name: str) -> Any:
+    return getattr(import_module(part.module), name, getattr(absent, name))
