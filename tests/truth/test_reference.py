@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import RectBivariateSpline
 from tests.truth import oracles
 
 from printhammer.drive import PulseTrain, SineForce
@@ -16,6 +17,7 @@ from printhammer.parts.backstop_elastomer import ElastomerBackstop
 from printhammer.parts.backstop_hertz import HertzBackstop
 from printhammer.parts.backstop_rigid import RigidBackstop
 from printhammer.parts.magnet_inverse_root import InverseRootMagnet
+from printhammer.parts.magnet_table import TableMagnet
 from printhammer.parts.pack_dashpot import DashpotPack
 from printhammer.parts.pack_power import PowerPack
 from printhammer.parts.spring_linear import LinearSpring
@@ -366,6 +368,28 @@ def test_leaving_the_range_of_the_magnet_is_a_status() -> None:
     assert run.status == "range left"
     assert run.events[-1].x == pytest.approx(100e-6, rel=1e-12)
     assert np.isnan(run.at(1e-3)[0][0])
+
+
+def test_a_force_table_is_followed_from_cell_to_cell() -> None:
+    x, current = np.linspace(30e-6, 330e-6, 7), np.linspace(0.0, 1.2, 4)
+    gap = MAGNET.Am - MAGNET.Bm * current[None, :]
+    # A coarse table is far from equation (3): what counts is the spline through it.
+    force = MAGNET.F0 - gap**2 / np.sqrt(x[:, None])
+    hammer = made_of(
+        magnet=TableMagnet.from_arrays(x, current, force), spring=SPRING, pack=PACK, backstop=STOP
+    )
+    spline = RectBivariateSpline(x, current, force)
+    run = reference(hammer, ONE_PULSE, 2e-3, tolerance=1e-13)
+    assert run.status == "ok"
+    assert "pack-peak" in kinds(run)
+    for step in run.steps:
+        s = 0.5 * step.length / step.h
+        place, _ = step.at(step.t + 0.5 * step.length)
+        if not STOP.position < place < PACK.front:
+            continue
+        total = spline(place, ONE_PULSE.value(step.t + 0.5 * step.length))[0, 0]
+        total += SPRING.Bs - SPRING.Bs / SPRING.As * (place - STOP.position)
+        assert MASS * np.polynomial.Polynomial(step.v).deriv()(s) / step.h == pytest.approx(total, abs=1e-8)
 
 
 @pytest.mark.parametrize("overlap", ["add", "replace"])

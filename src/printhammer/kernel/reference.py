@@ -485,7 +485,8 @@ def horizon(
     """Return the first of ``times`` at which two references differ by 1e-10 of the stroke, or ``t_end``.
 
     Their tolerances are 1e-12 and 1e-13. ``stroke``, m, is by default the span of the displacement at
-    ``times`` in the finer run; ``state`` as for `reference`. Beyond the horizon no comparison of runs means anything.
+    ``times`` in the finer run; ``state`` as for `reference`. Beyond the horizon no comparison of runs means
+    anything.
     """
     wanted = np.asarray(times, dtype=float)
     coarse = reference(hammer, drive, t_end, state=state, tolerance=1e-12, times=wanted)

@@ -62,7 +62,6 @@ class Table:
         self.edges = (np.asarray(x), np.asarray(current))
         powers = [min(3, edges.size - 1) for edges in self.edges]
         self._spline = RectBivariateSpline(*self.edges, np.asarray(force), kx=powers[0], ky=powers[1])
-        self._powers = powers
         self._cells: dict[tuple[int, int], Array] = {}
 
     def index(self, x: float, current: float) -> tuple[int, int]:
@@ -76,13 +75,16 @@ class Table:
     def packed(self, cell: tuple[int, int]) -> Array:
         """Return (x0, i0, coefficients) of a cell about its centre, where no knot is near."""
         if cell not in self._cells:
-            x, current = (0.5 * (edges[k] + edges[k + 1]) for edges, k in zip(self.edges, cell, strict=True))
-            c = np.zeros((4, 4))
-            for p in range(self._powers[0] + 1):
-                for q in range(self._powers[1] + 1):
-                    slope = float(self._spline(x, current, dx=p, dy=q, grid=False))
-                    c[p, q] = slope / (math.factorial(p) * math.factorial(q))
-            self._cells[cell] = np.array([x, current, *c.ravel()])
+            spans = [edges[k : k + 2] for edges, k in zip(self.edges, cell, strict=True)]
+            middles = [0.5 * (span[0] + span[1]) for span in spans]
+            halves = [0.5 * (span[1] - span[0]) for span in spans]
+            # The spline is one polynomial there: 4 by 4 of its values give the coefficients.
+            nodes = np.array([-0.9, -0.3, 0.3, 0.9])
+            values = self._spline(middles[0] + halves[0] * nodes, middles[1] + halves[1] * nodes)
+            inverse = np.linalg.inv(nodes[:, None] ** np.arange(4))
+            units = [half ** -np.arange(4.0) for half in halves]
+            c = inverse @ values @ inverse.T * units[0][:, None] * units[1]
+            self._cells[cell] = np.array([*middles, *c.ravel()])
         return self._cells[cell]
 
     def guards(self, cell: tuple[int, int], x: Array, current: Array) -> list[tuple[str, Array]]:
@@ -236,6 +238,9 @@ class ReferenceHammer:
 
         # The other forces change slowly: their size at first touch sets the indentation to start from.
         deep = (-outside(0.0) / contact.stiffness) ** (1.0 / contact.power)
-        while inside(deep) <= 0.0:
-            deep *= 1.5
+        deepest = self.position - self.low
+        while deep < deepest and inside(deep) <= 0.0:
+            deep *= 1.1
+        if deep >= deepest:
+            raise ValueError("no rest state at the backstop: give a state to start from")
         return self.position - float(brentq(inside, 0.0, deep, xtol=1e-22, rtol=1e-15))
