@@ -178,9 +178,9 @@ def expected(note: Quantity) -> str:
     return " and ".join(said) or f"a finite number{unit}"
 
 
-def shown(value: object) -> str:
-    """Return the text of a value for a message, on one line and not too long."""
-    text = repr(value)
+def shown(value: object, *, quotes: bool = True) -> str:
+    """Return the text of a value for a message, on one line and not too long; printable text also bare."""
+    text = value if isinstance(value, str) and not quotes and value.isprintable() else repr(value)
     return text if len(text) <= 80 else text[:77] + "..."
 
 
@@ -214,6 +214,8 @@ def sentence(
         return f"{prefix.rstrip('.')}: {fault['msg'].removeprefix('Value error, ')}".removeprefix(": ")
     key, kind, note = prefix + name, fault["type"], quantities(model).get(name)
     wanted = expected(note) if note else fault["msg"].removeprefix("Input should be ")
+    if kind == "bool_type":
+        wanted = "true or false"
     if kind == "missing":
         return f"{key} is missing, expected {note.meaning} ({note.si})" if note else f"{key} is missing"
     text = (written or {}).get(name) or shown(fault["input"])

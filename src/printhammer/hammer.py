@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.resources import files
@@ -294,7 +295,8 @@ class Hammer:
                 (target.parent / name).write_bytes(data)
             draft.replace(target)
         except OSError as error:
-            draft.unlink(missing_ok=True)
+            with suppress(OSError):
+                draft.unlink()
             raise InputError(f"{target}: the hammer file cannot be written ({error.strerror})") from None
 
     def _tables(self, target: Path) -> dict[str, bytes]:

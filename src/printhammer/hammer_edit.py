@@ -114,7 +114,7 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
     kind = getattr(type(value), selector, None) if selector else None
     if kind not in kinds_of(section) or type(value) is not model_of(section, kind):
         raise InputError(f"{section} = {shown(value)}: expected a part, a table, or None")
-    if value.content():
+    if getattr(value, "content", dict)():
         raise InputError(f"{section}: expected a table that names its file, not one read already")
     driven = getattr(value, "quantity", "current")
     fields: dict[str, Any] = {selector: kind}

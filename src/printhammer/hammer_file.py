@@ -214,8 +214,7 @@ def _only(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
         if key not in known:
             close = get_close_matches(key, known, 1)
             hint = f"expected {close[0]!r}" if close else f"expected one of {', '.join(known)}"
-            name = prefix + key if key.isprintable() else shown(prefix + key)
-            raise InputError(f"the key {name} is not known, {hint}")
+            raise InputError(f"the key {shown(prefix + key, quotes=False)} is not known, {hint}")
 
 
 def _read(
@@ -270,7 +269,7 @@ def _constant(key: str, given: Any, note: Quantity) -> Constant:
     try:
         si = to_si(value, texts["unit"], si_unit)
     except InputError as error:
-        raise InputError(f"{key} = {value!r} {texts['unit']}: {error}") from None
+        raise InputError(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}: {error}") from None
     return Constant(
         key=key, value=value, **texts, si=si, meaning=note.meaning, symbol=note.symbol, si_unit=si_unit
     )

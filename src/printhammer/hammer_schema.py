@@ -30,8 +30,8 @@ def schema() -> dict[str, Any]:
     Returns
     -------
     dict
-        What a file may hold. Dimensions, the order of positions and constants that stand in the place of others
-        are left to `printhammer hammer check`.
+        What a file may hold. Dimensions, the order of positions and constants that stand in the place of
+        others are left to `printhammer hammer check`.
     """
     properties: dict[str, Any] = {"format": {"const": FORMAT, "description": "version of the file format"}}
     properties |= {name: {"type": "string", "description": meaning} for name, meaning in TEXTS.items()}

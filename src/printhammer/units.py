@@ -220,7 +220,7 @@ def _measure(unit: str) -> tuple[Fraction, UnitsContainer]:
 def _factors(unit: str) -> Iterator[tuple[str, Fraction]]:
     """Split a unit into names and powers; a slash divides by the one factor that follows it."""
     text, position, sign = unit.translate(_SIGNS), 0, 1
-    while found := _FACTOR.match(text, position):
+    while unit.isprintable() and (found := _FACTOR.match(text, position)):
         if found["name"] != "1":
             yield found["name"], sign * Fraction((found["power"] or "1").strip("() "))
         position, sign = found.end(), -1 if found["operator"] == "/" else 1

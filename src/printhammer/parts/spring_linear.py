@@ -4,8 +4,8 @@
 
 Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (4); b is the position of the backstop (0
 without one).
-Validity: the linear range of the spring. Bs is its force at the backstop, As the travel over which it falls to
-zero. Weakness: neither mass nor damping of its own.
+Validity: the linear range of the spring. Bs is its force at the backstop, As the travel over which it falls
+to zero. Weakness: neither mass nor damping of its own.
 
 Packed constants: c = [Bs, Bs / As, b].
 """
