@@ -1,0 +1,55 @@
+"""Codes of the modes, switches and statuses that the compiled kernel works with.
+
+A mode is a stretch of the motion under one smooth force law; a switch is the instant at which the mode ends.
+"""
+
+# Modes.
+FREE = 0
+"""Neither the pack nor the backstop acts."""
+LOADING = 1
+"""In the pack on the loading branch (packs without memory have only this branch)."""
+UNLOADING = 2
+"""In the pack on the unloading branch of the latest local maximum."""
+RELOADING = 3
+"""In the pack, going in again along the unloading branch."""
+PACK_RELEASED = 4
+"""Beyond the pack front, but the pack has let go and does not pull."""
+BACKSTOP = 5
+"""In the backstop, integrated in the regularised variables."""
+BACKSTOP_RELEASED = 6
+"""Behind the backstop position, but the backstop has let go and does not pull."""
+RESTING = 7
+"""At rest on a rigid backstop."""
+
+# Switches that end a step.
+NO_SWITCH = 0
+EDGE = 1
+REACHED_BACKSTOP = 2
+REACHED_FRONT = 3
+REVERSAL = 4
+LEFT_FRONT = 5
+REACHED_PEAK = 6
+LEFT_BACKSTOP = 7
+PUSH_ENDED = 8
+PUSH_BEGAN = 9
+UNRESOLVED = 10
+"""Not a switch: the step is too long to tell and has to be repeated with half its length."""
+NEAR_TOUCH = 11
+"""Not a switch: an extremum within the margin of a boundary has to be located before one can tell."""
+
+# Statuses of a run.
+OK = 0
+RANGE_LEFT = 1
+RUNAWAY = 2
+STEP_LIMIT = 3
+STEP_UNDERFLOW = 4
+
+STATUS_NAMES = ("ok", "range left", "runaway", "step limit", "step underflow")
+"""Public names of the statuses, by code."""
+
+# Surfaces of a contact.
+PACK_SURFACE = 0
+BACKSTOP_SURFACE = 1
+
+ANY_SCALES = (1.0, 1.0, 1.0)
+"""Scales of an error estimate that is not looked at."""

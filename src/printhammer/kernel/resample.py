@@ -1,0 +1,233 @@
+"""States and forces at any times of a recorded run.
+
+The state inside a step is one shortened step of the same method from the node before it: no interpolation formula, and
+no dependence on the output grid.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compiling import compiled, entry
+from printhammer.kernel.layout import BACKSTOP_PART, MAGNET, PACK, POSITION, SPRING
+from printhammer.kernel.modes import ANY_SCALES, BACKSTOP, BACKSTOP_SURFACE, RELOADING, RESTING, UNLOADING
+
+if TYPE_CHECKING:
+    from printhammer.kernel.contact import contact_rate
+    from printhammer.kernel.dop853 import contact_step
+    from printhammer.kernel.forces import Hammer, acceleration, pack_force
+    from printhammer.kernel.landing import plain_step
+    from printhammer.kernel.laws import (
+        FORCE_DRIVE,
+        HAS_PACK,
+        MEMORY,
+        backstop_elastic,
+        backstop_viscous,
+        magnet_force,
+        pack_memory,
+        spring_force,
+    )
+    from printhammer.kernel.pulses import Drive, drive_value, pass_edges
+
+GOLDEN = 0.3819660112501051
+SAMPLES = 6
+"""Samples in each step of a contact among which its largest depth and force are looked for."""
+
+
+@compiled
+def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
+    """Return what the unloading branch needs of the local maximum `kept` at a node."""
+    if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
+        return pack_memory(hammer[PACK:BACKSTOP_PART], kept)
+    return 0.0
+
+
+@compiled
+def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
+    """Return the s at which a step in the backstop from time `t0` reaches time `t` [s], by Newton's method."""
+    left = t - t0
+    if left <= 0.0:
+        return 0.0
+    under_root = w0 * w0 - v0 * left
+    s = left / (w0 + math.sqrt(under_root)) if under_root > 0.0 else w0 / v0
+    for _ in range(60):
+        t1, w1, _v1, _kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
+        if w1 <= 0.0:
+            s *= 0.9
+            continue
+        change = (t - t1) / (2.0 * w1)
+        s = max(s + change, 0.5 * s)
+        if abs(change) <= 4e-16 * s:
+            break
+    return s
+
+
+@compiled
+def state_in_step(
+    t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
+) -> tuple[float, float, float]:
+    """Return displacement, velocity and w at time `t` [s] in the step that begins at a node."""
+    if mode == RESTING or t <= t0:
+        return x0, v0, kept if mode == BACKSTOP else 0.0
+    if mode == BACKSTOP:
+        kv0 = contact_rate(kept, v0, t0, hammer, drive)
+        if kept == 0.0 and v0 == 0.0:
+            a0 = acceleration(t0, x0, v0, mode, 0.0, hammer, drive)
+            return x0 + 0.5 * a0 * (t - t0) ** 2, a0 * (t - t0), math.sqrt(max(-0.5 * a0, 0.0)) * (t - t0)
+        if v0 == 0.0 and abs(kv0) * (t - t0) <= 1e-9 * abs(kept):
+            # Held at rest: the run does not integrate there either.
+            return x0, v0, kept
+        s = s_at(t, t0, kept, v0, kv0, hammer, drive)
+        _t1, w1, v1, _kv1, _error = contact_step(t0, kept, v0, kv0, s, hammer, drive, ANY_SCALES)
+        return hammer[POSITION] - w1 * w1, v1, w1
+    memory = memory_of(mode, kept, hammer)
+    a0 = acceleration(t0, x0, v0, mode, memory, hammer, drive)
+    x1, v1, _a1, _ex, _ev = plain_step(t0, x0, v0, a0, t - t0, mode, memory, hammer, drive)
+    return x1, v1, 0.0
+
+
+@entry
+def resample(
+    times: Any,
+    nodes: Any,
+    firings: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Any,
+    hammer: Hammer,
+    out: Any,
+) -> None:
+    """Fill `out` with states and forces at `times`.
+
+    Parameters
+    ----------
+    times : float64 array, shape (n,)
+        Ascending, inside the run [s].
+    nodes, firings, pieces, replace, under_way, live, hammer
+        As recorded and given in :func:`printhammer.kernel.run.run`.
+    out : float64 array, shape (n, 9)
+        Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of the
+        backstop, mode. At the time of an impact or a switch: the state after it.
+    """
+    first, last = 0, 0
+    first, last, _edge = pass_edges(nodes[0, 0], firings, pieces, replace, under_way, first, last, live)
+    i = 0
+    for row in range(times.size):
+        t = times[row]
+        moved = False
+        while i + 1 < nodes.shape[0] and nodes[i + 1, 0] <= t:
+            i += 1
+            moved = True
+        if moved:
+            first, last, _edge = pass_edges(
+                nodes[i, 0], firings, pieces, replace, under_way, first, last, live
+            )
+        mode = int(nodes[i, 3])
+        kept = nodes[i, 4]
+        x, v, w = state_in_step(t, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, live)
+        value = drive_value(t, live)
+        out[row, 0] = x
+        out[row, 1] = v
+        out[row, 2] = value
+        out[row, 3] = magnet_force(hammer[MAGNET:], x, 0.0 if FORCE_DRIVE else value)
+        out[row, 4] = spring_force(hammer[SPRING:PACK], x)
+        out[row, 5] = pack_force(x, v, mode, memory_of(mode, kept, hammer), hammer)
+        out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if mode == BACKSTOP else 0.0
+        out[row, 7] = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if mode == BACKSTOP else 0.0
+        out[row, 8] = mode
+
+
+@compiled
+def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, drive: Drive) -> tuple[float, float]:
+    """Return depth [m] and contact force [N] at time `t` in the step that begins at `node`."""
+    mode = int(node[3])
+    x, v, w = state_in_step(t, node[0], node[1], node[2], mode, node[4], hammer, drive)
+    if surface == BACKSTOP_SURFACE:
+        force = 0.0
+        if mode == BACKSTOP:
+            c = hammer[BACKSTOP_PART:MAGNET]
+            force = backstop_elastic(c, w) + backstop_viscous(c, w, v)
+        return hammer[POSITION] - x, force
+    return x - hammer[2], -pack_force(x, v, mode, memory_of(mode, node[4], hammer), hammer)
+
+
+@compiled
+def refined(
+    which: int, low: float, high: float, node: Any, surface: int, hammer: Hammer, drive: Drive
+) -> tuple[float, float]:
+    """Return time and value of the largest depth (`which` 0) or force (1) between two times, by golden section."""
+    t1 = low + GOLDEN * (high - low)
+    t2 = high - GOLDEN * (high - low)
+    f1 = depth_and_force(t1, node, surface, hammer, drive)[which]
+    f2 = depth_and_force(t2, node, surface, hammer, drive)[which]
+    for _ in range(42):
+        if f1 > f2:
+            high, t2, f2 = t2, t1, f1
+            t1 = low + GOLDEN * (high - low)
+            f1 = depth_and_force(t1, node, surface, hammer, drive)[which]
+        else:
+            low, t1, f1 = t1, t2, f2
+            t2 = high - GOLDEN * (high - low)
+            f2 = depth_and_force(t2, node, surface, hammer, drive)[which]
+    return (t1, f1) if f1 > f2 else (t2, f2)
+
+
+@entry
+def peaks(
+    contacts: Any,
+    nodes: Any,
+    firings: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Any,
+    hammer: Hammer,
+    out: Any,
+) -> None:
+    """Fill `out`, shape (number of contacts, 3), with the time [s] of the largest depth, that depth [m] and the peak force [N].
+
+    `contacts` are as recorded; the steps of a contact begin at its node and end at the first node not before its end.
+    """
+    first, last = 0, 0
+    for row in range(contacts.shape[0]):
+        surface = int(contacts[row, 0])
+        i = int(contacts[row, 5])
+        deepest = (nodes[i, 0], 0.0)
+        strongest = 0.0
+        while i + 1 < nodes.shape[0] and not (nodes[i, 0] >= contacts[row, 3]):
+            node = nodes[i]
+            first, last, _edge = pass_edges(node[0], firings, pieces, replace, under_way, first, last, live)
+            start, stop = node[0], nodes[i + 1, 0]
+            best = 0
+            best_force = 0
+            best_value = -1.0
+            best_force_value = -1.0
+            for j in range(SAMPLES + 1):
+                depth, force = depth_and_force(
+                    start + (stop - start) * j / SAMPLES, node, surface, hammer, live
+                )
+                if depth > best_value:
+                    best, best_value = j, depth
+                if force > best_force_value:
+                    best_force, best_force_value = j, force
+            # An extremum inside the step may lie beside the best sample and exceed all values so far.
+            if best_value >= 0.9 * deepest[1] and stop > start:
+                low = start + (stop - start) * max(best - 1, 0) / SAMPLES
+                high = start + (stop - start) * min(best + 1, SAMPLES) / SAMPLES
+                found = refined(0, low, high, node, surface, hammer, live)
+                if best_value >= found[1]:
+                    found = (start + (stop - start) * best / SAMPLES, best_value)
+                if found[1] > deepest[1]:
+                    deepest = found
+            if best_force_value >= 0.9 * strongest and stop > start:
+                low = start + (stop - start) * max(best_force - 1, 0) / SAMPLES
+                high = start + (stop - start) * min(best_force + 1, SAMPLES) / SAMPLES
+                strongest = max(
+                    strongest, best_force_value, refined(1, low, high, node, surface, hammer, live)[1]
+                )
+            i += 1
+        out[row, 0] = deepest[0]
+        out[row, 1] = deepest[1]
+        out[row, 2] = strongest

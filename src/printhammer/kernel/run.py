@@ -1,0 +1,392 @@
+"""One run of one hammer: the loop over steps, switches and edges of the drive."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compiling import compiled, entry
+from printhammer.kernel.landing import FAILED
+from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION
+from printhammer.kernel.modes import (
+    BACKSTOP,
+    BACKSTOP_RELEASED,
+    BACKSTOP_SURFACE,
+    EDGE,
+    FREE,
+    LEFT_BACKSTOP,
+    LEFT_FRONT,
+    LOADING,
+    NO_SWITCH,
+    OK,
+    PACK_RELEASED,
+    PACK_SURFACE,
+    PUSH_BEGAN,
+    PUSH_ENDED,
+    RANGE_LEFT,
+    REACHED_BACKSTOP,
+    REACHED_FRONT,
+    REACHED_PEAK,
+    RELOADING,
+    RESTING,
+    REVERSAL,
+    RUNAWAY,
+    STEP_LIMIT,
+    STEP_UNDERFLOW,
+    UNLOADING,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.contact import advance_contact, contact_rate
+    from printhammer.kernel.forces import Hammer, acceleration
+    from printhammer.kernel.landing import advance
+    from printhammer.kernel.laws import (
+        BACKSTOP_PULLS,
+        HAS_BACKSTOP,
+        HAS_PACK,
+        MEMORY,
+        RELOAD_ALONG_UNLOADING,
+        RIGID,
+        backstop_rebound,
+        backstop_switch,
+        pack_memory,
+    )
+    from printhammer.kernel.pulses import Drive, pass_edges
+    from printhammer.kernel.record import add_node, close_contact, open_contact
+
+HELD = 1e-15
+"""Where the motion over one characteristic time is below this share of the scales, the armature is held still."""
+
+
+@compiled
+def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
+    """Return the mode of an initial state; a state in the pack meets fresh paper at its own depth."""
+    if HAS_BACKSTOP:
+        b = hammer[POSITION]
+        if x < b and not RIGID:
+            if (
+                not BACKSTOP_PULLS
+                and backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(b - x), v) <= 0.0
+            ):
+                return BACKSTOP_RELEASED
+            return BACKSTOP
+        if x <= b and RIGID and v <= 0.0:
+            return RESTING if v == 0.0 and a < 0.0 else FREE
+        if x == b and (v < 0.0 or (v == 0.0 and a < 0.0)):
+            return BACKSTOP
+    if HAS_PACK and x >= hammer[FRONT]:
+        if x > hammer[FRONT] and v < 0.0 and MEMORY:
+            return UNLOADING
+        if x > hammer[FRONT] or v > 0.0:
+            return LOADING
+    return FREE
+
+
+@compiled
+def time_to_level(distance: float, v: float, a: float) -> float:
+    """Return the time [s] in which a constant acceleration covers `distance` >= 0, infinity if it never does."""
+    if v <= 0.0 and a <= 0.0:
+        return math.inf
+    under_root = v * v + 2.0 * a * distance
+    if under_root < 0.0:
+        return math.inf
+    root = math.sqrt(under_root)
+    if v > 0.0:
+        return 2.0 * distance / (v + root)
+    return (root - v) / a
+
+
+@compiled
+def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Hammer) -> float:
+    """Shorten a step that would overshoot the backstop or the pack front by far."""
+    if HAS_BACKSTOP and mode == FREE and x >= hammer[POSITION]:
+        h = (
+            min(h, 1.02 * time_to_level(x - hammer[POSITION], -v, -a))
+            if x > hammer[POSITION] or v < 0.0
+            else (min(h, -2.04 * v / a) if a < 0.0 and v > 0.0 else h)
+        )
+    if HAS_PACK and mode == FREE and x < hammer[FRONT]:
+        h = min(h, 1.02 * time_to_level(hammer[FRONT] - x, v, a))
+    return h
+
+
+@compiled
+def out_of_bounds(x: float, bounds: Any) -> int:
+    """Return the status of a displacement: `bounds` is (lowest, highest, origin, far)."""
+    if not (bounds[0] <= x <= bounds[1]):
+        return RANGE_LEFT
+    if abs(x - bounds[2]) > bounds[3]:
+        return RUNAWAY
+    return OK
+
+
+@compiled
+def failure(x: float, v: float, bounds: Any, control: Any) -> int:
+    """Return the status of a run whose step became too short."""
+    near = 0.05 * control[0]
+    if (x - bounds[0] < near and v <= 0.0) or (bounds[1] - x < near and v >= 0.0):
+        return RANGE_LEFT
+    return STEP_UNDERFLOW
+
+
+@compiled
+def reversed_mode(
+    t: float, x: float, mode: int, peak: float, memory: float, hammer: Hammer, drive: Drive
+) -> tuple[int, float, float]:
+    """Return mode, peak and memory after the velocity became zero inside the pack."""
+    if mode == LOADING:
+        if acceleration(t, x, 0.0, LOADING, memory, hammer, drive) > 0.0:
+            return LOADING, peak, memory
+        return UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
+    if mode == RELOADING:
+        return UNLOADING, peak, memory
+    if RELOAD_ALONG_UNLOADING:
+        again = acceleration(t, x, 0.0, UNLOADING, memory, hammer, drive) > 0.0
+        return (RELOADING if again else UNLOADING), peak, memory
+    # As printed, the loading branch is the stronger one below the peak: the wire goes in again only if the other
+    # forces overcome it, else this point is at once a new local maximum.
+    if acceleration(t, x, 0.0, LOADING, memory, hammer, drive) > 0.0:
+        return LOADING, peak, memory
+    return UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
+
+
+@compiled
+def kick_into_backstop(
+    t: float, a: float, t_next: float, hammer: Hammer, control: Any
+) -> tuple[float, float, float]:
+    """Return time, w and velocity shortly after a touch with zero velocity, where the contact force is negligible.
+
+    The regularised equations stand still at w = v = 0.
+    """
+    depth = 1e-10 * control[0]
+    pause = min(math.sqrt(2.0 * depth / -a), t_next - t)
+    return t + pause, math.sqrt(-0.5 * a) * pause, a * pause
+
+
+@compiled
+def contact_unit(v: float, control: Any) -> float:
+    """Return the scale of s for a touch with velocity `v`: the duration in s of a Hertz contact goes as |v|^-0.6."""
+    speed = max(abs(v), 1e-6 * control[1])
+    return math.sqrt(control[0]) / (control[1] ** 0.4 * speed**0.6)
+
+
+@entry
+def run(
+    firings: Any,
+    pieces: Any,
+    replace: bool,
+    hammer: Hammer,
+    t: float,
+    x: float,
+    v: float,
+    t_end: float,
+    control: Any,
+    bounds: Any,
+    max_steps: int,
+    under_way: Any,
+    live: Any,
+    nodes: Any,
+    contacts: Any,
+) -> tuple[int, int, int, int]:
+    """Integrate from state (`t`, `x`, `v`) to time `t_end`.
+
+    Parameters
+    ----------
+    firings : float64 array, shape (n,)
+        Firing times [s], ascending.
+    pieces : float64 array, shape (m + 1, 6)
+        The waveform's table of pieces, see :mod:`printhammer.kernel.pulses`.
+    replace : bool
+        Whether a firing cuts off the pulses before it.
+    hammer : float64 array
+        See :mod:`printhammer.kernel.layout`.
+    t, x, v, t_end : float
+        Initial time [s], displacement [m], velocity [m/s], and the end of the run [s].
+    control : tuple of float
+        Scales of displacement and velocity, allowances of the two error estimates.
+    bounds : tuple of float
+        Lowest and highest displacement, origin and farthest distance from it [m].
+    max_steps : int
+        Largest number of steps.
+    under_way : int64 array, shape (n,)
+    live : float64 array, shape (1 + 7 n,)
+        Working space, see :mod:`printhammer.kernel.pulses`.
+    nodes : float64 array, shape (any, 5)
+    contacts : float64 array, shape (any, 7)
+        Filled with the record, see :mod:`printhammer.kernel.record`.
+
+    Returns
+    -------
+    tuple
+        Status, and the numbers of nodes, contacts and steps; the first two may exceed the arrays' lengths.
+    """
+    drive = live
+    first, last, edge = pass_edges(t, firings, pieces, replace, under_way, 0, 0, live)
+    used = 0
+    touched = 0
+    steps = 0
+    status = OK
+    time_scale = control[0] / control[1]
+    still = HELD * control[1] / time_scale
+    memory = 0.0
+    peak = x
+    w = 0.0
+    kv = 0.0
+    a = acceleration(t, x, v, FREE, memory, hammer, drive)
+    mode = first_mode(x, v, a, hammer)
+    if mode == UNLOADING:
+        memory = pack_memory(hammer[PACK:BACKSTOP_PART], peak)
+    h_free = 0.02 * time_scale
+    h_pack = 0.005 * time_scale
+    h_contact = 0.05
+    h = h_pack if mode in (LOADING, UNLOADING) else h_free
+    if mode in (LOADING, UNLOADING):
+        touched = open_contact(contacts, touched, PACK_SURFACE, t, v, 0, True)
+    elif mode in (BACKSTOP, BACKSTOP_RELEASED, RESTING):
+        touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, 0, True)
+    if mode in (BACKSTOP, BACKSTOP_RELEASED):
+        w = math.sqrt(hammer[POSITION] - x)
+    a = acceleration(t, x, v, mode, memory, hammer, drive)
+    started = mode
+    used = add_node(
+        nodes,
+        used,
+        t,
+        x,
+        v,
+        mode,
+        w if mode == BACKSTOP else (peak if mode in (UNLOADING, RELOADING) else 0.0),
+    )
+    entered = True
+    while t < t_end and status == OK:
+        t_next = min(edge, t_end)
+        if t_next <= t:
+            first, last, edge = pass_edges(t, firings, pieces, replace, under_way, first, last, live)
+            a = acceleration(t, x, v, mode, memory, hammer, drive)
+            entered = True
+            continue
+        steps += 1
+        if steps > max_steps:
+            status = STEP_LIMIT
+            break
+        switch = NO_SWITCH
+        if mode == BACKSTOP:
+            if entered:
+                kv = contact_rate(w, v, t, hammer, drive)
+                entered = False
+            idle = first == last
+            if w > 0.0 and idle and abs(v) <= 1e-14 * control[1] and abs(kv) <= 100.0 * still * 2.0 * w:
+                t = t_next
+                switch = EDGE
+            elif w == 0.0 and v == 0.0:
+                t, w, v = kick_into_backstop(t, a, t_next, hammer, control)
+                kv = contact_rate(w, v, t, hammer, drive)
+                switch = EDGE if t == t_next else NO_SWITCH
+            else:
+                touching = w == 0.0 and started != BACKSTOP
+                unit = 1.0
+                if started != BACKSTOP:
+                    started = BACKSTOP
+                    unit = contact_unit(v, control)
+                    h = h_contact * unit
+                switch, end, h = advance_contact((t, w, v, kv), h, t_next, hammer, drive, control)
+                if touching:
+                    h_contact = h / unit
+                t, w, v, kv = end
+            x = hammer[POSITION] - w * w
+        elif mode == RESTING or (v == 0.0 and abs(a) <= still and mode in (UNLOADING, LOADING, RELOADING)):
+            pause = min(t_next - t, 0.005 * time_scale)
+            a_next = acceleration(t + pause, x, 0.0, mode, memory, hammer, drive)
+            if mode == RESTING and a_next > 0.0 and a < 0.0:
+                low, high = 0.0, pause
+                while high - low > 1e-15 * time_scale:
+                    middle = 0.5 * (low + high)
+                    if not (low < middle < high):
+                        break
+                    if acceleration(t + middle, x, 0.0, mode, memory, hammer, drive) > 0.0:
+                        high = middle
+                    else:
+                        low = middle
+                pause = high
+                a_next = acceleration(t + pause, x, 0.0, mode, memory, hammer, drive)
+            if pause == t_next - t:
+                t = t_next
+                switch = EDGE
+            else:
+                t += pause
+            a = a_next
+            if mode == RESTING and a > 0.0:
+                close_contact(contacts, touched, t, 0.0)
+                mode = FREE
+                h = h_free
+        else:
+            if started != mode:
+                h = h_pack if mode in (LOADING, UNLOADING) else h_free
+            fresh = started != mode
+            started = mode
+            h = sensible_step(h, x, v, a, mode, hammer)
+            switch, end, h = advance((t, x, v, a), h, t_next, mode, memory, peak, hammer, drive, control)
+            t, x, v, a = end
+            if fresh and mode == FREE:
+                h_free = h
+            elif fresh and mode == LOADING:
+                h_pack = h
+        if switch == FAILED:
+            status = failure(x, v, bounds, control)
+            break
+        status = out_of_bounds(x, bounds)
+        entered = entered or switch != NO_SWITCH
+        if switch == EDGE:
+            first, last, edge = pass_edges(t, firings, pieces, replace, under_way, first, last, live)
+            a = acceleration(t, x, v, mode, memory, hammer, drive)
+            if mode == BACKSTOP:
+                kv = contact_rate(w, v, t, hammer, drive)
+        elif switch != NO_SWITCH:
+            if switch == REACHED_BACKSTOP:
+                touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, used, False)
+                if RIGID:
+                    used = add_node(nodes, used, t, x, v, FREE, 0.0)
+                    v = backstop_rebound(hammer[BACKSTOP_PART:MAGNET], v)
+                    a = acceleration(t, x, v, FREE, memory, hammer, drive)
+                    if a < 0.0 and v * v <= -2.0 * a * 1e-12 * control[0]:
+                        v = 0.0
+                        mode = RESTING
+                    else:
+                        close_contact(contacts, touched, t, v)
+                else:
+                    mode = BACKSTOP
+                    w = 0.0
+            elif switch == REACHED_FRONT:
+                if v > 0.0:
+                    touched = open_contact(contacts, touched, PACK_SURFACE, t, v, used, False)
+                    mode = LOADING
+                else:
+                    v = 0.0
+            elif switch == REVERSAL:
+                if x <= hammer[FRONT]:
+                    close_contact(contacts, touched, t, v)
+                    mode = FREE
+                else:
+                    mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
+            elif switch == LEFT_FRONT or switch == LEFT_BACKSTOP:
+                close_contact(contacts, touched, t, v)
+                x = hammer[POSITION] if switch == LEFT_BACKSTOP else hammer[FRONT]
+                mode = FREE
+                if switch == LEFT_BACKSTOP and v <= 0.0:
+                    v = 0.0
+                    if acceleration(t, x, v, FREE, memory, hammer, drive) < 0.0:
+                        touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, used, False)
+                        mode = BACKSTOP
+                        w = 0.0
+            elif switch == REACHED_PEAK:
+                mode = LOADING
+            elif switch == PUSH_ENDED:
+                mode = BACKSTOP_RELEASED if mode == BACKSTOP else PACK_RELEASED
+            elif switch == PUSH_BEGAN:
+                mode = BACKSTOP if mode == BACKSTOP_RELEASED else LOADING
+                if mode == BACKSTOP:
+                    w = math.sqrt(max(hammer[POSITION] - x, 0.0))
+            a = acceleration(t, x, v, mode, memory, hammer, drive)
+        kept = w if mode == BACKSTOP else (peak if mode in (UNLOADING, RELOADING) else 0.0)
+        used = add_node(nodes, used, t, x, v, mode, kept)
+    return status, used, touched, steps
