@@ -16,18 +16,28 @@ forces exceed it there, and otherwise that point is at once a new local maximum 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from printhammer.kernel.reference_drive import ReferenceDrive
 from printhammer.kernel.reference_laws import NO_CONTACT, Contact, ReferenceHammer
-from printhammer.kernel.reference_series import ORDER, Array, Step, first_fall, horner, motion_series, offset
+from printhammer.kernel.reference_series import (
+    ORDER,
+    Array,
+    Event,
+    ReferenceRun,
+    Step,
+    first_fall,
+    horner,
+    motion_series,
+    offset,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+__all__ = ["Event", "ReferenceRun", "horizon", "reference"]
 
 STICK_HEIGHT = 1e-16
 """Height, m, below which the bounces on a rigid backstop are taken as ended."""
@@ -35,52 +45,9 @@ STICK_HEIGHT = 1e-16
 STEP_LIMIT = 1_000_000
 
 
-@dataclass(frozen=True)
-class Event:
-    """A switch.
-
-    ``kind`` is pack-touch, pack-peak, pack-trough, pack-leave, backstop-touch, backstop-leave,
-    backstop-rebound, backstop-stick, backstop-release, cut (a contact would begin to pull), uncut, or
-    range-left; ``time`` in s, ``x`` in m, ``v`` in m/s (just after a rebound).
-    """
-
-    time: float
-    kind: str
-    x: float
-    v: float
-
-
-@dataclass
-class ReferenceRun:
-    """Outcome of `reference`: ``t``, ``x``, ``v`` (SI, at the times asked for), ``events``, ``status``."""
-
-    status: str
-    events: list[Event]
-    steps: list[Step] = field(repr=False)
-    t: Array = field(default_factory=lambda: np.zeros(0))
-    x: Array = field(default_factory=lambda: np.zeros(0))
-    v: Array = field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def end(self) -> float:
-        """Time that the run reached, s."""
-        return self.steps[-1].t + self.steps[-1].length if self.steps else 0.0
-
-    def at(self, times: ArrayLike) -> tuple[Array, Array]:
-        """Displacement, m, and velocity, m/s, at any times of the run; NaN after its end."""
-        wanted = np.atleast_1d(np.asarray(times, dtype=float))
-        starts = [step.t for step in self.steps]
-        x, v = np.full(wanted.size, math.nan), np.full(wanted.size, math.nan)
-        end = self.end
-        for i, time in enumerate(wanted):
-            place = bisect_right(starts, time) - 1
-            if place < 0 or time > end:
-                continue
-            x[i], v[i] = self.steps[place].at(float(time))
-        return x, v
-
-
 class _Run:
+    """State of a run: mode, displacement ``ref`` + ``y``, velocity, and ``peak``, the indentation rmax d."""
+
     def __init__(self, hammer: Any, drive: Any, state: tuple[float, float] | None, tolerance: float) -> None:
         self.parts = ReferenceHammer(hammer)
         self.drive = ReferenceDrive(drive)
@@ -180,8 +147,10 @@ class _Run:
         """Step, in units of the expansion's, at which the last coefficients are worth the tolerance."""
         reach = math.inf
         for k in range(ORDER - 2, ORDER + 1):
-            if c[k] != 0.0:
-                reach = min(reach, (self.tolerance * scale / abs(c[k])) ** (1.0 / k))
+            last = abs(float(c[k]))
+            # Coefficients that underflow set no limit.
+            if last > 1e-290:
+                reach = min(reach, (self.tolerance * scale / last) ** (1.0 / k))
         return reach
 
     def _step_series(self, contact: Contact, limit: float) -> tuple[float, float, Array, Array]:

@@ -1,4 +1,4 @@
-"""Taylor series of the motion in one mode, and the first sign change of a polynomial.
+"""Taylor series of the motion in one mode, the run they make up, and the first sign change of a polynomial.
 
 Part of the slow, independent oracle (``reference.py``). Between switches the equation of motion is
 
@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from bisect import bisect_right
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,8 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
 
 Array = NDArray[np.float64]
 
@@ -47,6 +50,51 @@ class Step:
         """Return displacement, m, and velocity, m/s."""
         s = (time - self.t) / self.h
         return self.ref + horner(self.y, s), horner(self.v, s)
+
+
+@dataclass(frozen=True)
+class Event:
+    """A switch.
+
+    ``kind`` is pack-touch, pack-peak, pack-trough, pack-leave, backstop-touch, backstop-leave,
+    backstop-rebound, backstop-stick, backstop-release, cut (a contact would begin to pull), uncut, or
+    range-left; ``time`` in s, ``x`` in m, ``v`` in m/s (just after a rebound).
+    """
+
+    time: float
+    kind: str
+    x: float
+    v: float
+
+
+@dataclass
+class ReferenceRun:
+    """Outcome of `reference`: ``t``, ``x``, ``v`` (SI, at the times asked for), ``events``, ``status``."""
+
+    status: str
+    events: list[Event]
+    steps: list[Step] = field(repr=False)
+    t: Array = field(default_factory=lambda: np.zeros(0))
+    x: Array = field(default_factory=lambda: np.zeros(0))
+    v: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def end(self) -> float:
+        """Time that the run reached, s."""
+        return self.steps[-1].t + self.steps[-1].length if self.steps else 0.0
+
+    def at(self, times: ArrayLike) -> tuple[Array, Array]:
+        """Displacement, m, and velocity, m/s, at any times of the run; NaN after its end."""
+        wanted = np.atleast_1d(np.asarray(times, dtype=float))
+        starts = [step.t for step in self.steps]
+        x, v = np.full(wanted.size, math.nan), np.full(wanted.size, math.nan)
+        end = self.end
+        for i, time in enumerate(wanted):
+            place = bisect_right(starts, time) - 1
+            if place < 0 or time > end:
+                continue
+            x[i], v[i] = self.steps[place].at(float(time))
+        return x, v
 
 
 def _motion_series(
