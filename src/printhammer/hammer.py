@@ -314,28 +314,48 @@ class Hammer:
         return found
 
     def check(self) -> None:
-        """Refuse a hammer that has no rest state at its backstop.
+        """Refuse a hammer that does not rest at its backstop.
 
         Raises
         ------
         InputError
-            With magnet, spring and backstop, the net force at zero current at the backstop is not negative.
+            With a magnet and a backstop, the net force at zero current at the backstop is not negative, or
+            the backstop does not hold the armature.
         """
-        from printhammer.hammer_check import check
+        from printhammer.equilibrium import rest_state
 
-        check(self)
+        if self.magnet is not None and self.backstop is not None:
+            try:
+                rest_state(self)
+            except InputError as error:
+                raise InputError(f"{self._where}: {error}") from None
 
     def warnings(self) -> list[str]:
-        """Say what is odd about a hammer that can still be simulated, a sentence each.
+        """Say what is odd about a hammer that can still be simulated.
+
+        Returns
+        -------
+        list of str
+            A sentence for each interval between backstop and platen in which the net force of magnet and
+            spring at zero current is positive.
 
         Raises
         ------
         InputError
             As `check`.
         """
-        from printhammer.hammer_check import warnings
+        from printhammer.equilibrium import positive_intervals
+        from printhammer.units import from_si
 
-        return warnings(self)
+        self.check()
+        told = []
+        for ends in positive_intervals(self):
+            low, high = (from_si(end, "m", "um") for end in ends)
+            where = f"from {low:.4g} to {high:.4g} um"
+            told.append(
+                f"the net force at zero current is positive {where}: the armature may never return from there"
+            )
+        return told
 
     @staticmethod
     def schema() -> dict[str, Any]:
