@@ -59,7 +59,7 @@ def net(hammer: Bench, x: float, current: float = 0.0) -> float:
     b = hammer.backstop.position
     force = hammer.magnet.F0 - (hammer.magnet.Am - hammer.magnet.Bm * current) ** 2 / math.sqrt(x)
     force += hammer.spring.Bs - hammer.spring.Bs / hammer.spring.As * (x - b)
-    return force + hammer.backstop.stiffness * max(b - x, 0.0) ** 1.5
+    return float(force + hammer.backstop.stiffness * max(b - x, 0.0) ** 1.5)
 
 
 def test_the_armature_rests_compressing_the_backstop() -> None:

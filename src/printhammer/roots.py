@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _PIECES: Final = 16
 _ROUNDS: Final = 16
 _PROBE: Final = 1e-6
+_SLOPE: Final = 1e-3
 # Rounding makes a root a short stretch of zeros.
 _FLAT: Final = 1e-12
 
@@ -56,9 +57,9 @@ def roots(function: Callable[[float], float], grid: Sequence[float]) -> list[Roo
     """Find the roots of a function on an ascending grid.
 
     Stretches where the function is NaN are passed over, as are those longer than 1e-12 where it is zero,
-    which hold no isolated root. A pair of roots between two grid points is found where the
-    function comes nearer to zero than at both neighbours; two roots that lie closer together than about
-    1e-8 of their distance from the neighbouring grid points may be missed, or given as one.
+    which hold no isolated root. A pair of roots between two neighbouring grid points is found; of three only
+    one, and two that lie closer together than about 1e-8 of the distance of the grid points may be missed
+    or given as one.
     """
     found: list[Root] = []
     points = _with_probes(function, grid)
@@ -110,44 +111,42 @@ def _in_stretch(function: Callable[[float], float], points: Sequence[tuple[float
                 after = points[k + 1][1] if k < last else 0.0
                 found.append(Root(points[(first + k) // 2][0], _sign(before), _sign(after)))
         elif k < last:
-            after = points[k + 1][1]
+            end, after = points[k + 1]
             if value * after < 0.0:
-                found.append(Root(bisect(function, x, points[k + 1][0]), _sign(value), _sign(after)))
-            before = points[k - 1][1] if k > 0 else 0.0
-            same = value * before > 0.0 and value * after > 0.0
-            if (
-                same
-                and abs(value) <= min(abs(before), abs(after))
-                and abs(value) < max(abs(before), abs(after))
-            ):
-                found += _pair(function, points[k - 1][0], x, points[k + 1][0], _sign(value))
+                found.append(Root(bisect(function, x, end), _sign(value), _sign(after)))
+            elif after != 0.0:
+                found += _pair(function, points[k], points[k + 1])
         k += 1
     return found
 
 
 def _pair(
-    function: Callable[[float], float], low: float, middle: float, high: float, sign: int
+    function: Callable[[float], float], start: tuple[float, float], end: tuple[float, float]
 ) -> list[Root]:
-    """Look for a pair of roots around a point where the function comes nearest to zero."""
-    left, best, right = low, middle, high
-    height = sign * function(middle)
+    """Look for a pair of roots between two points at which the function has the same sign."""
+    (low, at_low), (high, at_high) = start, end
+    sign = _sign(at_low)
+    step = _SLOPE * (high - low)
+    if sign * (function(low + step) - at_low) >= 0.0 or sign * (function(high - step) - at_high) >= 0.0:
+        return []
+    left, right = low, high
     for _ in range(_ROUNDS):
         grid = [left + (right - left) * k / _PIECES for k in range(_PIECES + 1)]
         values = [sign * function(x) for x in grid]
         k = min(range(_PIECES + 1), key=values.__getitem__)
-        if values[k] < height:
-            best, height = grid[k], values[k]
-        if height <= 0.0:
-            break
+        best, height = grid[k], values[k]
+        if height < 0.0:
+            return [
+                Root(bisect(function, low, best), sign, -sign),
+                Root(bisect(function, best, high), -sign, sign),
+            ]
+        if height == 0.0:
+            return [Root(best, sign, sign)]
+        # A dip that reaches zero is sampled far below its rims.
+        if height > max(values) - height:
+            return []
         left, right = grid[max(k - 1, 0)], grid[min(k + 1, _PIECES)]
-    if height > 0.0:
-        return []
-    if height == 0.0:
-        return [Root(best, sign, sign)]
-    return [
-        Root(bisect(function, low, best), sign, -sign),
-        Root(bisect(function, best, high), -sign, sign),
-    ]
+    return []
 
 
 def _sign(value: float) -> int:

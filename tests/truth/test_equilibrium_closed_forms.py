@@ -1,11 +1,12 @@
 """Equilibria against closed forms and against a brute-force scan."""
 
+import itertools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from printhammer.equilibrium import equilibria, release_current, rest_state
@@ -99,8 +100,11 @@ def test_magnet_and_spring_are_a_cubic_in_the_root_of_x(
     )
     stiffness = bs / travel
     cubic = np.polynomial.Polynomial([-((am - bm * current) ** 2), f0 + bs + stiffness * b, 0.0, -stiffness])
-    real = [float(u.real) for u in cubic.roots() if abs(u.imag) < 1e-9 * abs(u) and u.real > 0.0]
+    powers = [complex(u) for u in cubic.roots().tolist()]
+    real = [u.real for u in powers if abs(u.imag) < 1e-9 * abs(u) and u.real > 0.0]
     expected = sorted(u * u for u in real if b < u * u < 1.0)
+    # Close to a fold neither side knows the two roots to many digits.
+    assume(all(high / low > 1.001 for low, high in itertools.pairwise(expected)))
     found = [point for point in equilibria(hammer, current) if point.surface is None]
     assert [point.x for point in found] == pytest.approx(expected, rel=1e-9)
     # Ascending through the upper root the force turns from positive to negative: there it is stable.
@@ -135,7 +139,7 @@ def test_no_equilibrium_is_missed(
     )
 
     def force(x: np.ndarray) -> np.ndarray:
-        total = f0 - (am - bm * current) ** 2 / np.sqrt(x) + bs - bs / travel * (x - b)
+        total: np.ndarray = f0 - (am - bm * current) ** 2 / np.sqrt(x) + bs - bs / travel * (x - b)
         return total + k * np.maximum(b - x, 0.0) ** 1.5 - pack * np.maximum((x - front) / d, 0.0) ** 2.7
 
     scan = np.concatenate([np.geomspace(1e-12, 1e-6, 20_000), np.linspace(1e-6, platen, 400_000)[1:]])
