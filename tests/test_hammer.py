@@ -14,6 +14,7 @@ from printhammer.parts.backstop_elastomer import ElastomerBackstop
 from printhammer.parts.backstop_hertz import HertzBackstop
 from printhammer.parts.backstop_rigid import RigidBackstop
 from printhammer.parts.magnet_table import TableMagnet
+from printhammer.parts.spring_preload import PreloadSpring
 from printhammer.waveforms import HalfSine
 
 OSCILLATOR = """
@@ -92,6 +93,23 @@ def test_a_hammer_may_lack_all_but_the_mass() -> None:
     assert (bare.magnet, bare.spring, bare.pack, bare.backstop, bare.waveform) == (None,) * 5
     assert (bare.position, bare.front, bare.origin, bare.platen) == (None, None, 0.0, None)
     assert bare.warnings() == []
+
+
+def test_a_textbook_oscillator_is_built_of_parts() -> None:
+    built = ph.Hammer.build(
+        "2 kg",
+        name="oscillator",
+        spring=PreloadSpring(preload=0.0, stiffness=1.0),
+        backstop=RigidBackstop(position=0.0, restitution=0.8),
+    )
+    assert (built.name, built.mass, set(built.parts)) == ("oscillator", 2.0, {"spring", "backstop"})
+    assert built.spring == PreloadSpring(preload=0.0, stiffness=1.0)
+    assert {constant.source for constant in built.constants.values()} == {"given in Python"}
+    assert ph.Hammer.from_toml(built.to_toml()) == built
+    with pytest.raises(ph.InputError, match="oscillator: mass = 0"):
+        ph.Hammer.build(0.0, name="oscillator")
+    with pytest.raises(ph.InputError, match="the key 'wheel' is not known"):
+        ph.Hammer.build(1.0, wheel=None)
 
 
 def test_replace_leaves_the_old_hammer_alone(hammer: ph.Hammer) -> None:

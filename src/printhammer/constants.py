@@ -167,7 +167,8 @@ def folder_of(info: ValidationInfo) -> Path:
 
 def expected(note: Quantity) -> str:
     """Return what a message says of the bounds of a constant, such as "more than 0 m"."""
-    unit = "" if note.si == "1" else f" {note.si}"
+    pure = note.si == "1"
+    unit = "" if pure else f" {note.si}"
     bounds = (
         ("more than ", note.gt, ""),
         ("", note.ge, " or more"),
@@ -175,7 +176,7 @@ def expected(note: Quantity) -> str:
         ("", note.le, " or less"),
     )
     said = [f"{before}{bound:g}{unit}{after}" for before, bound, after in bounds if bound is not None]
-    return " and ".join(said) or f"a finite number{unit}"
+    return " and ".join(said) or ("a finite number" if pure else f"a finite number in {note.si}")
 
 
 def shown(value: object, *, quotes: bool = True) -> str:

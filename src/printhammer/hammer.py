@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.constants import Constant, quantities
 from printhammer.errors import InputError
 from printhammer.hammer_edit import Edit, changed, changed_text, edit_of
-from printhammer.hammer_file import Contents, build, file_options, read_document
+from printhammer.hammer_file import FORMAT, Contents, build, file_options, read_document
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart
 
 if TYPE_CHECKING:
@@ -115,6 +115,43 @@ class Hammer:
         place = Path(folder) if folder is not None else Path()
         document = read_document(text, name)
         return cls(build(document, name, place), document, text, (), name, place)
+
+    @classmethod
+    def build(
+        cls,
+        mass: str | float,
+        *,
+        name: str = "hammer",
+        status: str = "assumed",
+        source: str = "given in Python",
+        **parts: Any,
+    ) -> Hammer:
+        """Make a hammer of parts, such as a textbook impact oscillator.
+
+        Parameters
+        ----------
+        mass : str or float
+            Mass of the armature, text with its unit or kg.
+        name : str, optional
+            Short name.
+        status, source : str, optional
+            Of all constants.
+        **parts
+            `magnet`, `spring`, `pack`, `backstop`, `waveform`, `platen` and `coil`, each as `replace` takes it.
+
+        Returns
+        -------
+        Hammer
+            The hammer.
+
+        Raises
+        ------
+        InputError
+            As for `replace`.
+        """
+        constant = 'mass = { value = 1.0, unit = "kg", status = "assumed", source = "to be replaced" }'
+        bare = cls.from_toml(f'format = {FORMAT}\nname = "hammer"\n\n{constant}\n', name=name)
+        return bare.replace({"name": name, "mass": mass, **parts}, status=status, source=source)
 
     @property
     def name(self) -> str:
