@@ -12,6 +12,8 @@ from printhammer.motion import Motion
 from printhammer.problem import TOLERANCE, Problem
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy.typing as npt
 
     from printhammer.drive import Drive
@@ -94,6 +96,13 @@ def simulate(
     if ledger:
         _ = motion.energy
     return motion
+
+
+def announce_compiling(callback: Callable[[str], None] | None) -> None:
+    """Have `callback` called with one sentence before machine code is made that is not kept on disk yet."""
+    from printhammer.kernel import specialise
+
+    specialise.announce = callback
 
 
 def _state(hammer: Hammer, state: tuple[float, float] | None) -> tuple[float, float]:

@@ -20,6 +20,8 @@ BACKSTOP_RELEASED = 6
 """Behind the backstop position, but the backstop has let go and does not pull."""
 RESTING = 7
 """At rest on a rigid backstop."""
+HELD = 8
+"""At rest in the backstop, not integrated until the drive changes."""
 
 # Switches that end a step.
 NO_SWITCH = 0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled, entry
 from printhammer.kernel.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, POSITION
-from printhammer.kernel.modes import ANY_SCALES, BACKSTOP, BACKSTOP_RELEASED, RESTING
+from printhammer.kernel.modes import ANY_SCALES, BACKSTOP, BACKSTOP_RELEASED, HELD, RESTING
 
 if TYPE_CHECKING:
     from printhammer.kernel.contact import contact_rate
@@ -94,15 +94,13 @@ def quadratures(
             lost = 0.5 * (v0 * v0 - nodes[i + 1, 2] * nodes[i + 1, 2]) / hammer[INVERSE_MASS]
             out[row, 3] = lost if mode != BACKSTOP and x0 != hammer[FRONT] else 0.0
             continue
-        if mode == RESTING or ends[row] <= starts[row]:
+        if mode in (RESTING, HELD) or ends[row] <= starts[row]:
             continue
         memory = memory_of(mode, kept, hammer)
         kv0 = contact_rate(kept, v0, t0, hammer, live) if mode == BACKSTOP else 0.0
-        moving = mode == BACKSTOP and not (v0 == 0.0 and abs(kv0) * (ends[row] - t0) <= 1e-9 * abs(kept))
-        if mode == BACKSTOP and not moving:
-            continue
+        regular = mode == BACKSTOP and not (kept == 0.0 and v0 == 0.0)
         low, high = starts[row], ends[row]
-        if moving and not (kept == 0.0 and v0 == 0.0):
+        if regular:
             low = s_at(starts[row], t0, kept, v0, kv0, hammer, live)
             high = s_at(ends[row], t0, kept, v0, kv0, hammer, live)
         for j in range(8):
@@ -110,7 +108,7 @@ def quadratures(
             weight = WEIGHTS[j] if j < 4 else WEIGHTS[j - 4]
             place = 0.5 * (low + high) + 0.5 * (high - low) * point
             share = 0.5 * (high - low) * weight
-            if moving and not (kept == 0.0 and v0 == 0.0):
+            if regular:
                 t, w, v, _kv, _error = contact_step(t0, kept, v0, kv0, place, hammer, live, ANY_SCALES)
                 x = hammer[POSITION] - w * w
                 share *= 2.0 * w

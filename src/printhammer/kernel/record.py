@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from printhammer.kernel.compiling import compiled
+from printhammer.kernel.modes import HELD
 
 NODE_WIDTH = 5
 CONTACT_WIDTH = 7
@@ -33,6 +34,12 @@ def add_node(nodes: Rows, used: int, t: float, x: float, v: float, mode: int, me
     nodes[i, 3] = mode
     nodes[i, 4] = memory
     return used + 1
+
+
+@compiled
+def hold_node(nodes: Rows, used: int) -> None:
+    """Mark the latest node as one at rest in the backstop until the next."""
+    nodes[min(used, nodes.shape[0]) - 1, 3] = HELD
 
 
 @compiled

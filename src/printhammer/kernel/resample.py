@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled, entry
 from printhammer.kernel.layout import BACKSTOP_PART, MAGNET, PACK, POSITION, SPRING
-from printhammer.kernel.modes import ANY_SCALES, BACKSTOP, BACKSTOP_SURFACE, RELOADING, RESTING, UNLOADING
+from printhammer.kernel.modes import ANY_SCALES, BACKSTOP, BACKSTOP_SURFACE, HELD, RELOADING, RESTING, UNLOADING
 
 if TYPE_CHECKING:
     from printhammer.kernel.contact import contact_rate
@@ -68,16 +68,13 @@ def state_in_step(
     t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float]:
     """Return displacement, velocity and w at time `t` [s] in the step that begins at a node."""
-    if mode == RESTING or t <= t0:
-        return x0, v0, kept if mode == BACKSTOP else 0.0
+    if mode in (RESTING, HELD) or t <= t0:
+        return x0, v0, kept if mode in (BACKSTOP, HELD) else 0.0
     if mode == BACKSTOP:
         kv0 = contact_rate(kept, v0, t0, hammer, drive)
         if kept == 0.0 and v0 == 0.0:
             a0 = acceleration(t0, x0, v0, mode, 0.0, hammer, drive)
             return x0 + 0.5 * a0 * (t - t0) ** 2, a0 * (t - t0), math.sqrt(max(-0.5 * a0, 0.0)) * (t - t0)
-        if v0 == 0.0 and abs(kv0) * (t - t0) <= 1e-9 * abs(kept):
-            # Held at rest: the run does not integrate there either.
-            return x0, v0, kept
         s = s_at(t, t0, kept, v0, kv0, hammer, drive)
         _t1, w1, v1, _kv1, _error = contact_step(t0, kept, v0, kv0, s, hammer, drive, ANY_SCALES)
         return hammer[POSITION] - w1 * w1, v1, w1
@@ -134,8 +131,8 @@ def resample(
         out[row, 3] = magnet_force(hammer[MAGNET:], x, 0.0 if FORCE_DRIVE else value)
         out[row, 4] = spring_force(hammer[SPRING:PACK], x)
         out[row, 5] = pack_force(x, v, mode, memory_of(mode, kept, hammer), hammer)
-        out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if mode == BACKSTOP else 0.0
-        out[row, 7] = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if mode == BACKSTOP else 0.0
+        out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if mode in (BACKSTOP, HELD) else 0.0
+        out[row, 7] = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if mode in (BACKSTOP, HELD) else 0.0
         out[row, 8] = mode
 
 
@@ -146,7 +143,7 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, drive: Dr
     x, v, w = state_in_step(t, node[0], node[1], node[2], mode, node[4], hammer, drive)
     if surface == BACKSTOP_SURFACE:
         force = 0.0
-        if mode == BACKSTOP:
+        if mode in (BACKSTOP, HELD):
             c = hammer[BACKSTOP_PART:MAGNET]
             force = backstop_elastic(c, w) + backstop_viscous(c, w, v)
         return hammer[POSITION] - x, force

@@ -52,9 +52,9 @@ if TYPE_CHECKING:
         pack_memory,
     )
     from printhammer.kernel.pulses import Drive, pass_edges
-    from printhammer.kernel.record import add_node, close_contact, open_contact
+    from printhammer.kernel.record import add_node, close_contact, hold_node, open_contact
 
-HELD = 1e-15
+STILL = 1e-15
 """Where the motion over one characteristic time is below this share of the scales, the armature is held still."""
 
 
@@ -227,7 +227,7 @@ def run(
     steps = 0
     status = OK
     time_scale = control[0] / control[1]
-    still = HELD * control[1] / time_scale
+    still = STILL * control[1] / time_scale
     memory = 0.0
     peak = x
     w = 0.0
@@ -276,6 +276,7 @@ def run(
                 entered = False
             idle = first == last
             if w > 0.0 and idle and abs(v) <= 1e-14 * control[1] and abs(kv) <= 100.0 * still * 2.0 * w:
+                hold_node(nodes, used)
                 t = t_next
                 switch = EDGE
             elif w == 0.0 and v == 0.0:
