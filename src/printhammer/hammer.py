@@ -137,7 +137,7 @@ class Hammer:
         status, source : str, optional
             Of all constants.
         **parts
-            `magnet`, `spring`, `pack`, `backstop`, `waveform`, `platen` and `coil`, each as `replace` takes it.
+            `magnet`, `spring`, `pack`, `backstop`, `waveform`, `platen`, `coil`, each as `replace` takes it.
 
         Returns
         -------

@@ -92,6 +92,19 @@ def test_a_table_that_cannot_be_read_is_refused(tmp_path: Path, name: str) -> No
         TableMagnet(file=str(tmp_path / name))
 
 
+@pytest.mark.parametrize(
+    ("force", "sentence"),
+    [
+        ([[1.0, 2.0]], "expected 2 rows of 2 forces"),
+        ([[1.0, 2.0], [3.0]], "expected 2 rows of 2 forces"),
+        ([[1.0, 2.0], [3.0, float("inf")]], "the point 0.0002 m, 1.0 A, inf N is expected to be finite"),
+    ],
+)
+def test_arrays_that_are_no_grid_are_refused(force: list[list[float]], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        TableMagnet.from_arrays([1e-4, 2e-4], [0.0, 1.0], force)
+
+
 @given(st.text(max_size=60), st.integers(0, len(GRID)))
 def test_any_text_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, text: str, place: int) -> None:
     path = tmp_path_factory.getbasetemp() / "any.csv"

@@ -88,6 +88,13 @@ def test_absent_has_every_law_with_its_arguments() -> None:
         assert len(inspect.signature(getattr(absent, name)).parameters) == count
 
 
+def test_absent_parts_do_nothing() -> None:
+    absent = import_module("printhammer.parts.absent")
+    for name, count in ARGUMENTS.items():
+        expected = {"pack_switch": 1.0, "backstop_switch": 1.0, "backstop_rebound": 0.5}.get(name, 0.0)
+        assert getattr(absent, name)(None, *[-0.5] * (count - 1)) == expected
+
+
 @pytest.mark.parametrize("part", EXAMPLES, ids=ids)
 def test_part_is_whole(part: Part) -> None:
     kind = type(part)

@@ -57,11 +57,15 @@ def gather(rows: Iterable[tuple[float, float, float]], what: str) -> ForceTable:
     Raises
     ------
     InputError
-        A point is given twice or missing, there are fewer than two displacements or currents, or 0 A lies
+        A point is not finite, given twice or missing, there are fewer than two displacements or currents, or 0 A lies
         outside the currents.
     """
     points: dict[tuple[float, float], float] = {}
     for x, current, force in rows:
+        if not (math.isfinite(x) and math.isfinite(current) and math.isfinite(force)):
+            raise InputError(
+                f"{what}: the point {x!r} m, {current!r} A, {force!r} N is expected to be finite"
+            )
         if (x, current) in points:
             raise InputError(f"{what}: the point {x:.9g} m, {current:.9g} A is given twice, expected once")
         points[x, current] = force

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from printhammer.constants import folder_of
+from printhammer.errors import InputError
 from printhammer.parts._force_table import ForceTable, gather, packed_spline, read_csv
 from printhammer.parts.base import MagnetPart, register
 
@@ -156,6 +157,10 @@ class TableMagnet(MagnetPart):
         InputError
             If the arrays do not make a grid.
         """
+        if len(force) != len(x) or any(len(line) != len(current) for line in force):
+            raise InputError(
+                f"force table: expected {len(x)} rows of {len(current)} forces, one for each x and current"
+            )
         rows = [
             (float(a), float(b), float(f))
             for a, line in zip(x, force, strict=True)
