@@ -57,8 +57,8 @@ def gather(rows: Iterable[tuple[float, float, float]], what: str) -> ForceTable:
     Raises
     ------
     InputError
-        A point is not finite, given twice or missing, there are fewer than two displacements or currents, or 0 A lies
-        outside the currents.
+        A point is not finite, given twice or missing, there are fewer than two displacements or currents, or
+        0 A lies outside the currents.
     """
     points: dict[tuple[float, float], float] = {}
     for x, current, force in rows:
