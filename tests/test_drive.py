@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from printhammer.drive import Burst, Drive, Overlap, PulseTrain, SineForce
+from printhammer.drive_input import even_times
 from printhammer.errors import InputError
 from printhammer.waveforms import HalfSine, Rectangle, Sampled, Sine, Trapezoid, Waveform
 
@@ -52,6 +53,7 @@ def test_peak_is_at_least_every_sample_and_reached_by_one(
     assert drive.peak <= sampled.max() * (1.0 + 1e-3) + 1e-9
 
 
+@settings(max_examples=30)
 @given(waveforms, st.floats(100.0, 20e3), st.integers(1, 12))
 def test_peak_of_an_even_train_is_that_of_the_same_times(waveform: Waveform, rate: float, count: int) -> None:
     train = PulseTrain(waveform, rate=rate, pulses=count)
@@ -95,6 +97,11 @@ def test_a_train_by_rate_and_one_by_period() -> None:
     np.testing.assert_array_equal(by_period.times, 1e-3 + np.arange(4) * 1.05e-3)
     assert by_period.period == 1.05e-3
     assert not by_period.times.flags.writeable
+
+
+def test_even_times_need_a_rate_or_a_period() -> None:
+    with pytest.raises(InputError, match="rate or a period"):
+        even_times(None, None, 3)
 
 
 def test_given_times_and_a_single_pulse() -> None:

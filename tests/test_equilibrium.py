@@ -128,6 +128,7 @@ def test_an_interval_may_end_with_the_stroke() -> None:
     paper = replace(away, platen=None, pack=PACK)
     assert positive_intervals(paper) == [(low, 203e-6 + 178e-6)]
     assert positive_intervals(replace(away, backstop=None)) == []
+    assert positive_intervals(replace(away, platen=51e-6)) == []
 
 
 def test_on_a_rigid_backstop_the_armature_rests_at_its_position() -> None:

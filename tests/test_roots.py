@@ -40,6 +40,11 @@ def test_a_curve_that_touches_zero_at_a_grid_point_has_one_root_of_one_sign() ->
     assert roots(lambda x: -x * x, [-1.0, 0.0, 1.0]) == [Root(0.0, -1, -1)]
 
 
+def test_a_curve_that_touches_zero_between_grid_points_has_at_most_one_root() -> None:
+    assert roots(lambda x: (x - 0.125) ** 2, [-1.0, 1.0]) == [Root(0.125, 1, 1)]
+    assert len(roots(lambda x: (x - 0.1234) ** 2, GRID)) <= 1
+
+
 def test_a_stretch_of_zeros_and_of_nan_holds_no_root() -> None:
     assert roots(lambda _: 0.0, GRID) == []
     assert roots(lambda x: max(x, 0.0), GRID) == []

@@ -233,7 +233,7 @@ def test_a_file_that_is_missing_or_not_text_is_one_sentence(tmp_path: Path) -> N
     with pytest.raises(InputError, match="UTF-8"):
         Sampled(file=str(tmp_path / "noise.csv"))
     with pytest.raises(InputError, match="file"):
-        Sampled()
+        SHAPES["sampled"]()
 
 
 @given(st.text(max_size=200))

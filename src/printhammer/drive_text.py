@@ -49,8 +49,6 @@ def inline(value: Any) -> str:
         return "{ " + ", ".join(f"{key} = {inline(entry)}" for key, entry in value.items()) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(inline(entry) for entry in value) + "]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value)

@@ -194,7 +194,7 @@ def release_current(hammer: HammerLike) -> float:
     found: list[float] = []
     for sign, limit in ((1.0, high), (-1.0, -low)):
         if limit > 0.0:
-            grid = [sign * size for size in _away_from(0.0, 1e-9, limit)]
+            grid = [sign * size for size in _away_from_zero(1e-9, limit)]
             crossed = [root.x for root in roots(net, sorted(grid))]
             found += sorted(crossed, key=abs)[:1]
     if not found:
@@ -329,16 +329,16 @@ def _grid(force: StaticForce, low: float, high: float) -> list[float]:
         for sign in (1.0, -1.0):
             limit = high - anchor if sign > 0.0 else anchor - low
             if limit > 0.0:
-                places.update(anchor + sign * step for step in _away_from(0.0, _NEAREST, limit))
+                places.update(anchor + sign * step for step in _away_from_zero(_NEAREST, limit))
     return sorted(place for place in places if low <= place <= high)
 
 
-def _away_from(start: float, first: float, limit: float) -> list[float]:
-    """Return a start and steps away from it that grow geometrically up to a limit, 12 a decade."""
+def _away_from_zero(first: float, limit: float) -> list[float]:
+    """Return 0 and steps that grow geometrically up to a limit, 12 a decade."""
     if limit <= first:
-        return [start, start + limit]
+        return [0.0, limit]
     count = max(2, math.ceil(12.0 * math.log10(limit / first)) + 1)
-    return [start, *(start + step for step in np.geomspace(first, limit, count).tolist())]
+    return [0.0, *np.geomspace(first, limit, count).tolist()]
 
 
 def _currents(hammer: HammerLike) -> tuple[float, float]:

@@ -114,14 +114,12 @@ def _inner_extremes(row: FloatArray, length: float) -> list[float]:
     return [q / a] + ([c / q] if q != 0.0 else [])
 
 
-def largest(segments: FloatArray, until: float = math.inf) -> float:
-    """Largest absolute value that a segment table takes (or approaches) at 0 <= tau < until."""
+def largest(segments: FloatArray) -> float:
+    """Return the largest absolute value that a segment table takes or approaches."""
     best = 0.0
     for row, after in itertools.pairwise(segments):
         start, kind, p0, p1, p2, p3 = (float(entry) for entry in row)
-        length = min(float(after[0]), until) - start
-        if length <= 0.0:
-            break
+        length = float(after[0]) - start
         places = [0.0, *(s for s in _inner_extremes(row, length) if 0.0 < s < length)]
         if math.isfinite(length):
             places.append(length)

@@ -98,6 +98,7 @@ def test_two_overlapping_half_sines_peak_as_the_sum_of_sines_does(shift: float) 
     assert drive.peak == pytest.approx(expected, rel=1e-12)
 
 
+@settings(max_examples=30)
 @given(st.floats(0.2, 3.0), st.integers(2, 12))
 def test_a_long_train_of_rectangles_builds_up_the_geometric_sum(spacing: float, count: int) -> None:
     # The rise is sharp, so at the last firing every earlier pulse has left an exponential tail.
