@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.specialise import Kernel
     from printhammer.segments import FloatArray
 
-TOLERANCE: Final = 1e-9
+TOLERANCE: Final = 2e-11
 """Default tolerance: error allowed in one step, in units of the stroke and of a typical speed."""
 
 MAX_STEPS: Final = 50_000_000

@@ -123,17 +123,23 @@ def velocity_root(v0: float, a0: float, v1: float, a1: float, h: float) -> float
     """Return the fraction of the step in (0, 1] at which the cubic through both ends' velocities falls to zero."""
     c2 = 3.0 * (v1 - v0) - h * (2.0 * a0 + a1)
     c3 = 2.0 * (v0 - v1) + h * (a0 + a1)
+    # From rest, the root at the start is divided out.
+    at_rest = v0 == 0.0
     low, high = 0.0, 1.0
     s = v0 / (v0 - v1) if v0 != v1 else 0.5
     for _ in range(60):
         if not (low < s < high):
             s = 0.5 * (low + high)
-        value = v0 + s * (h * a0 + s * (c2 + s * c3))
-        if value > 0.0 or (value == 0.0 and low == 0.0 and s == 0.0):
+        if at_rest:
+            value = h * a0 + s * (c2 + s * c3)
+            slope = c2 + 2.0 * s * c3
+        else:
+            value = v0 + s * (h * a0 + s * (c2 + s * c3))
+            slope = h * a0 + s * (2.0 * c2 + 3.0 * s * c3)
+        if value > 0.0:
             low = s
         else:
             high = s
-        slope = h * a0 + s * (2.0 * c2 + 3.0 * s * c3)
         change = value / slope if slope != 0.0 else 2.0
         if abs(change) < 1e-12:
             break

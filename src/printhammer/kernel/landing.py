@@ -36,7 +36,7 @@ from printhammer.kernel.modes import (
 
 if TYPE_CHECKING:
     from printhammer.kernel.dop853 import time_step
-    from printhammer.kernel.forces import Hammer
+    from printhammer.kernel.forces import Hammer, acceleration
     from printhammer.kernel.laws import (
         BACKSTOP_PULLS,
         HAS_BACKSTOP,
@@ -119,7 +119,7 @@ def land_on_level(
             low = fraction
         rest = gap / v1 if v1 != 0.0 else math.inf
         if abs(0.5 * a1 * rest * rest) <= negligible and abs(rest) <= 0.01 * h:
-            return t + (step + rest), level, v1 + a1 * rest, a1
+            return t + max(step + rest, 0.0), level, v1 + a1 * rest, a1
         if (high - low) * h <= 1e-15 * control[0] / control[1]:
             return t + step, level, v1, a1
         fraction += rest / h
@@ -153,13 +153,26 @@ def land_on_reversal(
             high = fraction
         rest = -v1 / a1 if a1 != 0.0 else math.inf
         if abs(v1) <= negligible and abs(rest) <= 0.01 * h:
-            return t + (step + rest), x1 + 0.5 * v1 * rest, 0.0, a1, fraction
+            return t + max(step + rest, 0.0), x1 + 0.5 * v1 * rest, 0.0, a1, fraction
         if (high - low) * h <= 1e-15 * control[0] / control[1]:
             return t + step, x1, 0.0, a1, fraction
         fraction += rest / h
         if not (low < fraction < high):
             fraction = 0.5 * (low + high)
     return t + step, x1, 0.0, a1, fraction
+
+
+@compiled
+def longest_still_step(start: State, mode: int, memory: float, hammer: Hammer, drive: Drive, control: Any) -> float:
+    """Return the longest step [s] at which the method is stable for small oscillations about the present place.
+
+    Near rest all errors are below the tolerance, those of an unstable step too, until they have grown to it.
+    """
+    t, x, v, _a = start
+    small = 1e-5 * control[0]
+    rise = acceleration(t, x + small, v, mode, memory, hammer, drive)
+    slope = abs(rise - acceleration(t, x - small, v, mode, memory, hammer, drive)) / (2.0 * small)
+    return 2.0 / math.sqrt(slope) if slope > 0.0 else math.inf
 
 
 @compiled
@@ -302,6 +315,8 @@ def advance(
     """
     t, x, v, a = start
     shortest = 1e-14 * control[0] / control[1]
+    if abs(v) * h + abs(a) * h * h < 1e-6 * control[0]:
+        h = min(h, longest_still_step(start, mode, memory, hammer, drive, control))
     while True:
         at_edge = h >= t_next - t
         if at_edge:

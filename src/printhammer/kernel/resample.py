@@ -45,21 +45,27 @@ def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
 
 @compiled
 def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the s at which a step in the backstop from time `t0` reaches time `t` [s], by Newton's method."""
+    """Return the s at which a step in the backstop from time `t0` reaches time `t` [s].
+
+    Each correction solves dt = 2 w ds - v ds^2, whose root stays regular where the armature leaves, w = 0; a time after
+    that gives the s of leaving.
+    """
     left = t - t0
     if left <= 0.0:
         return 0.0
-    under_root = w0 * w0 - v0 * left
-    s = left / (w0 + math.sqrt(under_root)) if under_root > 0.0 else w0 / v0
-    for _ in range(60):
-        t1, w1, _v1, _kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
-        if w1 <= 0.0:
-            s *= 0.9
-            continue
-        change = (t - t1) / (2.0 * w1)
-        s = max(s + change, 0.5 * s)
-        if abs(change) <= 4e-16 * s:
+    s = 0.0
+    t1, w1, v1 = t0, w0, v0
+    for _ in range(12):
+        left = t - t1
+        under_root = max(w1 * w1 - v1 * left, 0.0)
+        if w1 > 0.0 and under_root > 0.0:
+            change = left / (w1 + math.sqrt(under_root))
+        else:
+            change = (w1 - math.sqrt(under_root)) / v1
+        s += change
+        if abs(change) <= 1e-15 * s:
             break
+        t1, w1, v1, _kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
     return s
 
 

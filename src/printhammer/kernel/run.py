@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.pulses import Drive, pass_edges
     from printhammer.kernel.record import add_node, close_contact, hold_node, open_contact
 
-STILL = 1e-15
+STILL = 1e-12
 """Where the motion over one characteristic time is below this share of the scales, the armature is held still."""
 
 
@@ -275,7 +275,7 @@ def run(
                 kv = contact_rate(w, v, t, hammer, drive)
                 entered = False
             idle = first == last
-            if w > 0.0 and idle and abs(v) <= 1e-14 * control[1] and abs(kv) <= 100.0 * still * 2.0 * w:
+            if w > 0.0 and idle and abs(v) <= 1e-14 * control[1] and abs(kv) <= 0.1 * still * 2.0 * w:
                 hold_node(nodes, used)
                 t = t_next
                 switch = EDGE
@@ -296,7 +296,9 @@ def run(
                 t, w, v, kv = end
             x = hammer[POSITION] - w * w
         elif mode == RESTING or (v == 0.0 and abs(a) <= still and mode in (UNLOADING, LOADING, RELOADING)):
-            pause = min(t_next - t, 0.005 * time_scale)
+            pause = t_next - t
+            if first < last:
+                pause = min(pause, 0.005 * time_scale)
             a_next = acceleration(t + pause, x, 0.0, mode, memory, hammer, drive)
             if mode == RESTING and a_next > 0.0 and a < 0.0:
                 low, high = 0.0, pause
