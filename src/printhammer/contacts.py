@@ -34,8 +34,8 @@ class Contact:
     peak_force : float or None
         Largest contact force, N; None on a rigid backstop, where it is not finite.
     loss : float
-        Energy that the contact took from the armature for good, J: minus the work of the whole pack force, or of the
-        viscous force of the backstop. Of an open pack contact: so far, what it stores included.
+        Energy that the contact took from the armature for good, J: minus the work of the whole pack force,
+        or of the viscous force of the backstop. Of an open pack contact: so far, what it stores included.
     firing : int or None
         Number of the latest firing at or before the touch.
     extra : bool
@@ -62,9 +62,9 @@ class Contact:
 class Dot:
     """What one firing did on the paper.
 
-    A pack contact belongs to the latest firing at or before its touch. The first one in an interval makes the dot, later
-    ones are extra contacts, one already open at a firing belongs to the dot before. A firing without a first one is a
-    lost dot.
+    A pack contact belongs to the latest firing at or before its touch. The first one in an interval makes
+    the dot, later ones are extra contacts, one already open at a firing belongs to the dot before. A firing
+    without a first one is a lost dot.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid:
 def loading_works(
     problem: Problem, record: Record, contacts: Sequence[Contact], increments: FloatArray
 ) -> FloatArray:
-    """Return the work done on the pack up to the largest indentation of each contact, J; 0 for the backstop."""
+    """Return the work done on the pack up to the peak of each contact, J; 0 for the backstop."""
     result = np.zeros(len(contacts))
     rows, steps, starts, ends = [], [], [], []
     for row, contact in enumerate(contacts):

@@ -33,8 +33,8 @@ def motion_dataset(motion: Motion) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Over the coordinate `t` [s]: `x`, `v`, `current` and the forces as `force_magnet` and so on; units and long names in
-        the attributes of each, provenance in those of the set.
+        Over the coordinate `t` [s]: `x`, `v`, `current` and the forces as `force_magnet` and so on; units
+        and long names in the attributes of each, provenance in those of the set.
     """
     import xarray as xr
 
@@ -49,7 +49,7 @@ def motion_dataset(motion: Motion) -> xr.Dataset:
 
 
 def motion_table(motion: Motion) -> pd.DataFrame:
-    """Return the output grid of a motion as a table with columns such as "x [m]"; provenance in its `attrs`."""
+    """Return the output grid of a motion as a table, columns such as "x [m]"; provenance in `attrs`."""
     import pandas as pd
 
     columns = {"t [s]": motion.t}

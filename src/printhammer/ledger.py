@@ -32,11 +32,13 @@ class Ledger:
     backstop_loss : float
         Minus the integral of Fe v dt, and what impacts on a rigid backstop take.
     kinetic, stored : float
-        Change of kinetic energy and of stored energy (magnet at zero current, spring, Hertz) from start to end.
+        Change of kinetic energy and of stored energy (magnet at zero current, spring, Hertz) from start to
+        end.
     throughput : float
         Sum of the integrals of the absolute power of coil, drive force, pack and backstop.
     residual : float
-        Work minus losses minus changes: 0 but for numerical errors, since each term has a quadrature of its own.
+        Work minus losses minus changes: 0 but for numerical errors, since each term has a quadrature of its
+        own.
     """
 
     coil_work: float
@@ -50,13 +52,13 @@ class Ledger:
 
 
 def increments_of(problem: Problem, record: Record) -> FloatArray:
-    """Return the integrals of power [J] over every step of a run: coil, drive force, pack loss, backstop loss."""
+    """Return the integrals of power [J] over every step: coil, drive force, pack loss, backstop loss."""
     times = record.nodes[:, 0]
     return problem.quadratures(record, np.arange(len(times) - 1), times[:-1], times[1:])
 
 
 def stored_energy(hammer: Hammer, x: float) -> float:
-    """Return the energy stored in magnet (at zero current), spring and backstop at displacement `x` [m], J."""
+    """Return the energy stored in magnet (at zero current), spring and backstop at `x` [m], J."""
     origin = hammer.origin
     total = 0.0
     for part, name in ((hammer.magnet, "magnet_energy"), (hammer.spring, "spring_energy")):

@@ -38,8 +38,8 @@ _BISECTIONS: Final = 52
 class Motion:
     """The motion of one hammer under one drive, from `printhammer.simulate`.
 
-    Everything is computed from the recorded steps when it is first asked for, with the integrator itself, never by
-    interpolation; nothing depends on the output grid.
+    Everything is computed from the recorded steps when it is first asked for, with the integrator itself,
+    never by interpolation; nothing depends on the output grid.
     """
 
     def __init__(self, problem: Problem, record: Record, end: float, times: FloatArray, scheme: str) -> None:
@@ -133,8 +133,8 @@ class Motion:
         inside = (times >= self.start) & (times <= self.end)
         if not inside.all():
             raise InputError(
-                f"t = {times[~inside][0]:.9g} s lies outside the motion, expected a time from {self.start:.9g} s"
-                f" to {self.end:.9g} s"
+                f"t = {times[~inside][0]:.9g} s lies outside the motion, expected a time from"
+                f" {self.start:.9g} s to {self.end:.9g} s"
             )
         order = np.argsort(times, kind="stable")
         table = np.empty((times.size, 9))
@@ -142,7 +142,7 @@ class Motion:
         return table
 
     def at(self, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return displacement, m, and velocity, m/s, at any times of the run, s; after a jump of the velocity.
+        """Return displacement, m, and velocity, m/s, at any times of the run, s; after jumps.
 
         Raises
         ------
@@ -208,7 +208,7 @@ class Motion:
         return times, self._problem.resample(self._record, times)[:, 0] if len(rows) else times
 
     def peak_after(self, firing: int) -> tuple[float, float] | None:
-        """Return time, s, and displacement, m, of the largest local maximum after a firing and before the next.
+        """Return time, s, and displacement, m, of the largest local maximum from a firing to the next.
 
         None if there is none; the position at the firing never counts.
 

@@ -99,9 +99,9 @@ def constants_of(hammer: Hammer) -> FloatArray:
 def scales_of(hammer: Hammer, drive: Drive, state: tuple[float, float]) -> tuple[float, float]:
     """Return a typical displacement [m] and speed [m/s] of a hammer, by which tolerances are measured.
 
-    The displacement is the way from the backstop to the pack. Without one of them it is how far the forces would bring
-    the mass in one period of the drive or of its own, or the distance of the initial state. The speed is what the
-    largest force gives the mass over that way.
+    The displacement is the way from the backstop to the pack. Without one of them it is how far the forces
+    would bring the mass in one period of the drive or of its own, or the distance of the initial state. The
+    speed is what the largest force gives the mass over that way.
     """
     from printhammer.static_force import StaticForce
 
@@ -220,7 +220,7 @@ class Problem:
         return out
 
     def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
-        """Return coil work, work of a drive force, pack loss and backstop loss [J], shape (n, 4), inside steps."""
+        """Return work of coil and drive force, pack and backstop loss [J], shape (n, 4), inside steps."""
         out = np.empty((len(steps), 4))
         self.kernel.quadratures(
             np.ascontiguousarray(steps, np.int64),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 CYCLE: Final = 4e-3
 """Time after the last firing, s, at which a run ends unless told otherwise."""
 
-DEFAULT: Final = "default"
-SCHEMES: Final = (DEFAULT, "trapezoid", "runge-kutta-4")
+Scheme = Literal["default", "trapezoid", "runge-kutta-4"]
+SCHEMES: Final = get_args(Scheme)
 """Integrators: located contacts and high order; the two of the paper."""
 
 _FEWEST, _MOST, _PER_SCALE = 1001, 400_001, 100
@@ -39,7 +39,7 @@ def simulate(
     tolerance: float = TOLERANCE,
     points: int | None = None,
     times: npt.ArrayLike | None = None,
-    scheme: str = DEFAULT,
+    scheme: Scheme = "default",
     step_scale: float = 1.0,
     ledger: bool = False,
 ) -> Motion:
@@ -52,8 +52,8 @@ def simulate(
     drive : Drive
         The drive.
     duration : float or str, optional
-        End of the run, s, or text with a unit; by default 4 ms after the last firing, and required for a drive that does
-        not end.
+        End of the run, s, or text with a unit; by default 4 ms after the last firing, and required for a
+        drive that does not end.
     state : tuple of float, optional
         Displacement, m, and velocity, m/s, at time 0; by default the rest state.
     tolerance : float, optional
@@ -84,13 +84,14 @@ def simulate(
     if not 1e-15 <= tolerance <= 1e-2:
         raise InputError(f"tolerance = {tolerance!r}, expected a number from 1e-15 to 1e-2")
     end = _end(drive, duration)
-    problem = Problem(hammer, drive, _state(hammer, state), 0.0, tolerance)
-    if scheme == DEFAULT:
-        record = problem.run(end)
+    start = _state(hammer, state)
+    if scheme == "default":
+        problem = Problem(hammer, drive, start, 0.0, tolerance)
     else:
-        from printhammer.scheme_runs import run_scheme
+        from printhammer.scheme_runs import SchemeProblem
 
-        record = run_scheme(problem, end, scheme, step_scale)
+        problem = SchemeProblem(hammer, drive, start, tolerance, scheme, step_scale)
+    record = problem.run(end)
     reached = float(record.nodes[-1, 0])
     motion = Motion(problem, record, end, _grid(problem, reached, points, times), scheme)
     if ledger:
@@ -119,8 +120,8 @@ def _state(hammer: Hammer, state: tuple[float, float] | None) -> tuple[float, fl
         low, high = hammer.magnet.domain
         if not low <= x <= high:
             raise InputError(
-                f"state = {state!r}, expected a displacement from {low:.9g} m to {high:.9g} m, where the magnet's"
-                " law holds"
+                f"state = {state!r}, expected a displacement from {low:.9g} m to {high:.9g} m, where the law"
+                " of the magnet holds"
             )
     rigid = hammer.backstop is not None and hammer.backstop.law == "rigid"
     if rigid and hammer.position is not None and x < hammer.position:

@@ -1,0 +1,1 @@
+"""The numerical kernel: arrays and numbers only, no units, files or pictures."""

@@ -30,8 +30,8 @@ def compiled(function: Function) -> Function:
 def entry(function: Function) -> Function:
     """Compile an entry point lazily and keep its machine code on disk.
 
-    The cache on disk goes by file and qualified name, which all kernels share; the digest of the kernel's sources, that
-    :mod:`printhammer.kernel.specialise` defines in a template module, keeps them apart.
+    The cache on disk goes by file and qualified name, which all kernels share; the digest of the kernel's
+    sources, that :mod:`printhammer.kernel.specialise` defines in a template module, keeps them apart.
     """
     function.__qualname__ += "_" + function.__globals__["DIGEST"]
     return numba.njit(cache=True, **_OPTIONS)(function)  # type: ignore[no-any-return]

@@ -1,4 +1,4 @@
-"""One controlled step in the backstop, in the regularised variables, that ends on the first switch inside it."""
+"""One controlled step in the backstop, in the regularised variables, ending on the first switch inside."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compiling import compiled, inlined
 from printhammer.kernel.hermite import position_root, rises_through
 from printhammer.kernel.landing import FAILED, step_factor
-from printhammer.kernel.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET
+from printhammer.kernel.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET, Control
 from printhammer.kernel.modes import (
     ANY_SCALES,
     EDGE,
@@ -30,7 +30,7 @@ ContactState = Any
 """Time, w, velocity, dv/ds."""
 
 PHASE_LIMIT = 2.0
-"""Largest phase of the contact's own oscillation in one step; beyond about 5 the method is unstable at rest."""
+"""Largest phase of the contact's own oscillation in one step; from about 5 on the method is unstable."""
 
 
 @compiled
@@ -55,16 +55,22 @@ def longest_contact_step(w: float, hammer: Hammer) -> float:
 
 
 @compiled
-def contact_scales(w: float, v: float, h: float, control: Any) -> tuple[float, float, float]:
-    """Return the scales of errors in time, w and velocity: those of displacement and velocity brought to them."""
+def contact_scales(w: float, v: float, h: float, control: Control) -> tuple[float, float, float]:
+    """Return the scales of errors in time, w and velocity that follow from those of `control`."""
     return control[0] / control[1], control[0] / (2.0 * max(w, abs(v) * h)), control[1]
 
 
 @compiled
 def leave(
-    start: ContactState, h: float, fraction: float, upper: float, hammer: Hammer, drive: Drive, control: Any
+    start: ContactState,
+    h: float,
+    fraction: float,
+    upper: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
 ) -> tuple[float, float, float, float, float]:
-    """Return the state at which w falls to zero inside `upper` of a step of `h`, and its fraction of the step."""
+    """Return the state at which w falls to zero inside `upper` of a step of `h`, and its fraction."""
     t, w, v, kv = start
     low, high = 0.0, upper
     negligible = 1e-12 * math.sqrt(control[0])
@@ -89,7 +95,7 @@ def leave(
 def reach_time(
     start: ContactState, h: float, upper: float, t_upper: float, target: float, hammer: Hammer, drive: Drive
 ) -> ContactState:
-    """Return the state at time `target` [s] inside `upper` of a step of `h` in s, whose end is at `t_upper`."""
+    """Return the state at time `target` [s] inside `upper` of a step of `h` in s that ends at `t_upper`."""
     t, w, v, kv = start
     low, high = 0.0, upper
     fraction = upper * (target - t) / (t_upper - t)
@@ -132,15 +138,15 @@ def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive:
 
 @inlined
 def advance_contact(
-    start: ContactState, h: float, t_next: float, hammer: Hammer, drive: Drive, control: Any
+    start: ContactState, h: float, t_next: float, hammer: Hammer, drive: Drive, control: Control
 ) -> tuple[int, ContactState, float]:
     """Take one accepted step in the backstop, at most to `t_next`, ending on the first switch.
 
     Returns
     -------
     tuple
-        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP or PUSH_ENDED), the state there, the next step
-        length in s.
+        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP or PUSH_ENDED), the state there, the
+        next step length in s.
     """
     t, w, v, kv = start
     shortest = 1e-14 * math.sqrt(control[0]) / control[1]
@@ -162,7 +168,7 @@ def advance_contact(
                 return FAILED, start, h
             continue
         code = rises_through(-w, v, kv, -w1, v1, kv1, h, 0.0)
-        if code == UNRESOLVED or code == NEAR_TOUCH:
+        if code in (UNRESOLVED, NEAR_TOUCH):
             if h > shortest:
                 h *= 0.5
                 continue

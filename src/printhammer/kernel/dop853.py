@@ -1,7 +1,7 @@
 """One step of the Runge-Kutta method DOP853: in time, and in the regularised variables of a backstop contact.
 
-In the backstop, delta = b - x and the force holds delta^1.5, which is not smooth at delta = 0. With w = sqrt(delta)
-and a new independent variable s, dt = 2 w ds, the motion obeys
+In the backstop, delta = b - x and the force holds delta^1.5, which is not smooth at delta = 0. With w =
+sqrt(delta) and a new independent variable s, dt = 2 w ds, the motion obeys
 
     dw/ds = -v,    dv/ds = 2 w a,    dt/ds = 2 w,
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @compiled
 def combined_error(e5: float, e3: float) -> float:
-    """Combine the estimates of order 5 and 3 into one that behaves like order 7 (Hairer, Norsett, Wanner, II.10)."""
+    """Combine the estimates of order 5 and 3 into one of order 7 (Hairer, Norsett, Wanner, II.10)."""
     if e5 == 0.0:
         return 0.0
     return e5 * e5 / math.sqrt(e5 * e5 + 0.01 * e3 * e3)
@@ -214,8 +214,8 @@ def contact_step(
     Returns
     -------
     tuple of float
-        Time [s], w [m^0.5], velocity [m/s] and dv/ds at the end, and the error estimate, the sum of those of time,
-        w and velocity in units of `scales`.
+        Time [s], w [m^0.5], velocity [m/s] and dv/ds at the end, and the error estimate, the sum of those of
+        time, w and velocity in units of `scales`.
     """
     v0 = v1
     kw1 = -v1

@@ -1,8 +1,9 @@
 """Coefficients of the explicit Runge-Kutta method DOP853, order 8 with embedded orders 5 and 3.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993),
-section II.10; the method is due to Dormand and Prince. Stages are numbered from 1: ``A32`` multiplies the second
-slope in the third stage, ``B`` are the weights, ``E3`` and ``E5`` the weights of the two error estimates.
+section II.10; the method is due to Dormand and Prince. Stages are numbered from 1: ``A32`` multiplies the
+second slope in the third stage, ``B`` are the weights, ``E3`` and ``E5`` the weights of the two error
+estimates.
 """
 
 C02 = 0.05260015195876773

@@ -54,14 +54,14 @@ def acceleration(
     force = field_force(t, x, hammer, drive)
     if HAS_PACK:
         force += pack_force(x, v, mode, memory, hammer)
-    return force * hammer[INVERSE_MASS]
+    return float(force * hammer[INVERSE_MASS])
 
 
 @inlined
 def backstop_acceleration(t: float, w: float, v: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the acceleration [m/s^2] in the backstop at compression ``w**2`` [m]: equations (1), (6) and (7)."""
+    """Return the acceleration [m/s^2] at compression ``w**2`` [m] of the backstop: (1), (6) and (7)."""
     force = field_force(t, hammer[POSITION] - w * w, hammer, drive)
     force += backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) + backstop_viscous(
         hammer[BACKSTOP_PART:MAGNET], w, v
     )
-    return force * hammer[INVERSE_MASS]
+    return float(force * hammer[INVERSE_MASS])

@@ -1,9 +1,10 @@
 """Whether and where a quintic crosses a level: the search for switches inside one step.
 
-The quintic takes position, velocity and acceleration at both ends of a step from the integrator. Its Bernstein
-coefficients bound it (convex hull) and those of its derivative bound the number of its extrema (variation diminishing,
-G. Farin, *Curves and Surfaces for CAGD*, ch. 5), so that a step on which two crossings could hide is recognised from
-six numbers. The quintic only says where to look; the switch itself is located with the integrator.
+The quintic takes position, velocity and acceleration at both ends of a step from the integrator. Its
+Bernstein coefficients bound it (convex hull) and those of its derivative bound the number of its extrema
+(variation diminishing, G. Farin, *Curves and Surfaces for CAGD*, ch. 5), so that a step on which two
+crossings could hide is recognised from six numbers. The quintic only says where to look; the switch itself is
+located with the integrator.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from printhammer.kernel.compiling import compiled
 from printhammer.kernel.modes import NEAR_TOUCH, NO_SWITCH, REACHED_FRONT, UNRESOLVED
 
 MARGIN = 1e-3
-"""Distance to a level, in lengths of the control polygon, within which an extremum is located before it is judged."""
+"""Distance to a level, in lengths of the control polygon, within which an extremum is located first."""
 
 
 @compiled
@@ -32,7 +33,7 @@ def sign_changes(d0: float, d1: float, d2: float, d3: float, d4: float) -> int:
 def control_points(
     x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float
 ) -> tuple[float, float, float, float]:
-    """Return the four inner Bernstein coefficients of the quintic through both ends of a step of length `h`."""
+    """Return the four inner Bernstein coefficients of the quintic through both ends of a step of `h`."""
     p1 = x0 + 0.2 * h * v0
     p2 = p1 + 0.2 * h * v0 + 0.05 * h * h * a0
     p4 = x1 - 0.2 * h * v1
@@ -49,15 +50,16 @@ def rises_through(
     Returns
     -------
     int
-        REACHED_FRONT if it ends above and has one crossing, NO_SWITCH if it has none, NEAR_TOUCH if it ends below but
-        its only maximum may reach the level, UNRESOLVED if it may have several extrema and the step must be halved.
+        REACHED_FRONT if it ends above and has one crossing, NO_SWITCH if it has none, NEAR_TOUCH if it ends
+        below but its only maximum may reach the level, UNRESOLVED if it may have several extrema and the step
+        must be halved.
     """
     p1, p2, p3, p4 = control_points(x0, v0, a0, x1, v1, a1, h)
     d0, d1, d2, d3, d4 = p1 - x0, p2 - p1, p3 - p2, p4 - p3, x1 - p4
     if x1 > level:
         return REACHED_FRONT if sign_changes(d0, d1, d2, d3, d4) <= 1 else UNRESOLVED
     margin = MARGIN * (abs(d0) + abs(d1) + abs(d2) + abs(d3) + abs(d4))
-    if max(max(p1, p2), max(p3, p4)) < level - margin:
+    if max(p1, p2, p3, p4) < level - margin:
         return NO_SWITCH
     changes = sign_changes(d0, d1, d2, d3, d4)
     if changes == 0:
@@ -75,8 +77,8 @@ def turns_down(x0: float, v0: float, a0: float, x1: float, v1: float, a1: float,
     Returns
     -------
     int
-        REACHED_FRONT (read: there is one crossing) if it ends at or below zero after one change of sign, NO_SWITCH if
-        it stays positive, UNRESOLVED if it may change its sign more often.
+        REACHED_FRONT (read: there is one crossing) if it ends at or below zero after one change of sign,
+        NO_SWITCH if it stays positive, UNRESOLVED if it may change its sign more often.
     """
     p1, p2, p3, p4 = control_points(x0, v0, a0, x1, v1, a1, h)
     changes = sign_changes(p1 - x0, p2 - p1, p3 - p2, p4 - p3, x1 - p4)
@@ -120,7 +122,7 @@ def position_root(
 
 @compiled
 def velocity_root(v0: float, a0: float, v1: float, a1: float, h: float) -> float:
-    """Return the fraction of the step in (0, 1] at which the cubic through both ends' velocities falls to zero."""
+    """Return the fraction of the step in (0, 1] at which the cubic of the velocity falls to zero."""
     c2 = 3.0 * (v1 - v0) - h * (2.0 * a0 + a1)
     c3 = 2.0 * (v0 - v1) + h * (a0 + a1)
     # From rest, the root at the start is divided out.

@@ -1,8 +1,9 @@
 """One controlled step off the backstop that ends exactly on the first switch, if there is one inside it.
 
-After a step is accepted, its quintic tells whether a switch lies inside (:mod:`printhammer.kernel.hermite`). If so,
-the step is repeated from its start with the length that the quintic suggests, and the small rest is closed with the
-exact derivatives at that point: the displacement of the switch is exact, its time as good as the integrator.
+After a step is accepted, its quintic tells whether a switch lies inside (:mod:`printhammer.kernel.hermite`).
+If so, the step is repeated from its start with the length that the quintic suggests, and the small rest is
+closed with the exact derivatives at that point: the displacement of the switch is exact, its time as good as
+the integrator.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled, inlined
 from printhammer.kernel.hermite import position_root, rises_through, turns_down, velocity_root
-from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION
+from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control
 from printhammer.kernel.modes import (
     BACKSTOP_RELEASED,
     EDGE,
@@ -67,10 +68,11 @@ def plain_step(
 
 
 @compiled
-def error_ratio(error_x: float, error_v: float, mode: int, control: Any) -> float:
+def error_ratio(error_x: float, error_v: float, mode: int, control: Control) -> float:
     """Return the error estimate of a step over what is allowed; NaN stays NaN.
 
-    `control` is (scale of x, scale of v, allowance of the order 6 estimate, allowance of the order 7 estimate).
+    `control` is (scale of x, scale of v, allowance of the order 6 estimate, allowance of the order 7
+    estimate).
     """
     ratio_x = abs(error_x) / control[0]
     ratio_v = abs(error_v) / control[1]
@@ -103,7 +105,7 @@ def land_on_level(
     memory: float,
     hammer: Hammer,
     drive: Drive,
-    control: Any,
+    control: Control,
 ) -> State:
     """Return the state at which sign * x rises through sign * `level`, inside `upper` of a step of `h`."""
     t, x, v, a = start
@@ -138,7 +140,7 @@ def land_on_reversal(
     memory: float,
     hammer: Hammer,
     drive: Drive,
-    control: Any,
+    control: Control,
 ) -> tuple[float, float, float, float, float]:
     """Return the state at which sign * v falls to zero inside a step of `h`, and its fraction of the step."""
     t, x, v, a = start
@@ -163,8 +165,10 @@ def land_on_reversal(
 
 
 @compiled
-def longest_still_step(start: State, mode: int, memory: float, hammer: Hammer, drive: Drive, control: Any) -> float:
-    """Return the longest step [s] at which the method is stable for small oscillations about the present place.
+def longest_still_step(
+    start: State, mode: int, memory: float, hammer: Hammer, drive: Drive, control: Control
+) -> float:
+    """Return the longest step [s] that is stable for small oscillations about the present place.
 
     Near rest all errors are below the tolerance, those of an unstable step too, until they have grown to it.
     """
@@ -185,7 +189,14 @@ def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
 
 @compiled
 def land_on_push(
-    start: State, h: float, upper: float, mode: int, memory: float, hammer: Hammer, drive: Drive, control: Any
+    start: State,
+    h: float,
+    upper: float,
+    mode: int,
+    memory: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
 ) -> State:
     """Return the state at which the contact begins or ends to push, inside `upper` of a step of `h`."""
     t, x, v, a = start
@@ -216,9 +227,9 @@ def level_switch(
     memory: float,
     hammer: Hammer,
     drive: Drive,
-    control: Any,
+    control: Control,
 ) -> tuple[int, float, float]:
-    """Look for sign * x rising through sign * `level` in a step: a code, the fraction, an upper bound of it."""
+    """Look for sign * x rising through sign * `level` in a step: a code, the fraction, a bound of it."""
     _t, x0, v0, a0 = start
     _t1, x1, v1, a1 = end
     code = rises_through(sign * x0, sign * v0, sign * a0, sign * x1, sign * v1, sign * a1, h, sign * level)
@@ -251,7 +262,7 @@ def first_switch(
     peak: float,
     hammer: Hammer,
     drive: Drive,
-    control: Any,
+    control: Control,
 ) -> tuple[int, float, float, float, float]:
     """Find the first switch inside a step: its name, fraction, upper bound, level and direction."""
     switch, fraction, upper, level, sign = NO_SWITCH, 2.0, 1.0, 0.0, 1.0
@@ -304,14 +315,15 @@ def advance(
     peak: float,
     hammer: Hammer,
     drive: Drive,
-    control: Any,
+    control: Control,
 ) -> tuple[int, State, float]:
     """Take one accepted step from `start`, at most to `t_next`, ending on the first switch.
 
     Returns
     -------
     tuple
-        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, or its name), the state there, the next step length [s].
+        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, or its name), the state there, the next step length
+        [s].
     """
     t, x, v, a = start
     shortest = 1e-14 * control[0] / control[1]
@@ -336,7 +348,7 @@ def advance(
             h *= 0.5
             continue
         following = h * step_factor(ratio)
-        if switch == NO_SWITCH or switch == UNRESOLVED:
+        if switch in (NO_SWITCH, UNRESOLVED):
             switch = EDGE if at_edge else NO_SWITCH
         elif switch == REVERSAL:
             turn = land_on_reversal(start, h, fraction, sign, mode, memory, hammer, drive, control)

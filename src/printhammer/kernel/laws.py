@@ -1,8 +1,9 @@
-"""What the compiled kernel is bound to: the laws of one hammer's parts and a few switches fixed at compile time.
+"""What a compiled kernel is bound to: the laws of one hammer's parts, and choices fixed at compile time.
 
-The functions and flags below are declarations. The modules listed in :data:`printhammer.kernel.specialise.TEMPLATES`
-import them for the type checker only; at run time :func:`printhammer.kernel.specialise.specialise` puts the chosen laws
-in their place and compiles one kernel for each combination of laws, so that a replaced part costs nothing at run time.
+The functions and flags below are declarations. The modules listed in
+:data:`printhammer.kernel.specialise.TEMPLATES` import them for the type checker only; at run time
+:func:`printhammer.kernel.specialise.specialise` puts the chosen laws in their place and compiles one kernel
+for each combination of laws, so that a replaced part costs nothing at run time.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
     from numpy import float64
+    from numpy.typing import NDArray
 
     Constants = NDArray[float64]
 
@@ -24,7 +25,8 @@ class Laws:
     Attributes
     ----------
     magnet, spring, pack, backstop : str
-        Dotted names of modules with the law functions declared in this file; the empty string for an absent part.
+        Dotted names of modules with the law functions declared in this file; the empty string for an absent
+        part.
     absent : str
         Dotted name of the module from which every function that a part's module lacks is taken.
     force_drive : bool
@@ -32,7 +34,8 @@ class Laws:
     pack_pulls, backstop_pulls : bool
         Whether the contact force may become tensile, as the printed law allows.
     reload_along_unloading : bool
-        Reloading inside one pack contact follows the unloading branch instead of jumping to the loading branch.
+        Reloading inside one pack contact follows the unloading branch instead of jumping to the loading
+        branch.
     """
 
     magnet: str

@@ -1,12 +1,14 @@
 """The drive at an instant, and the instants at which one of its pieces begins or ends.
 
-A drive is n firing times and one waveform, a table of pieces ``[start, kind, p0, p1, p2, p3]`` of which the last row
-holds the end of support. With s the time since the start of the piece: kind 0 is a cubic p0 + s (p1 + s (p2 + s p3)),
-kind 1 an exponential p0 + p1 exp(-p2 s), kind 2 a sine p0 + p1 sin(p2 s + p3). The pieces under way are known by
-their numbers, not by comparing times, so that an instant exactly on an edge belongs to the piece that begins there.
+A drive is n firing times and one waveform, a table of pieces ``[start, kind, p0, p1, p2, p3]`` of which the
+last row holds the end of support. With s the time since the start of the piece: kind 0 is a cubic p0 + s (p1
++ s (p2 + s p3)), kind 1 an exponential p0 + p1 exp(-p2 s), kind 2 a sine p0 + p1 sin(p2 s + p3). The pieces
+under way are known by their numbers, not by comparing times, so that an instant exactly on an edge belongs to
+the piece that begins there.
 
-While a run goes on, the pieces under way are kept side by side in one array ``live``: their number, then seven values
-each, ``[firing, start, kind, p0, p1, p2, p3]``. It is rewritten at every edge; all the force sum needs is in it.
+While a run goes on, the pieces under way are kept side by side in one array ``live``: their number, then
+seven values each, ``[firing, start, kind, p0, p1, p2, p3]``. It is rewritten at every edge; all the force sum
+needs is in it.
 """
 
 from __future__ import annotations
@@ -56,8 +58,8 @@ def pass_edges(
 ) -> tuple[int, int, float]:
     """Begin and end all pieces whose edge is not after time `t` [s] and rewrite `live`.
 
-    Pulses `first` to `last` - 1 are under way, pulse p in the piece ``under_way[p]``. With `replace`, a firing cuts off
-    the pulses before it.
+    Pulses `first` to `last` - 1 are under way, pulse p in the piece ``under_way[p]``. With `replace`, a
+    firing cuts off the pulses before it.
 
     Returns
     -------

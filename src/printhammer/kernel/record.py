@@ -1,12 +1,13 @@
 """The record of a run: nodes at the ends of all steps, and contacts.
 
-A node is ``[time, position, velocity, mode, memory]``: the mode and memory hold from this node to the next; memory is
-the displacement of the latest local maximum in the pack, w = sqrt(b - x) in the backstop, else zero. A contact is
-``[surface, time in, velocity in, time out, velocity out, last node before it, open at the start]``; the time out of a
-contact that is open at the end is NaN.
+A node is ``[time, position, velocity, mode, memory]``: the mode and memory hold from this node to the next;
+memory is the displacement of the latest local maximum in the pack, w = sqrt(b - x) in the backstop, else
+zero. A contact is ``[surface, time in, velocity in, time out, velocity out, last node before it, open at the
+start]``; the time out of a contact that is open at the end is NaN.
 
-The arrays are the caller's. Rows beyond their length are counted but not kept, all but the last: a caller that wants
-them all repeats the run with longer arrays, one that wants only the final state gives an array of one row.
+The arrays are the caller's. Rows beyond their length are counted but not kept, all but the last: a caller
+that wants them all repeats the run with longer arrays, one that wants only the final state gives an array of
+one row.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """States and forces at any times of a recorded run.
 
-The state inside a step is one shortened step of the same method from the node before it: no interpolation formula, and
-no dependence on the output grid.
+The state inside a step is one shortened step of the same method from the node before it: no interpolation
+formula, and no dependence on the output grid.
 """
 
 from __future__ import annotations
@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled, entry
 from printhammer.kernel.layout import BACKSTOP_PART, MAGNET, PACK, POSITION, SPRING
-from printhammer.kernel.modes import ANY_SCALES, BACKSTOP, BACKSTOP_SURFACE, HELD, RELOADING, RESTING, UNLOADING
+from printhammer.kernel.modes import (
+    ANY_SCALES,
+    BACKSTOP,
+    BACKSTOP_SURFACE,
+    HELD,
+    RELOADING,
+    RESTING,
+    UNLOADING,
+)
 
 if TYPE_CHECKING:
     from printhammer.kernel.contact import contact_rate
@@ -47,8 +55,8 @@ def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
 def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
     """Return the s at which a step in the backstop from time `t0` reaches time `t` [s].
 
-    Each correction solves dt = 2 w ds - v ds^2, whose root stays regular where the armature leaves, w = 0; a time after
-    that gives the s of leaving.
+    Each correction solves dt = 2 w ds - v ds^2, whose root stays regular where the armature leaves, w = 0; a
+    time after that gives the s of leaving.
     """
     left = t - t0
     if left <= 0.0:
@@ -111,8 +119,8 @@ def resample(
     nodes, firings, pieces, replace, under_way, live, hammer
         As recorded and given in :func:`printhammer.kernel.run.run`.
     out : float64 array, shape (n, 9)
-        Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of the
-        backstop, mode. At the time of an impact or a switch: the state after it.
+        Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
+        the backstop, mode. At the time of an impact or a switch: the state after it.
     """
     first, last = 0, 0
     first, last, _edge = pass_edges(nodes[0, 0], firings, pieces, replace, under_way, first, last, live)
@@ -138,7 +146,9 @@ def resample(
         out[row, 4] = spring_force(hammer[SPRING:PACK], x)
         out[row, 5] = pack_force(x, v, mode, memory_of(mode, kept, hammer), hammer)
         out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if mode in (BACKSTOP, HELD) else 0.0
-        out[row, 7] = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if mode in (BACKSTOP, HELD) else 0.0
+        out[row, 7] = (
+            backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if mode in (BACKSTOP, HELD) else 0.0
+        )
         out[row, 8] = mode
 
 
@@ -160,7 +170,7 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, drive: Dr
 def refined(
     which: int, low: float, high: float, node: Any, surface: int, hammer: Hammer, drive: Drive
 ) -> tuple[float, float]:
-    """Return time and value of the largest depth (`which` 0) or force (1) between two times, by golden section."""
+    """Return time and value of the largest depth (`which` 0) or force (1) between two times."""
     t1 = low + GOLDEN * (high - low)
     t2 = high - GOLDEN * (high - low)
     f1 = depth_and_force(t1, node, surface, hammer, drive)[which]
@@ -189,9 +199,11 @@ def peaks(
     hammer: Hammer,
     out: Any,
 ) -> None:
-    """Fill `out`, shape (number of contacts, 3), with the time [s] of the largest depth, that depth [m] and the peak force [N].
+    """Fill `out` with the peaks of all contacts.
 
-    `contacts` are as recorded; the steps of a contact begin at its node and end at the first node not before its end.
+    Each row has the time [s] of the largest depth, that depth [m] and the peak force [N].
+    `contacts` are as recorded; the steps of a contact begin at its node and end at the first node not before
+    its end.
     """
     first, last = 0, 0
     for row in range(contacts.shape[0]):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled, entry
 from printhammer.kernel.landing import FAILED
-from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION
+from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control
 from printhammer.kernel.modes import (
     BACKSTOP,
     BACKSTOP_RELEASED,
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.record import add_node, close_contact, hold_node, open_contact
 
 STILL = 1e-12
-"""Where the motion over one characteristic time is below this share of the scales, the armature is held still."""
+"""Share of the scales below which the motion in one characteristic time counts as none."""
 
 
 @compiled
@@ -84,7 +84,7 @@ def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
 
 @compiled
 def time_to_level(distance: float, v: float, a: float) -> float:
-    """Return the time [s] in which a constant acceleration covers `distance` >= 0, infinity if it never does."""
+    """Return the time [s] in which a constant acceleration covers `distance` >= 0, or infinity."""
     if v <= 0.0 and a <= 0.0:
         return math.inf
     under_root = v * v + 2.0 * a * distance
@@ -121,7 +121,7 @@ def out_of_bounds(x: float, bounds: Any) -> int:
 
 
 @compiled
-def failure(x: float, v: float, bounds: Any, control: Any) -> int:
+def failure(x: float, v: float, bounds: Any, control: Control) -> int:
     """Return the status of a run whose step became too short."""
     near = 0.05 * control[0]
     if (x - bounds[0] < near and v <= 0.0) or (bounds[1] - x < near and v >= 0.0):
@@ -143,18 +143,16 @@ def reversed_mode(
     if RELOAD_ALONG_UNLOADING:
         again = acceleration(t, x, 0.0, UNLOADING, memory, hammer, drive) > 0.0
         return (RELOADING if again else UNLOADING), peak, memory
-    # As printed, the loading branch is the stronger one below the peak: the wire goes in again only if the other
-    # forces overcome it, else this point is at once a new local maximum.
+    # As printed, the loading branch is the stronger one below the peak: the wire goes in again only if the
+    # other forces overcome it, else this point is at once a new local maximum.
     if acceleration(t, x, 0.0, LOADING, memory, hammer, drive) > 0.0:
         return LOADING, peak, memory
     return UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
 
 
 @compiled
-def kick_into_backstop(
-    t: float, a: float, t_next: float, hammer: Hammer, control: Any
-) -> tuple[float, float, float]:
-    """Return time, w and velocity shortly after a touch with zero velocity, where the contact force is negligible.
+def kick_into_backstop(t: float, a: float, t_next: float, control: Control) -> tuple[float, float, float]:
+    """Return time, w and velocity shortly after a touch without velocity, the contact force still negligible.
 
     The regularised equations stand still at w = v = 0.
     """
@@ -164,10 +162,10 @@ def kick_into_backstop(
 
 
 @compiled
-def contact_unit(v: float, control: Any) -> float:
-    """Return the scale of s for a touch with velocity `v`: the duration in s of a Hertz contact goes as |v|^-0.6."""
+def contact_unit(v: float, control: Control) -> float:
+    """Return the scale of s for a touch with velocity `v`; a Hertz contact lasts |v|^-0.6 in s."""
     speed = max(abs(v), 1e-6 * control[1])
-    return math.sqrt(control[0]) / (control[1] ** 0.4 * speed**0.6)
+    return float(math.sqrt(control[0]) / (control[1] ** 0.4 * speed**0.6))
 
 
 @entry
@@ -180,7 +178,7 @@ def run(
     x: float,
     v: float,
     t_end: float,
-    control: Any,
+    control: Control,
     bounds: Any,
     max_steps: int,
     under_way: Any,
@@ -280,7 +278,7 @@ def run(
                 t = t_next
                 switch = EDGE
             elif w == 0.0 and v == 0.0:
-                t, w, v = kick_into_backstop(t, a, t_next, hammer, control)
+                t, w, v = kick_into_backstop(t, a, t_next, control)
                 kv = contact_rate(w, v, t, hammer, drive)
                 switch = EDGE if t == t_next else NO_SWITCH
             else:
@@ -371,7 +369,7 @@ def run(
                     mode = FREE
                 else:
                     mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
-            elif switch == LEFT_FRONT or switch == LEFT_BACKSTOP:
+            elif switch in (LEFT_FRONT, LEFT_BACKSTOP):
                 close_contact(contacts, touched, t, v)
                 x = hammer[POSITION] if switch == LEFT_BACKSTOP else hammer[FRONT]
                 mode = FREE

@@ -1,9 +1,10 @@
 """One compiled kernel for each combination of laws.
 
-The kernel's template modules are ordinary source files whose law functions are names without a value. For a given
-:class:`~printhammer.kernel.laws.Laws` they are executed once more under a module name of their own, with the chosen
-laws put in place, so that the compiler sees every call and can inline it. The module name holds a digest of all
-sources involved: machine code cached on disk is used again for the same sources, and never for others.
+The kernel's template modules are ordinary source files whose law functions are names without a value. For a
+given :class:`~printhammer.kernel.laws.Laws` they are executed once more under a module name of their own,
+with the chosen laws put in place, so that the compiler sees every call and can inline it. The module name
+holds a digest of all sources involved: machine code cached on disk is used again for the same sources, and
+never for others.
 """
 
 from __future__ import annotations
