@@ -358,11 +358,11 @@ def run(
                     mode = BACKSTOP
                     w = 0.0
             elif switch == REACHED_FRONT:
-                if v > 0.0:
+                v = max(v, 0.0)
+                # A touch without velocity opens a contact only if the armature is pushed on.
+                if v > 0.0 or acceleration(t, x, v, FREE, memory, hammer, drive) > 0.0:
                     touched = open_contact(contacts, touched, PACK_SURFACE, t, v, used, False)
                     mode = LOADING
-                else:
-                    v = 0.0
             elif switch == REVERSAL:
                 if x <= hammer[FRONT]:
                     close_contact(contacts, touched, t, v)
