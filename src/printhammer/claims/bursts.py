@@ -1,0 +1,222 @@
+"""Claims about nine-pulse bursts against rate, Figs. 8 and 9."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.claims.context import NotMeasurableError
+from printhammer.claims.definition import claims
+from printhammer.claims.judging import Measured, measures
+from printhammer.claims.shapes import spread
+from printhammer.drive import PulseTrain
+
+if TYPE_CHECKING:
+    from printhammer.claims.context import Context
+    from printhammer.claims.definition import Claim
+    from printhammer.motion import Motion
+
+_WHOLE = ("backstop", "pack", "waveform")
+_CLOSER: Final = 8
+
+
+def spreads(motion: Motion) -> tuple[int, float | None, float | None]:
+    """Return number of struck dots, spread of peak forces over their mean, spread of flight times, s."""
+    forces = [dot.peak_force for dot in motion.dots if dot.peak_force is not None]
+    flights = [dot.flight_time for dot in motion.dots if dot.flight_time is not None]
+    if len(forces) < 2:
+        return len(forces), None, None
+    return len(forces), spread(forces) / float(np.mean(forces)), spread(flights)
+
+
+@measures("independent_at_low_rate", "pack", "waveform")
+def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
+    """Spread of the dots of a slow burst."""
+    rate, pulses = claim.settings["rate_Hz"], claim.settings["pulses"]
+    struck, force, flight = spreads(context.train(rate, pulses))
+    value = {"dots_struck": struck, "force_spread": force, "flight_time_spread_s": flight}
+    if force is None or flight is None:
+        return Measured(value, f"{struck} of {pulses} dots are struck.")
+    return Measured(
+        value,
+        f"{struck} of {pulses} dots; forces agree within {force:.2%}, flight times within"
+        f" {flight * 1e6:.2f} us.",
+    )
+
+
+def _rates(settings: Any) -> list[float]:
+    first, last, step = (settings[name] for name in ("first_rate_Hz", "last_rate_Hz", "rate_step_Hz"))
+    return [float(first + step * k) for k in range(round((last - first) / step) + 1)]
+
+
+@measures("order_of_onset", *_WHOLE)
+def order_of_onset(context: Context, claim: Claim) -> Measured:
+    """Rates at which flight times vary, forces vary, and a dot is lost, for the first time."""
+    settings = claim.settings
+    first: dict[str, float] = {}
+    for rate in _rates(settings):
+        struck, force, flight = spreads(context.train(rate, settings["pulses"]))
+        if flight is not None and flight > settings["flight_time_spread_s"]:
+            first.setdefault("flight_time", rate)
+        if force is not None and force > settings["force_spread"]:
+            first.setdefault("force", rate)
+        if struck < settings["pulses"]:
+            first["lost"] = rate
+            break
+    lost = first.get("lost")
+    value: dict[str, Any] = {"first_lost_dot_at_Hz": lost}
+    for name in ("flight_time", "force"):
+        onset = first.get(name)
+        value[f"{name}_varies_from_Hz"] = onset
+        both = onset is not None and lost is not None
+        value[f"rate_below_first_lost_dot_{name}_Hz"] = lost - onset if both and lost and onset else None
+    told = {name: f"at {rate:.0f} Hz" for name, rate in first.items()}
+    return Measured(
+        value,
+        f"Flight times first vary {told.get('flight_time', 'at no rate before')}, forces"
+        f" {told.get('force', 'at no rate before')}; the first dot is lost"
+        f" {told.get('lost', 'at no rate tried')}.",
+    )
+
+
+@measures("second_dot_lost", *_WHOLE)
+def second_dot_lost(context: Context, claim: Claim) -> Measured:
+    """First interval of rates in which the peak after the second firing stays below the pack."""
+    settings = claim.settings
+    waveform, front = context.waveform, context.front
+    begins = ends = None
+    for rate in _rates(settings):
+        # The third firing ends the interval of the second.
+        motion = context.run(PulseTrain(waveform, rate=rate, pulses=2), 2.0 / rate)
+        peak = motion.peak_after(1)
+        below = peak is None or peak[1] < front
+        if below and begins is None:
+            begins = rate
+        if begins is not None:
+            if not below:
+                break
+            ends = rate
+    wanted = settings["quenched_rate_Hz"]
+    value = {
+        "begins_at_rate_Hz": begins,
+        "contains_quenched_rate": bool(begins is not None and ends is not None and begins <= wanted <= ends),
+        "ends_at_rate_Hz": ends,
+    }
+    if begins is None:
+        return Measured(value, f"The second dot is never lost up to {settings['last_rate_Hz']:.0f} Hz.")
+    return Measured(value, f"The second dot is first lost from {begins:.0f} to {ends:.0f} Hz.")
+
+
+def hung_up(motion: Motion) -> bool:
+    """Whether the armature stays off the backstop from its first leaving of the pack to the last firing."""
+    left = _first_leaving(motion)
+    if left is None:
+        return False
+    # Every touch and leaving is the end of a step, so that none is missed between them.
+    times = motion.step_times
+    between = (times > left) & (times < motion.drive.times[-1])
+    return not (motion.at(times)[0][between] <= motion.hammer.origin).any()
+
+
+def _first_leaving(motion: Motion) -> float | None:
+    """Return when the armature first leaves the pack, s; None if it never touches it."""
+    times = motion.step_times
+    inside = motion.at(times)[0] > (motion.hammer.front or 0.0)
+    if not inside.any():
+        return None
+    first = int(np.argmax(inside))
+    outside = ~inside[first:]
+    return float(times[first + int(np.argmax(outside))]) if outside.any() else motion.end
+
+
+def _hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
+    """Return the rate from which on all hang up, the motions, and the highest rate allowed, Hz."""
+    settings = claims()["hang_up_at_high_rate"].settings
+    step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))
+    waveform = context.waveform
+    rate, lowest, found = settings["last_rate_Hz"], None, []
+    if waveform.quantity == "current":
+        while rate > 0.0 and PulseTrain(waveform, rate=rate, pulses=pulses).peak > limit:
+            rate -= step
+    highest = rate
+    while rate > 0.0:
+        motion = context.train(rate, pulses, tail=1e-3)
+        if not hung_up(motion):
+            break
+        lowest = rate
+        found.append(motion)
+        rate -= step
+    return lowest, found, highest
+
+
+@measures("hang_up_at_high_rate", *_WHOLE)
+def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
+    """Lowest rate from which on the armature hangs up."""
+    lowest, _, highest = context.once("hang-up", lambda: _hang_up_range(context))
+    value = {"hang_up_rate_Hz": lowest, "highest_rate_Hz": highest}
+    if lowest is None:
+        return Measured(value, f"At {highest:.0f} Hz the armature still touches the backstop.")
+    return Measured(value, f"From {lowest:.0f} to {highest:.0f} Hz the armature stays off the backstop.")
+
+
+@measures("weak_prints_when_hung_up", *_WHOLE)
+def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
+    """Largest pack force after the first dot where the armature hangs up."""
+    lowest, motions, highest = context.once("hang-up", lambda: _hang_up_range(context))
+    if lowest is None:
+        raise NotMeasurableError("The armature does not hang up")
+    # Largest forces at the ends of steps tell which motions are worth a closer look.
+    likely = sorted(motions, key=_rough_force, reverse=True)[:_CLOSER]
+    rate, strongest = 0.0, 0.0
+    for motion in likely:
+        for contact in [c for c in motion.contacts if c.surface == "pack"][1:]:
+            if contact.peak_force is not None and contact.peak_force > strongest:
+                rate, strongest = 1.0 / (motion.drive.period or math.inf), contact.peak_force
+    value = {
+        "largest_force_over_single": strongest / context.print_force,
+        "largest_force_N": strongest,
+        "at_rate_Hz": rate,
+    }
+    return Measured(
+        value,
+        f"From {lowest:.0f} to {highest:.0f} Hz the strongest impact after the first dot has"
+        f" {strongest:.1f} N, at {rate:.0f} Hz.",
+    )
+
+
+def _rough_force(motion: Motion) -> float:
+    """Return the largest pack force at an end of a step after the first leaving of the pack, N."""
+    left = _first_leaving(motion)
+    times = motion.step_times
+    later = times[times >= (motion.end if left is None else left)]
+    return float(-motion.forces_at(later)["pack"].min()) if later.size else 0.0
+
+
+@measures("flight_time_spread", *_WHOLE)
+def flight_time_spread(context: Context, claim: Claim) -> Measured:
+    """Spread of the flight times of bursts at the strange strobe times."""
+    settings, figure = claim.settings, claims()["poincare"]
+    pulses = settings["pulses"]
+    _, _, slow = spreads(context.train(settings["rate_Hz"], pulses))
+    found: dict[str, Any] = {}
+    for period, verdict in zip(figure.settings["strobe_times_s"], figure.band["verdicts"], strict=True):
+        if verdict == "strange":
+            drive = PulseTrain(context.waveform, period=period, pulses=pulses)
+            found[f"{period * 1e3:.2f} ms"] = spreads(context.run(drive, float(drive.times[-1]) + 4e-3))[2]
+    known = [flight for flight in found.values() if flight is not None]
+    least = min(known) - slow if slow is not None and len(known) == len(found) else None
+    over = {name: sum(flight > settings[name] for flight in known) for name in ("dot_matrix_s", "engraved_s")}
+    value = {
+        "least_spread_minus_low_rate_s": least,
+        "low_rate_spread_s": slow,
+        "spreads_s": found,
+        "bursts_over_200_us": over["dot_matrix_s"],
+        "bursts_over_30_us": over["engraved_s"],
+    }
+    return Measured(
+        value,
+        f"Of {len(found)} bursts {over['dot_matrix_s']} exceed 200 us, what dot-matrix printing tolerates,"
+        f" and {over['engraved_s']} exceed 30 us.",
+    )

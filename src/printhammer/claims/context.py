@@ -1,0 +1,186 @@
+"""The runs that the claims share: each is computed once."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+from printhammer.drive import PulseTrain
+from printhammer.errors import PrinthammerError
+from printhammer.problem import TOLERANCE
+from printhammer.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from printhammer.contacts import Contact, Dot
+    from printhammer.drive import Drive
+    from printhammer.hammer import Hammer
+    from printhammer.motion import Motion
+    from printhammer.waveforms import Waveform
+
+CYCLE: Final = 20e-3
+"""Duration of the single-pulse cycle, s: from rest to rest, with ample time to settle."""
+
+TAIL: Final = 4e-3
+"""Time after the last firing of a train for its dot, s."""
+
+_IDLE: Final = 1e-3
+
+_T = TypeVar("_T")
+
+
+class NotMeasurableError(PrinthammerError):
+    """A claim is about something that this hammer does not have or do."""
+
+
+class Context:
+    """A hammer and its motions, as the claims need them.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    tolerance : float
+        Of the default integrator.
+    """
+
+    def __init__(self, hammer: Hammer, tolerance: float = TOLERANCE) -> None:
+        self.hammer = hammer
+        self.tolerance = tolerance
+        self._motions: dict[tuple[Any, ...], Motion] = {}
+        self._found: dict[str, Any] = {}
+
+    def need(self, name: str) -> Any:
+        """Return a part or constant of the hammer.
+
+        Raises
+        ------
+        NotMeasurableError
+            The hammer does not have it.
+        """
+        found = getattr(self.hammer, name)
+        if found is None:
+            raise NotMeasurableError(f"The hammer has no {name}")
+        return found
+
+    @property
+    def waveform(self) -> Waveform:
+        """The standard waveform of the hammer."""
+        found: Waveform = self.need("waveform")
+        return found
+
+    @property
+    def position(self) -> float:
+        """Position of the backstop, m."""
+        self.need("backstop")
+        return self.hammer.origin
+
+    @property
+    def front(self) -> float:
+        """Front of the pack, m."""
+        return float(self.need("pack").front)
+
+    def once(self, name: str, search: Callable[[], _T]) -> _T:
+        """Return what a search finds, the second time from the shelf."""
+        if name not in self._found:
+            self._found[name] = search()
+        found: _T = self._found[name]
+        return found
+
+    def attempt(
+        self,
+        drive: Drive,
+        duration: float,
+        *,
+        hammer: Hammer | None = None,
+        state: tuple[float, float] | None = None,
+        **options: Any,
+    ) -> Motion:
+        """Run the hammer, or another one, under a drive; from the shelf if that was run before."""
+        which = self.hammer if hammer is None else hammer
+        options = {"tolerance": self.tolerance, **options}
+        key = (which.fingerprint, drive.fingerprint, duration, state, *sorted(options.items()))
+        if key not in self._motions:
+            # The grid is not looked at; what is, is computed where it is asked for.
+            self._motions[key] = simulate(which, drive, duration=duration, state=state, points=2, **options)
+        return self._motions[key]
+
+    def run(self, drive: Drive, duration: float, **options: Any) -> Motion:
+        """Run as `attempt` does.
+
+        Raises
+        ------
+        NotMeasurableError
+            The run ended early.
+        """
+        motion = self.attempt(drive, duration, **options)
+        if not motion.ok:
+            raise NotMeasurableError(f"A run under {drive!r} did not end: {motion.message}")
+        return motion
+
+    def pulses(self, times: Iterable[float], duration: float) -> Motion:
+        """Run pulses fired at given times, s."""
+        return self.run(PulseTrain(self.waveform, at=list(times)), duration)
+
+    def train(self, rate: float, pulses: int, tail: float = TAIL) -> Motion:
+        """Run a train at a rate, Hz, from rest, until `tail`, s, after its last firing."""
+        drive = PulseTrain(self.waveform, rate=rate, pulses=pulses)
+        return self.run(drive, float(drive.times[-1]) + tail)
+
+    def strobe_train(self, period: float, points: int) -> Motion:
+        """Run a train of a period, s, from rest, up to the firing that makes the last strobe point."""
+        drive = PulseTrain(self.waveform, period=period, pulses=points)
+        return self.run(drive, float(drive.times[-1]))
+
+    @cached_property
+    def single(self) -> Motion:
+        """The single-pulse cycle, from rest to rest."""
+        return self.pulses([0.0], CYCLE)
+
+    @cached_property
+    def idle(self) -> Motion:
+        """The hammer at rest, before anything is fired."""
+        return self.pulses([_IDLE], 0.5 * _IDLE)
+
+    @property
+    def rest(self) -> float:
+        """Displacement at rest, m."""
+        return float(self.idle.at(0.0)[0][0])
+
+    @cached_property
+    def peak(self) -> float:
+        """Largest displacement after a single pulse, m."""
+        found = self.single.peak_after(0)
+        if found is None:
+            raise NotMeasurableError("The armature has no largest displacement after a single pulse")
+        return found[1]
+
+    @property
+    def stroke(self) -> float:
+        """Single-pulse peak less backstop, m."""
+        stroke = self.peak - self.position
+        if stroke <= 0.0:
+            raise NotMeasurableError("The armature stays in the backstop after a single pulse")
+        return stroke
+
+    @property
+    def dot(self) -> Dot:
+        """The dot of the single pulse."""
+        dot = self.single.dots[0]
+        if not dot.struck:
+            raise NotMeasurableError("The armature does not reach the pack after a single pulse")
+        return dot
+
+    @property
+    def print_force(self) -> float:
+        """Peak force of the single-pulse dot, N."""
+        force = self.dot.peak_force
+        if not force:
+            raise NotMeasurableError("The single-pulse dot has no peak force")
+        return force
+
+
+def touches(motion: Motion) -> list[Contact]:
+    """List the touches of the backstop, the rest at the start excluded."""
+    return [c for c in motion.contacts if c.surface == "backstop" and not c.initial]

@@ -1,0 +1,108 @@
+"""What the paper claims, as `claims.toml` beside this file puts it into numbers."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Kind = Literal["stated", "typical", "shape"]
+KINDS: Final = get_args(Kind)
+
+TEXTS: Final = ("kind", "source", "says", "reading", "note")
+SIDES: Final = ("above", "at_least", "below", "at_most")
+
+_PRINTED_DIGITS: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One checkable statement of the paper.
+
+    Attributes
+    ----------
+    name : str
+        Name.
+    kind : str
+        "stated", "typical" or "shape".
+    source : str
+        Where the paper says it.
+    says : str
+        What it says, in our words.
+    reading : str
+        What is measured, and what must be so.
+    note : str
+        What a reader must know beside; may be empty.
+    settings : mapping
+        Numbers that set up the experiment, SI.
+    band : mapping
+        What each measured value must be: a number or text, true or false; a list (least, largest) of two
+        numbers, or of texts; a table of `SIDES`.
+    """
+
+    name: str
+    kind: Kind
+    source: str
+    says: str
+    reading: str
+    note: str
+    settings: Mapping[str, Any]
+    band: Mapping[str, Any]
+
+    def holds(self, value: Mapping[str, Any]) -> bool:
+        """Whether every measured value is within its band."""
+        return all(within(value.get(key), band) for key, band in self.band.items())
+
+    def missed(self, value: Mapping[str, Any]) -> list[str]:
+        """List the names of the values that are not within their bands."""
+        return [key for key, band in self.band.items() if not within(value.get(key), band)]
+
+
+def within(value: Any, band: Any) -> bool:
+    """Whether a value is within a band; None and NaN never are."""
+    if isinstance(band, dict):
+        return _is_number(value) and all(_on_side(value, side, limit) for side, limit in band.items())
+    if isinstance(band, list) and len(band) == 2 and all(_is_number(end) for end in band):
+        return _is_number(value) and band[0] <= value <= band[1]
+    if isinstance(band, list):
+        return list(value or ()) == band
+    if isinstance(band, bool) or isinstance(value, bool) or not _is_number(band):
+        return type(value) is type(band) and value == band
+    return _is_number(value) and math.isclose(value, band, rel_tol=_PRINTED_DIGITS)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value)
+
+
+def _on_side(value: float, side: str, limit: float) -> bool:
+    return {
+        "above": value > limit,
+        "at_least": value >= limit,
+        "below": value < limit,
+        "at_most": value <= limit,
+    }[side]
+
+
+@lru_cache(maxsize=1)
+def claims() -> Mapping[str, Claim]:
+    """Return all claims by name, in the order of the paper."""
+    text = files("printhammer").joinpath("claims", "claims.toml").read_text(encoding="utf-8")
+    return {name: _claim(name, table) for name, table in tomllib.loads(text).items()}
+
+
+def _claim(name: str, table: dict[str, Any]) -> Claim:
+    settings = table.pop("settings", [])
+    texts = {key: table.pop(key, "") for key in TEXTS}
+    return Claim(
+        name=name,
+        **texts,
+        settings={key: table[key] for key in settings},
+        band={key: band for key, band in table.items() if key not in settings},
+    )

@@ -1,0 +1,165 @@
+"""How a claim is judged: a function measures, the band of `claims.toml` decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from printhammer.claims.context import Context, NotMeasurableError
+from printhammer.claims.definition import Claim, claims
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from printhammer.hammer import Hammer
+
+Verdict = Literal["holds", "fails", "not yet"]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a claim's function measures.
+
+    Attributes
+    ----------
+    value : mapping
+        Measured values by name, SI, the unit at the end of the name; None where there is no such thing.
+    detail : str
+        One sentence about them.
+    """
+
+    value: Mapping[str, Any]
+    detail: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """A claim, judged.
+
+    Attributes
+    ----------
+    claim : Claim
+        What was judged.
+    value : mapping or None
+        Measured values by name, SI; None where nothing could be measured.
+    verdict : str
+        "holds", "fails" or "not yet".
+    detail : str
+        One sentence: what was found, or why nothing could be.
+    seconds : float
+        Time that it took; no part of `as_dict`.
+    """
+
+    claim: Claim
+    value: Mapping[str, Any] | None
+    verdict: Verdict
+    detail: str
+    seconds: float = 0.0
+
+    @property
+    def missed(self) -> list[str]:
+        """Names of the values that are not within their bands."""
+        return self.claim.missed(self.value) if self.value is not None else []
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what goes to `claims.json`."""
+        claim = self.claim
+        return {
+            "name": claim.name,
+            "kind": claim.kind,
+            "value": None if self.value is None else dict(self.value),
+            "band": dict(claim.band),
+            "verdict": self.verdict,
+            "reading": claim.reading,
+            "detail": self.detail,
+            "source": claim.source,
+            "says": claim.says,
+            "note": claim.note,
+        }
+
+
+Judge = Callable[[Context, Claim], Measured]
+"""Measures what a claim is about."""
+
+JUDGES: Final[dict[str, tuple[tuple[str, ...], Judge]]] = {}
+"""Name of a claim to the parts of a hammer that it is about, and the function that measures."""
+
+
+def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
+    """Register the function that measures what a claim is about.
+
+    Parameters
+    ----------
+    name : str
+        Name of the claim.
+    *needs : str
+        Attributes of the hammer without which the claim cannot hold.
+    """
+
+    def register(function: Judge) -> Judge:
+        if name in JUDGES or name not in claims():
+            raise ValueError(f"the claim {name!r} is measured twice, or is not known")
+        JUDGES[name] = (needs, function)
+        return function
+
+    return register
+
+
+PENDING: Final = {
+    "map_sensitivity": "the frequency-time map",
+    "poincare": "the largest exponent of the strobe map",
+    "no_period_doubling_cascade": "the largest exponent of the strobe map",
+}
+"""Claims that nothing can judge yet, and what it takes."""
+
+
+def judge_all(
+    hammer: Hammer,
+    names: Iterable[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+    context: Context | None = None,
+) -> list[Result]:
+    """Judge the claims of the paper for one hammer.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    names : iterable of str, optional
+        Claims to judge; by default all.
+    progress : callable, optional
+        Called with the name of each claim before it is judged.
+    context : Context, optional
+        Runs to share; by default a new one.
+
+    Returns
+    -------
+    list of Result
+        In the order of the paper.
+    """
+    context = Context(hammer) if context is None else context
+    wanted = set(claims() if names is None else names)
+    results = []
+    for name, claim in claims().items():
+        if name in wanted:
+            if progress is not None:
+                progress(name)
+            results.append(judge(context, claim))
+    return results
+
+
+def judge(context: Context, claim: Claim) -> Result:
+    """Judge one claim."""
+    if claim.name in PENDING:
+        return Result(claim, None, "not yet", f"Not judged yet: it takes {PENDING[claim.name]}.")
+    start = perf_counter()
+    needs, function = JUDGES[claim.name]
+    try:
+        for need in needs:
+            context.need(need)
+        measured = function(context, claim)
+    except (NotMeasurableError, InputError) as error:
+        return Result(claim, None, "fails", f"{error}.", perf_counter() - start)
+    verdict: Verdict = "holds" if claim.holds(measured.value) else "fails"
+    return Result(claim, measured.value, verdict, measured.detail, perf_counter() - start)

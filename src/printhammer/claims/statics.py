@@ -1,0 +1,124 @@
+"""Claims about the hammer at rest: geometry, rest state, magnet against spring, current."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from printhammer.claims.context import NotMeasurableError
+from printhammer.claims.definition import claims
+from printhammer.claims.judging import Measured, measures
+from printhammer.drive import PulseTrain
+from printhammer.equilibrium import equilibria, holding_margin, positive_intervals
+from printhammer.static_force import StaticForce
+
+if TYPE_CHECKING:
+    from printhammer.claims.context import Context
+    from printhammer.claims.definition import Claim
+
+
+@measures("geometry", "backstop", "pack", "platen")
+def geometry(context: Context, _claim: Claim) -> Measured:
+    """Positions of backstop, pack and platen."""
+    platen = float(context.need("platen"))
+    way = platen - context.front
+    thickness = float(getattr(context.hammer.pack, "thickness", way))
+    value = {
+        "backstop_m": context.position,
+        "pack_front_m": context.front,
+        "platen_m": platen,
+        "pack_thickness_m": thickness,
+    }
+    return Measured(
+        value, f"The pack is {thickness * 1e6:.1f} um thick, its front {way * 1e6:.1f} um before the platen."
+    )
+
+
+@measures("rest_state", "magnet", "backstop", "waveform")
+def rest_state(context: Context, _claim: Claim) -> Measured:
+    """Depth of the rest state in the backstop, force there, stability."""
+    rest = context.rest
+    force = float(context.idle.forces_at(0.0)["total"][0])
+    found = min(equilibria(context.hammer), key=lambda e: abs(e.x - rest), default=None)
+    here = found is not None and abs(found.x - rest) <= 1e-9 * abs(rest)
+    depth = context.position - rest
+    value = {
+        "depth_m": depth,
+        "total_force_N": abs(force),
+        "stable": bool(here and found is not None and found.stable),
+        "rest_m": rest,
+        "natural_frequency_Hz": found.frequency if here and found is not None else None,
+    }
+    return Measured(value, f"At rest the backstop is compressed by {depth * 1e6:.3f} um.")
+
+
+@measures("return_from_everywhere", "magnet", "spring", "backstop", "platen")
+def return_from_everywhere(context: Context, _claim: Claim) -> Measured:
+    """Largest net force of magnet and spring at zero current between backstop and platen."""
+    platen = float(context.need("platen"))
+    start, end = context.position, platen
+    best_x, best = start, -np.inf
+    for _ in range(6):
+        x = np.linspace(start, end, 2001)
+        net = -holding_margin(context.hammer, x)
+        if not np.isfinite(net).all():
+            raise NotMeasurableError("The law of the magnet does not hold all the way to the platen")
+        top = int(np.argmax(net))
+        if net[top] > best:
+            best_x, best = float(x[top]), float(net[top])
+        start, end = float(x[max(top - 1, 0)]), float(x[min(top + 1, 2000)])
+    intervals = [list(ends) for ends in positive_intervals(context.hammer) if ends[0] < platen]
+    value = {"largest_net_force_N": best, "at_m": best_x, "positive_from_to_m": intervals}
+    detail = f"The net force is largest at {best_x * 1e6:.1f} um, {best:+.3g} N."
+    return Measured(value, detail)
+
+
+@measures("release_margin", "magnet", "spring", "backstop")
+def release_margin(context: Context, _claim: Claim) -> Measured:
+    """Net force at the backstop in parts of the magnet's, at zero current."""
+    force = StaticForce(context.hammer)
+    magnet, spring = force.magnet(context.position), force.spring(context.position)
+    if magnet == 0.0:
+        raise NotMeasurableError("The magnet has no force at the backstop")
+    value = {
+        "net_over_magnet_force": abs(spring + magnet) / abs(magnet),
+        "net_force_N": spring + magnet,
+        "magnet_force_N": magnet,
+        "spring_force_N": spring,
+    }
+    detail = (
+        f"Of {abs(magnet):.2f} N of the magnet the spring leaves {abs(spring + magnet):.2f} N to be overcome."
+    )
+    return Measured(value, detail)
+
+
+@measures("current_range", "magnet", "waveform")
+def current_range(context: Context, _claim: Claim) -> Measured:
+    """Largest current of the paper's drives: single pulse, pairs, trains down to the shortest period."""
+    waveform = context.waveform
+    if waveform.quantity != "current":
+        raise NotMeasurableError("The hammer is driven by a force, not by a current")
+    settings = {name: claim.settings for name, claim in claims().items()}
+    drives = [PulseTrain(waveform)]
+    drives += [
+        PulseTrain(waveform, at=[0.0, settings[f"two_pulses_{us}us"]["interval_s"]]) for us in (660, 700)
+    ]
+    drives += [
+        PulseTrain(waveform, period=period, pulses=9) for period in settings["poincare"]["strobe_times_s"]
+    ]
+    largest = max(drive.peak for drive in drives)
+    strong, coil = getattr(context.hammer.magnet, "Am", None), getattr(context.hammer.magnet, "Bm", None)
+    value = {
+        "largest_current_A": largest,
+        "Am_over_Bm_A": strong / coil if strong is not None and coil else None,
+        "single_pulse_current_A": waveform.peak,
+    }
+    told = (
+        "the magnet's law has no Am and Bm"
+        if strong is None or not coil
+        else f"Am / Bm = {strong / coil:.3g} A"
+    )
+    return Measured(
+        value, f"The largest current of pulse, pairs and trains down to 0.80 ms is {largest:.3g} A; {told}."
+    )

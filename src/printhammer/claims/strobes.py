@@ -1,0 +1,149 @@
+"""Claims about the state at the moment of firing, Fig. 11."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.claims.context import NotMeasurableError, touches
+from printhammer.claims.definition import claims
+from printhammer.claims.judging import Measured, measures
+from printhammer.claims.shapes import rank_correlation
+
+if TYPE_CHECKING:
+    from printhammer.claims.context import Context
+    from printhammer.claims.definition import Claim
+    from printhammer.segments import FloatArray
+
+_WHOLE = ("backstop", "pack", "waveform")
+_ORBIT_TIME: Final = 4e-3
+_ORBIT_POINTS: Final = 200_001
+_LATTICE: Final = 101
+
+
+def window() -> tuple[FloatArray, FloatArray]:
+    """Return centre and half-widths of the window of Fig. 11, (m, m/s)."""
+    settings = claims()["poincare_window"].settings
+    low, high = np.array([settings["window_x_m"], settings["window_v_m_per_s"]]).T
+    return 0.5 * (low + high), 0.5 * (high - low)
+
+
+def strobe_points(context: Context, period: float, points: int) -> FloatArray:
+    """Return the states at the first firings of a train from rest, (m, m/s), shape (points, 2)."""
+    _, x, v = context.strobe_train(period, points).strobe
+    return np.column_stack([x, v])
+
+
+def scaled(points: FloatArray) -> FloatArray:
+    """Return states in half-widths of the window of Fig. 11."""
+    _, half = window()
+    return points / half
+
+
+def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
+    """Return the strobe points of the panels of Fig. 11 by strobe time, all or those called strange."""
+    figure, count = claims()["poincare"], claims()["poincare_window"].settings["points"]
+    times, verdicts = figure.settings["strobe_times_s"], figure.band["verdicts"]
+    return {
+        f"{period * 1e3:.2f} ms": strobe_points(context, period, count)
+        for period, verdict in zip(times, verdicts, strict=True)
+        if verdict == "strange" or not strange
+    }
+
+
+@measures("poincare_window", *_WHOLE)
+def poincare_window(context: Context, claim: Claim) -> Measured:
+    """Share of the strobe points of each panel inside the window; the others."""
+    centre, half = window()
+    shares: dict[str, float] = {}
+    outside: dict[str, Any] = {}
+    for name, points in panels(context, strange=False).items():
+        beyond = (np.abs(points - centre) > half).any(axis=1)
+        shares[name] = 1.0 - float(beyond.mean())
+        if beyond.any():
+            outside[name] = points[beyond].tolist()
+    value = {
+        "least_share_inside": min(shares.values()),
+        "shares_inside": shares,
+        "outside_m_and_m_per_s": outside,
+    }
+    least = claim.band["least_share_inside"]["at_least"]
+    low = [f"{name} ({share:.1%})" for name, share in shares.items() if share < least]
+    told = f"below {least:.0%} at {', '.join(low)}" if low else f"no panel is below {least:.0%}"
+    return Measured(value, f"Inside the window: {np.mean(list(shares.values())):.1%} of all points; {told}.")
+
+
+@measures("low_rate_fixed_point", *_WHOLE)
+def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
+    """How far the last points of slow trains are from each other."""
+    settings = claim.settings
+    last = settings["last_points"]
+    apart = {}
+    for period in settings["strobe_times_s"]:
+        points = scaled(strobe_points(context, period, settings["firings"]))[-last:]
+        apart[f"{period * 1e3:g} ms"] = float(np.linalg.norm(points - points[-1], axis=1).max())
+    worst = max(apart, key=lambda name: apart[name])
+    value = {"largest_scaled_distance": apart[worst], "scaled_distances": apart}
+    return Measured(
+        value,
+        f"The last {last} of {settings['firings']} points differ most at {worst}, by {apart[worst]:.1e} of"
+        " the window.",
+    )
+
+
+@measures("cloud_grows", *_WHOLE)
+def cloud_grows(context: Context, _claim: Claim) -> Measured:
+    """95th percentile of the distance of strobe points from rest against rate."""
+    rest = scaled(np.array([context.rest, 0.0]))
+    radii = {
+        name: float(np.percentile(np.linalg.norm(scaled(points) - rest, axis=1), 95.0))
+        for name, points in panels(context).items()
+    }
+    # The panels come in the order of rising rate.
+    correlation = rank_correlation(range(len(radii)), list(radii.values()))
+    value = {"rank_correlation": correlation, "scaled_radii": radii}
+    first, *_, last = radii.items()
+    return Measured(
+        value,
+        f"The radius goes from {first[1]:.2f} of the window at {first[0]} to {last[1]:.2f} at {last[0]}.",
+    )
+
+
+@measures("successive_points_apart", *_WHOLE)
+def successive_points_apart(context: Context, claim: Claim) -> Measured:
+    """Distance of successive points in parts of that of any two."""
+    ratios: dict[str, float | None] = {}
+    for name, states in panels(context).items():
+        points = scaled(states)
+        steps = np.median(np.linalg.norm(np.diff(points, axis=0), axis=1))
+        apart = np.linalg.norm(points[:, np.newaxis] - points, axis=2)
+        pairs = np.median(apart[np.triu_indices(len(points), 1)])
+        ratios[name] = float(steps / pairs) if pairs > 0.0 else None
+    count = sum(ratio is not None and ratio >= claim.settings["least_ratio"] for ratio in ratios.values())
+    value = {"panels_apart": count, "ratios": ratios}
+    return Measured(value, f"Successive points are apart in {count} of {len(ratios)} panels.")
+
+
+@measures("points_on_single_pulse_orbit", *_WHOLE)
+def points_on_single_pulse_orbit(context: Context, claim: Claim) -> Measured:
+    """Distance of strobe points to the single-pulse orbit, over that of points anywhere in the window."""
+    from scipy.spatial import cKDTree
+
+    motion, found = context.single, touches(context.single)
+    if not found:
+        raise NotMeasurableError("The armature does not return to the backstop after a single pulse")
+    start = found[0].t_in
+    times = np.linspace(start, min(start + _ORBIT_TIME, motion.end), _ORBIT_POINTS)
+    tree = cKDTree(scaled(np.column_stack(motion.at(times))))
+    centre, half = window()
+    axis = np.linspace(-1.0, 1.0, _LATTICE)
+    lattice = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2) + centre / half
+    anywhere = float(np.median(tree.query(lattice)[0]))
+    ratios = {
+        name: float(np.median(tree.query(scaled(points))[0])) / anywhere
+        for name, points in panels(context).items()
+    }
+    count = sum(ratio <= claim.settings["largest_ratio"] for ratio in ratios.values())
+    value = {"panels_on_orbit": count, "ratios": ratios, "scaled_distance_anywhere": anywhere}
+    return Measured(value, f"The points lie on the orbit in {count} of {len(ratios)} panels.")
