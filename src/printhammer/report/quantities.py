@@ -1,0 +1,106 @@
+"""Measured values and bands as text for readers: SI with a handy prefix, inch-pound beside."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final
+
+from printhammer.units import from_si
+
+_SUFFIXES: Final = {
+    "_m_per_s": "m/s",
+    "_Hz": "Hz",
+    "_m": "m",
+    "_s": "s",
+    "_N": "N",
+    "_J": "J",
+    "_A": "A",
+}
+
+# SI unit to the unit shown and its sign, and the same in inch-pound where the paper would use it.
+_SHOWN: Final = {
+    "m": ("um", "µm", "in", "in"),
+    "s": ("us", "µs", "", ""),
+    "N": ("N", "N", "lbf", "lbf"),
+    "J": ("mJ", "mJ", "in lbf", "in·lbf"),
+    "m/s": ("m/s", "m/s", "in/s", "in/s"),
+    "Hz": ("Hz", "Hz", "", ""),
+    "A": ("A", "A", "", ""),
+}
+
+_TINY: Final = 1e-6
+"""Number shown below which the inch-pound value is left out."""
+
+_WORDS: Final = {
+    "above": "> {}",
+    "at_least": "≥ {}",
+    "below": "< {}",
+    "at_most": "≤ {}",
+}
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """Split a name such as "peak_force_N" into words and SI unit, ("peak force", "N")."""
+    for suffix, unit in _SUFFIXES.items():
+        if name.endswith(suffix):
+            return _words(name.removesuffix(suffix)), unit
+    return _words(name), ""
+
+
+def _words(name: str) -> str:
+    return name.replace("_over_", " / ").replace("_", " ")
+
+
+def value_text(value: Any, unit: str, *, other: bool = True) -> str:
+    """Return a measured value as text, with the inch-pound value beside."""
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(value_text(entry, unit, other=False) for entry in value)
+    if not isinstance(value, (int, float)):
+        return str(value)
+    if not unit:
+        return _number(value, ".4g") if isinstance(value, float) else str(value)
+    return _both(value, unit, ".4g", other=other)
+
+
+def band_text(band: Any, unit: str) -> str:
+    """Return what a value must be, as text."""
+    if isinstance(band, dict):
+        return " and ".join(_WORDS[side].format(_limit(limit, unit)) for side, limit in band.items())
+    if isinstance(band, list) and band and isinstance(band[0], str):
+        return ", ".join(band)
+    if isinstance(band, list):
+        low, high = (_limit(end, unit) for end in band)
+        return f"{low.removesuffix(_sign(unit)).strip()} to {high}"
+    return f"must be {value_text(band, '')}" if isinstance(band, (bool, str)) else f"= {_limit(band, unit)}"
+
+
+def _limit(value: float, unit: str) -> str:
+    return _both(value, unit, ".6g", other=False) if unit else _number(value, "g")
+
+
+def _sign(unit: str) -> str:
+    return _SHOWN[unit][1] if unit else ""
+
+
+def typeset(text: str) -> str:
+    """Return a sentence of ours with the signs that a page can show."""
+    text = re.sub(r"(?<=\d )u([ms])\b", "µ\\1", text)
+    return text.replace(">=", "≥").replace("<=", "≤").replace(" -> ", " → ")
+
+
+def _both(value: float, unit: str, digits: str, *, other: bool = True) -> str:
+    name, sign, inch, inch_sign = _SHOWN[unit]
+    shown = from_si(value, unit, name)
+    text = f"{_number(shown, digits)} {sign}"
+    if inch and other and abs(shown) >= _TINY:
+        text += f" ({_number(from_si(value, unit, inch), '.4g')} {inch_sign})"
+    return text
+
+
+def _number(value: float, digits: str) -> str:
+    """Return a number as text, its exponent short, with a true minus sign."""
+    return re.sub(r"e(-?)\+?0*(\d)", r"e\1\2", f"{value:{digits}}").replace("-", "−")
