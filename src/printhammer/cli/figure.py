@@ -1,0 +1,37 @@
+"""The verb `figure`: one figure of the paper, for any hammer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from printhammer.cli.run import HAMMER, HammerArgument
+
+EXAMPLE = "Example: printhammer figure 3 hendriks-1983 --out build/figures"
+
+
+def figure(
+    number: Annotated[int, typer.Argument(metavar="N", help="Number of the figure in the paper.")],
+    hammer: HammerArgument = HAMMER,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write it.")] = Path("build/figures"),
+) -> None:
+    """Draw a figure of the paper as SVG, PNG and PDF."""
+    from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.errors import InputError
+    from printhammer.figures import FIGURES, save
+    from printhammer.hammer import load
+    from printhammer.outputs import make_folder
+
+    if number not in FIGURES:
+        known = ", ".join(map(str, FIGURES))
+        raise InputError(f"figure {number} is not drawn, expected one of {known}")
+    loaded = load(hammer)
+    make_folder(out)
+    announce_compiling()
+    entry = FIGURES[number]
+    screen = console()
+    screen.print(f"[bold]Figure {number}[/bold]  {entry.title}")
+    for path in save(entry.draw(loaded), out, f"figure{number:02d}"):
+        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)

@@ -1,0 +1,60 @@
+"""The verb `paper`: every figure and claim of the paper, in one report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from printhammer.cli.run import HAMMER, HammerArgument
+
+EXAMPLE = "Example: printhammer paper hendriks-1983 --out build/paper"
+
+_STYLES = {"holds": "green", "fails": "red", "not yet": "yellow"}
+
+
+def paper(
+    hammer: HammerArgument = HAMMER,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the report.")] = Path(
+        "build/paper"
+    ),
+    strict: Annotated[bool, typer.Option("--strict", help="End with status 1 if a claim fails.")] = False,
+) -> None:
+    """Draw the figures, judge the claims, and write one HTML report, the figures and claims.json."""
+    from rich.markup import escape
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from printhammer.cli.terminal import announce_compiling, console, plain_table
+    from printhammer.hammer import load
+    from printhammer.outputs import make_folder
+    from printhammer.report import write_report
+
+    loaded = load(hammer)
+    make_folder(out)
+    announce_compiling()
+    screen = console()
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=screen, transient=True
+    ) as progress:
+        task = progress.add_task("…", total=None)
+        report = write_report(loaded, out, progress=lambda text: progress.update(task, description=text))
+    table = plain_table(("claim", "left"), ("kind", "left"), ("verdict", "left"), ("measured", "left"))
+    for result in report.results:
+        style = _STYLES[result.verdict]
+        table.add_row(
+            result.claim.name,
+            result.claim.kind,
+            f"[{style}]{result.verdict}[/{style}]",
+            escape(result.detail),
+        )
+    screen.print(table)
+    counts = ", ".join(
+        f"[{style}]{report.count(verdict)} {verdict}[/{style}]" for verdict, style in _STYLES.items()
+    )
+    screen.print(f"\n{len(report.results)} claims: {counts}")
+    for path in report.files[-2:]:
+        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    screen.print(f"[dim]wrote[/dim] {out / 'figures'}, {len(report.files) - 2} files", soft_wrap=True)
+    if strict and report.count("fails"):
+        raise typer.Exit(1)

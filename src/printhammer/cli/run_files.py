@@ -1,0 +1,92 @@
+"""The files that `run` writes."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.cli.tables import frame, named, named_energy
+from printhammer.errors import InputError
+from printhammer.outputs import check_outputs, write_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+
+    from printhammer.motion import Motion
+
+_SUFFIXES: Final = {
+    "dots": (".csv", ".parquet"),
+    "contacts": (".csv", ".parquet"),
+    "plot": (".svg", ".png", ".pdf"),
+}
+
+
+def check(wanted: Mapping[str, Path], inputs: Iterable[Path]) -> None:
+    """Make sure, before the run, that the files can be written.
+
+    Raises
+    ------
+    InputError
+        As `check_outputs`, or the end of a name says no format.
+    """
+    for kind, path in wanted.items():
+        known = _SUFFIXES.get(kind)
+        if known is not None and path.suffix.lower() not in known:
+            raise InputError(f"--{kind} {path}: expected a name that ends in {' or '.join(known)}")
+    check_outputs(wanted.values(), inputs)
+
+
+def write(motion: Motion, wanted: Mapping[str, Path]) -> None:
+    """Write the files.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written.
+    """
+    from printhammer.contacts import Contact, Dot
+    from printhammer.export import write_csv, write_parquet
+
+    for kind, path in wanted.items():
+        if kind == "csv":
+            motion.to_csv(path)
+        elif kind == "parquet":
+            motion.to_parquet(path)
+        elif kind == "json":
+            write_file(path, json.dumps(as_json(motion), indent=2, allow_nan=False) + "\n")
+        elif kind == "plot":
+            _plot(motion, path)
+        else:
+            table = frame(motion.dots, Dot) if kind == "dots" else frame(motion.contacts, Contact)
+            (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(table, path)
+
+
+def as_json(motion: Motion) -> dict[str, Any]:
+    """Return what a motion tells, SI, names with units."""
+    times, x = motion.maxima
+    top = int(x.argmax()) if len(x) else None
+    return {
+        "status": motion.status,
+        "message": motion.message,
+        "end_s": motion.end,
+        "steps": motion.steps,
+        "peak": None if top is None else {"t_s": float(times[top]), "x_m": float(x[top])},
+        "dots": [named(dot) for dot in motion.dots],
+        "contacts": [named(contact) for contact in motion.contacts],
+        "energy": named_energy(motion.energy),
+        "constants": {
+            key: {"value": constant.si, "unit": constant.si_unit, "status": constant.status}
+            for key, constant in motion.hammer.constants.items()
+        },
+        "drive": motion.drive.to_toml(),
+        "provenance": motion.provenance,
+    }
+
+
+def _plot(motion: Motion, path: Path) -> None:
+    from io import BytesIO
+
+    buffer = BytesIO()
+    motion.plot().savefig(buffer, format=path.suffix[1:].lower())
+    write_file(path, buffer.getvalue())
