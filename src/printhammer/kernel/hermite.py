@@ -56,7 +56,7 @@ def rises_through(
     """
     p1, p2, p3, p4 = control_points(x0, v0, a0, x1, v1, a1, h)
     d0, d1, d2, d3, d4 = p1 - x0, p2 - p1, p3 - p2, p4 - p3, x1 - p4
-    if x1 > level:
+    if x1 > level or (x1 == level and v1 > 0.0):
         return REACHED_FRONT if sign_changes(d0, d1, d2, d3, d4) <= 1 else UNRESOLVED
     margin = MARGIN * (abs(d0) + abs(d1) + abs(d2) + abs(d3) + abs(d4))
     if max(p1, p2, p3, p4) < level - margin:

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from printhammer.kernel.compiling import compiled
-from printhammer.kernel.modes import HELD
 
 NODE_WIDTH = 5
 CONTACT_WIDTH = 7
@@ -38,9 +37,9 @@ def add_node(nodes: Rows, used: int, t: float, x: float, v: float, mode: int, me
 
 
 @compiled
-def hold_node(nodes: Rows, used: int) -> None:
-    """Mark the latest node as one at rest in the backstop until the next."""
-    nodes[min(used, nodes.shape[0]) - 1, 3] = HELD
+def relabel_node(nodes: Rows, used: int, mode: int) -> None:
+    """Give the latest node another mode, which holds until the next."""
+    nodes[min(used, nodes.shape[0]) - 1, 3] = mode
 
 
 @compiled

@@ -14,6 +14,7 @@ from printhammer.kernel.modes import (
     BACKSTOP_SURFACE,
     EDGE,
     FREE,
+    HELD,
     LEFT_BACKSTOP,
     LEFT_FRONT,
     LOADING,
@@ -52,10 +53,15 @@ if TYPE_CHECKING:
         pack_memory,
     )
     from printhammer.kernel.pulses import Drive, pass_edges
-    from printhammer.kernel.record import add_node, close_contact, hold_node, open_contact
+    from printhammer.kernel.record import add_node, close_contact, open_contact, relabel_node
+    from printhammer.kernel.rest import goes_on_in, rest_ends
 
 STILL = 1e-12
 """Share of the scales below which the motion in one characteristic time counts as none."""
+
+
+WAIT = 0.005
+"""Shortest wait, in characteristic times, before a resting armature is looked at again."""
 
 
 @compiled
@@ -99,12 +105,12 @@ def time_to_level(distance: float, v: float, a: float) -> float:
 @compiled
 def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Hammer) -> float:
     """Shorten a step that would overshoot the backstop or the pack front by far."""
-    if HAS_BACKSTOP and mode == FREE and x >= hammer[POSITION]:
-        h = (
-            min(h, 1.02 * time_to_level(x - hammer[POSITION], -v, -a))
-            if x > hammer[POSITION] or v < 0.0
-            else (min(h, -2.04 * v / a) if a < 0.0 and v > 0.0 else h)
-        )
+    if HAS_BACKSTOP and mode == FREE:
+        height = x - hammer[POSITION]
+        if height > 0.0:
+            h = min(h, 1.02 * time_to_level(height, -v, -a))
+        elif height == 0.0 and v > 0.0 and a < 0.0:
+            h = min(h, -2.04 * v / a)
     if HAS_PACK and mode == FREE and x < hammer[FRONT]:
         h = min(h, 1.02 * time_to_level(hammer[FRONT] - x, v, a))
     return h
@@ -256,6 +262,7 @@ def run(
         w if mode == BACKSTOP else (peak if mode in (UNLOADING, RELOADING) else 0.0),
     )
     entered = True
+    wait = WAIT * time_scale
     while t < t_end and status == OK:
         t_next = min(edge, t_end)
         if t_next <= t:
@@ -263,6 +270,10 @@ def run(
             a = acceleration(t, x, v, mode, memory, hammer, drive)
             entered = True
             continue
+        if mode == RESTING and a > 0.0:
+            close_contact(contacts, touched, t, 0.0)
+            mode = FREE
+            relabel_node(nodes, used, FREE)
         steps += 1
         if steps > max_steps:
             status = STEP_LIMIT
@@ -274,7 +285,7 @@ def run(
                 entered = False
             idle = first == last
             if w > 0.0 and idle and abs(v) <= 1e-14 * control[1] and abs(kv) <= 0.1 * still * 2.0 * w:
-                hold_node(nodes, used)
+                relabel_node(nodes, used, HELD)
                 t = t_next
                 switch = EDGE
             elif w == 0.0 and v == 0.0:
@@ -296,30 +307,16 @@ def run(
         elif mode == RESTING or (v == 0.0 and abs(a) <= still and mode in (UNLOADING, LOADING, RELOADING)):
             pause = t_next - t
             if first < last:
-                pause = min(pause, 0.005 * time_scale)
-            a_next = acceleration(t + pause, x, 0.0, mode, memory, hammer, drive)
-            if mode == RESTING and a_next > 0.0 and a < 0.0:
-                low, high = 0.0, pause
-                while high - low > 1e-15 * time_scale:
-                    middle = 0.5 * (low + high)
-                    if not (low < middle < high):
-                        break
-                    if acceleration(t + middle, x, 0.0, mode, memory, hammer, drive) > 0.0:
-                        high = middle
-                    else:
-                        low = middle
-                pause = high
-                a_next = acceleration(t + pause, x, 0.0, mode, memory, hammer, drive)
-            if pause == t_next - t:
-                t = t_next
-                switch = EDGE
-            else:
-                t += pause
-            a = a_next
-            if mode == RESTING and a > 0.0:
-                close_contact(contacts, touched, t, 0.0)
-                mode = FREE
-                h = h_free
+                pause = min(pause, wait)
+            least, most = (-math.inf, 0.0) if mode == RESTING else (-still, still)
+            ended, pause = rest_ends(t, x, pause, mode, memory, least, most, hammer, drive)
+            wait = WAIT * time_scale if ended or mode == RESTING else min(2.0 * wait, time_scale)
+            switch = EDGE if pause == t_next - t else NO_SWITCH
+            t = t_next if switch == EDGE else t + pause
+            a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
+            if ended and mode != RESTING and not goes_on_in(a, mode):
+                mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
+                a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
         else:
             if started != mode:
                 h = h_pack if mode in (LOADING, UNLOADING) else h_free

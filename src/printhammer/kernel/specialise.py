@@ -32,6 +32,7 @@ TEMPLATES = (
     "landing",
     "contact",
     "record",
+    "rest",
     "run",
     "resample",
     "quadrature",
