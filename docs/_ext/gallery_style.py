@@ -1,0 +1,91 @@
+"""The gallery: its order, the look of its pictures, and how they are taken from an example."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+ORDER = (
+    "single_pulse",
+    "two_pulses",
+    "fast_train",
+    "backstops",
+    "energy_ledger",
+    "inch_pound_file",
+    "measured_magnet",
+    "bouncing_ball",
+    "impact_oscillator",
+    "own_part",
+)
+"""The examples in the order in which one would teach them."""
+
+STYLE = {
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 100,
+    "figure.figsize": (6.8, 4.2),
+    "savefig.dpi": 160,
+    "font.size": 9.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+}
+
+
+class TeachingOrder:
+    """Sort key of the examples; one that is not in the list is an error."""
+
+    def __init__(self, folder: str) -> None:
+        self.folder = folder
+
+    def __call__(self, filename: str) -> int:
+        """Return the place of an example."""
+        return ORDER.index(Path(filename).stem)
+
+    def __repr__(self) -> str:
+        return "<TeachingOrder>"
+
+
+def plain_style(_conf: dict[str, Any], _filename: str) -> None:
+    """Set the look of all pictures before an example runs."""
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    mpl.rcdefaults()
+    mpl.rcParams.update(STYLE)
+
+
+def figures(_block: Any, variables: dict[str, Any], conf: dict[str, Any]) -> str:
+    """Save the figures that a block has made: those of pyplot, and those that a plot function returns.
+
+    Parameters
+    ----------
+    _block, variables, conf
+        As sphinx-gallery gives them to a scraper.
+
+    Returns
+    -------
+    str
+        reStructuredText that shows them.
+    """
+    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
+    from sphinx_gallery.scrapers import figure_rst
+
+    made: list[Figure] = [plt.figure(number) for number in plt.get_fignums()]
+    seen = variables["example_globals"].setdefault("__figures_seen__", [])
+    for value in list(variables["example_globals"].values()):
+        if isinstance(value, Figure) and value not in made and value not in seen:
+            made.append(value)
+    paths = []
+    for figure, path in zip(made, variables["image_path_iterator"], strict=False):
+        figure.savefig(path)
+        seen.append(figure)
+        paths.append(path)
+    plt.close("all")
+    return str(figure_rst(paths, conf["src_dir"], "; ".join(_title(figure) for figure in made)))
+
+
+def _title(figure: Any) -> str:
+    titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
+    return titles[0] if titles else "Picture of this example"

@@ -1,0 +1,38 @@
+"""Spring with a cubic term.
+
+    Fs = -(K (x - b) + D (x - b)^3)
+
+Source: G. Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (1918).
+Validity: deflections for which higher terms are small. Weakness: neither mass nor damping of its own.
+
+Packed constants: c = [K, D, b].
+"""
+
+from printhammer.constants import quantity
+from printhammer.parts import SpringPart, register
+
+
+def spring_force(c, x):
+    """Return the force of the spring, N, at displacement x, m."""
+    travel = x - c[2]
+    return -(c[0] + c[1] * travel * travel) * travel
+
+
+def spring_energy(c, x):
+    """Return the potential energy, J; minus its slope is the force."""
+    square = (x - c[2]) * (x - c[2])
+    return (0.5 * c[0] + 0.25 * c[1] * square) * square
+
+
+@register
+class CubicSpring(SpringPart):
+    """Constants of the cubic spring."""
+
+    law = "cubic"
+
+    stiffness: float = quantity("N/m", "K", "stiffness at small deflections")
+    cubic: float = quantity("N/m^3", "D", "coefficient of the cubic term", ge=0)
+
+    def packed(self, origin):
+        """Return (K, D, b)."""
+        return (self.stiffness, self.cubic, origin)

@@ -1,0 +1,58 @@
+"""Every script of the gallery runs on its own, without a warning, and only on the public names."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+PARTS = {"cubic_spring"}
+SCRIPTS = sorted(path for path in EXAMPLES.glob("*.py") if path.stem not in PARTS)
+# What a part from outside the package is made of.
+FOR_PARTS = {"printhammer.constants", "printhammer.parts"}
+
+
+def imported(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {name.name for name in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add(node.module or "")
+    return found
+
+
+def test_there_are_examples() -> None:
+    assert len(SCRIPTS) >= 10
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_an_example_uses_the_public_names(script: Path) -> None:
+    ours = {name for name in imported(script) if name.partition(".")[0] == "printhammer"}
+    assert ours == {"printhammer"}
+
+
+@pytest.mark.parametrize("name", sorted(PARTS))
+def test_a_part_from_outside_uses_what_parts_are_made_of(name: str) -> None:
+    ours = {name for name in imported(EXAMPLES / f"{name}.py") if name.startswith("printhammer")}
+    assert ours == FOR_PARTS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_an_example_runs(script: Path, tmp_path: Path) -> None:
+    settings = {"MPLBACKEND": "Agg", "MPLCONFIGDIR": str(tmp_path), "TMPDIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(script)],
+        cwd=tmp_path,
+        env={**os.environ, **settings},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert done.stdout != ""
