@@ -1,0 +1,124 @@
+"""The figures of the paper and of any motion, one function each, for any hammer.
+
+>>> from printhammer.figures import FIGURES, save
+>>> figure = FIGURES[3].draw(hammer)
+>>> save(figure, "build", "figure3")
+
+matplotlib is imported when a figure is drawn, not here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.errors import InputError
+from printhammer.figures.save import FORMATS, save
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
+    from printhammer.hammer import Hammer
+
+__all__ = ["FIGURES", "FORMATS", "PaperFigure", "figure", "save"]
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure of the paper.
+
+    Attributes
+    ----------
+    number : int
+        Its number in the paper.
+    title : str
+        A few words.
+    caption : str
+        What is to be seen, one or two sentences.
+    """
+
+    number: int
+    title: str
+    caption: str
+
+    @property
+    def function(self) -> Callable[..., Figure]:
+        """The function that draws it: a hammer and options to a matplotlib figure."""
+        name = f"figure{self.number}"
+        found: Callable[..., Figure] = getattr(import_module(f"{__name__}.{name}"), name)
+        return found
+
+    def draw(self, hammer: Hammer, **options: Any) -> Figure:
+        """Draw it for a hammer.
+
+        Raises
+        ------
+        InputError
+            The hammer lacks what the figure shows, or an option is not usable.
+        """
+        return self.function(hammer, **options)
+
+
+FIGURES: Final[dict[int, PaperFigure]] = {
+    entry.number: entry
+    for entry in (
+        PaperFigure(
+            2,
+            "Magnetic force and spring force",
+            "Net magnetic force against displacement at coil currents of 0, 0.5, 1, 1.5 and 2 A, the spring"
+            " force and its reflection (dashed). Double lines: backstop, front of the ribbon and paper pack,"
+            " platen.",
+        ),
+        PaperFigure(
+            3,
+            "A single pulse: motion",
+            "Displacement of the armature after a single current pulse, and the current.",
+        ),
+        PaperFigure(
+            4,
+            "A single pulse: total force",
+            "Total force on the armature after a single current pulse; tinted where it touches pack or"
+            " backstop.",
+        ),
+        PaperFigure(
+            5,
+            "A single pulse: force and displacement",
+            "Total force against displacement over one cycle. Clockwise loops are energy given to the"
+            " armature, counter-clockwise loops energy lost; the insert shows the loops of settle-out.",
+        ),
+        PaperFigure(
+            6,
+            "Two pulses",
+            "The response to a second pulse 660 and 700 µs after the first: quenched, or caught on the rise.",
+        ),
+        PaperFigure(
+            7,
+            "Buzz printing",
+            "A train of the same waveform, found by search, that prints while the armature stays clear of the"
+            " backstop; numbers are peak forces in units of that of a single pulse.",
+        ),
+        PaperFigure(
+            10,
+            "A single pulse: phase plane",
+            "Velocity against displacement after a single current pulse; arrows point to later times.",
+        ),
+    )
+}
+"""The figures of the paper by number."""
+
+
+def figure(number: int) -> PaperFigure:
+    """Return a figure of the paper.
+
+    Raises
+    ------
+    InputError
+        There is none of that number here.
+    """
+    if number not in FIGURES:
+        known = ", ".join(map(str, FIGURES))
+        raise InputError(f"figure = {number!r} is not known, expected one of {known}")
+    return FIGURES[number]

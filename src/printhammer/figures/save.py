@@ -1,0 +1,74 @@
+"""Figures as files: SVG and PDF for print, PNG for the screen; the same figure gives the same bytes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.errors import InputError
+from printhammer.figures.style import in_style
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure
+
+FORMATS: Final = ("svg", "pdf", "png")
+
+_METADATA: Final[dict[str, dict[str, Any]]] = {
+    # Neither dates nor versions, which would make equal figures differ.
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+    "png": {"Software": None},
+}
+
+
+def save(
+    figure: Figure, folder: str | Path, name: str, *, formats: Sequence[str] = FORMATS, dpi: float = 200.0
+) -> list[Path]:
+    """Write a figure into a folder, which is made if it is missing.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    folder : path
+        Where to.
+    name : str
+        Name of the files, without suffix.
+    formats : sequence of str, optional
+        Of "svg", "pdf" and "png".
+    dpi : float, optional
+        Dots per inch of the PNG.
+
+    Returns
+    -------
+    list of Path
+        The files, in the order of `formats`.
+
+    Raises
+    ------
+    InputError
+        A format is not known, or the folder cannot be written to; files there before stay as they are.
+    """
+    unknown = [kind for kind in formats if kind not in FORMATS]
+    if unknown:
+        raise InputError(f"format = {unknown[0]!r}, expected one of {', '.join(FORMATS)}")
+    target = Path(folder)
+    written: list[Path] = []
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        for kind in formats:
+            path, draft = target / f"{name}.{kind}", target / f".{name}.{kind}.part"
+            try:
+                with in_style():
+                    figure.savefig(draft, format=kind, dpi=dpi, metadata=_METADATA[kind])
+                draft.replace(path)
+            finally:
+                draft.unlink(missing_ok=True)
+            written.append(path)
+    except OSError as error:
+        raise InputError(
+            f"{target}: the figure {name} cannot be written ({error.strerror or error})"
+        ) from None
+    return written
