@@ -85,7 +85,7 @@ def order_of_onset(context: Context, claim: Claim) -> Measured:
 def second_dot_lost(context: Context, claim: Claim) -> Measured:
     """First interval of rates in which the peak after the second firing stays below the pack."""
     settings = claim.settings
-    waveform, front = context.waveform, context.front
+    waveform, front, _ = context.waveform, context.front, context.dot
     begins = ends = None
     for rate in _rates(settings):
         # The third firing ends the interval of the second.
@@ -217,6 +217,6 @@ def flight_time_spread(context: Context, claim: Claim) -> Measured:
     }
     return Measured(
         value,
-        f"Of {len(found)} bursts {over['dot_matrix_s']} exceed 200 us, what dot-matrix printing tolerates,"
-        f" and {over['engraved_s']} exceed 30 us.",
+        f"Of {len(found)} bursts, {over['dot_matrix_s']} spread by more than 200 us, what dot-matrix"
+        f" printing tolerates, and {over['engraved_s']} by more than 30 us.",
     )

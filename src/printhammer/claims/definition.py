@@ -71,7 +71,7 @@ def within(value: Any, band: Any) -> bool:
     if isinstance(band, list) and len(band) == 2 and all(_is_number(end) for end in band):
         return _is_number(value) and band[0] <= value <= band[1]
     if isinstance(band, list):
-        return list(value or ()) == band
+        return isinstance(value, (list, tuple)) and list(value) == band
     if isinstance(band, bool) or isinstance(value, bool) or not _is_number(band):
         return type(value) is type(band) and value == band
     return _is_number(value) and math.isclose(value, band, rel_tol=_PRINTED_DIGITS)

@@ -38,7 +38,9 @@ def integrator_comparison(context: Context, claim: Claim) -> Measured:
     value = {
         "trapezoid_completes": _completes(context, trapezoid, reference),
         "runge_kutta_completes": _completes(context, runge_kutta, reference),
-        "runge_kutta_error_over_trapezoid": errors[runge_kutta] / errors[trapezoid],
+        "runge_kutta_error_over_trapezoid": errors[runge_kutta] / errors[trapezoid]
+        if errors[trapezoid]
+        else None,
         "failing_scale_ratio": fails["runge-kutta-4"] / fails["trapezoid"],
         "trapezoid_error_m": errors[trapezoid],
         "runge_kutta_error_m": errors[runge_kutta],

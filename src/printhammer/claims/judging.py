@@ -160,6 +160,7 @@ def judge(context: Context, claim: Claim) -> Result:
             context.need(need)
         measured = function(context, claim)
     except (NotMeasurableError, InputError) as error:
-        return Result(claim, None, "fails", f"{error}.", perf_counter() - start)
+        reason = str(error)
+        return Result(claim, None, "fails", f"{reason[:1].upper()}{reason[1:]}.", perf_counter() - start)
     verdict: Verdict = "holds" if claim.holds(measured.value) else "fails"
     return Result(claim, measured.value, verdict, measured.detail, perf_counter() - start)

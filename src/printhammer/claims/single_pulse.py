@@ -87,6 +87,8 @@ def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
     starts = [motion.start, *ends]
     stops = [*(c.t_in for c in found), motion.end]
     elsewhere = max(largest(total, a, b) for a, b in zip(starts, stops, strict=True) if b > a)
+    if not elsewhere:
+        raise NotMeasurableError("No force acts on the armature outside the backstop")
     value = {"force_ratio": at_stop / elsewhere, "at_backstop_N": at_stop, "elsewhere_N": elsewhere}
     return Measured(value, f"{at_stop:.1f} N in the backstop, {elsewhere:.1f} N at any other time.")
 
@@ -122,6 +124,8 @@ def loops(context: Context, _claim: Claim) -> Measured:
     if not works:
         raise NotMeasurableError("No contact ends after a single pulse")
     energy = motion.energy
+    if not energy.throughput:
+        raise NotMeasurableError("No energy passes through the hammer after a single pulse")
     total = energy.coil_work + energy.drive_work - energy.pack_loss - energy.backstop_loss
     value = {
         "largest_work_J": max(works),

@@ -20,6 +20,7 @@ _WHOLE = ("backstop", "pack", "waveform")
 @measures("two_pulses_660us", *_WHOLE)
 def two_pulses_660us(context: Context, claim: Claim) -> Measured:
     """Peak after the second of two pulses."""
+    _ = context.dot
     interval = claim.settings["interval_s"]
     motion = context.pulses([0.0, interval], interval + TAIL)
     peak = motion.peak_after(1)

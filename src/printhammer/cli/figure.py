@@ -18,16 +18,15 @@ def figure(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write it.")] = Path("build/figures"),
 ) -> None:
     """Draw a figure of the paper as SVG, PNG and PDF."""
-    from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.cli.terminal import announce_compiling, console, load_checked
     from printhammer.errors import InputError
     from printhammer.figures import FIGURES, save
-    from printhammer.hammer import load
     from printhammer.outputs import make_folder
 
     if number not in FIGURES:
         known = ", ".join(map(str, FIGURES))
         raise InputError(f"figure {number} is not drawn, expected one of {known}")
-    loaded = load(hammer)
+    loaded = load_checked(hammer)
     make_folder(out)
     announce_compiling()
     entry = FIGURES[number]

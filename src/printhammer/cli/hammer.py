@@ -38,14 +38,14 @@ def check(hammer: HammerArgument = HAMMER) -> None:
     """Check a hammer file: an error ends with status 2, a warning does not."""
     from rich.markup import escape
 
-    from printhammer.cli.terminal import console, honesty
+    from printhammer.cli.terminal import console, honesty, warn
     from printhammer.hammer import load
 
     loaded = load(hammer)
     told = loaded.warnings()
     screen = console()
     for warning in told:
-        screen.print(f"[yellow]warning:[/yellow] {escape(hammer)}: {escape(warning)}", soft_wrap=True)
+        warn(f"{loaded.path}: {warning}")
     verdict = f"{len(told)} warning{'s' if len(told) > 1 else ''}" if told else "[green]ok[/green]"
     screen.print(f"{escape(hammer)}: {verdict}; {honesty(loaded)}", soft_wrap=True)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 from rich.padding import Padding
 
-from printhammer.cli.terminal import STATUS_STYLES, honesty, plain_table
+from printhammer.cli.terminal import STATUS_STYLES, honesty, plain_table, warn
 from printhammer.cli.units import with_unit
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def show(hammer: Hammer, units: Units, screen: Console) -> None:
     picture = equilibrium_picture(hammer)
     screen.print(statics_table(hammer, picture, units))
     for warning in hammer.warnings() if picture.rest is not None else [picture.no_rest]:
-        screen.print(f"[yellow]warning:[/yellow] {escape(warning)}", soft_wrap=True)
+        warn(f"{hammer.path}: {warning}")
 
 
 def constants_table(hammer: Hammer) -> Table:

@@ -6,9 +6,8 @@ in one sentence on the standard error; 130 after Ctrl-C.
 
 from __future__ import annotations
 
-import os
 import sys
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Final, NoReturn
 
 import typer
 
@@ -20,8 +19,11 @@ from printhammer.errors import PrinthammerError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+BAD_INPUT = 2
 INTERRUPTED = 130
-BROKEN_PIPE = 141
+
+# What typer raises for a command line that it cannot use; it has no public name in every version of typer.
+_REFUSED: Final[type[Exception]] = typer.BadParameter.__mro__[2]
 
 app = typer.Typer(
     name="printhammer",
@@ -62,15 +64,19 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         By default those of the process.
     """
     try:
-        app(None if arguments is None else list(arguments), prog_name="printhammer")
+        status = app(
+            None if arguments is None else list(arguments), prog_name="printhammer", standalone_mode=False
+        )
     except PrinthammerError as error:
         complain(str(error))
-        sys.exit(2)
+        sys.exit(BAD_INPUT)
+    except _REFUSED as error:
+        # Without arguments the help has been shown, and nothing is left to say.
+        if message := getattr(error, "format_message", str)().strip():
+            complain(f"{message.rstrip('.')} (see --help)")
+        sys.exit(BAD_INPUT)
     except KeyboardInterrupt:
+        status = INTERRUPTED
+    if status == INTERRUPTED:
         complain("interrupted")
-        sys.exit(INTERRUPTED)
-    except BrokenPipeError:
-        # Whoever read the output has had enough; keep the interpreter from complaining at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(BROKEN_PIPE)
-    sys.exit(0)
+    sys.exit(status if isinstance(status, int) else 0)

@@ -25,12 +25,11 @@ def paper(
     from rich.markup import escape
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from printhammer.cli.terminal import announce_compiling, console, plain_table
-    from printhammer.hammer import load
+    from printhammer.cli.terminal import announce_compiling, console, load_checked, plain_table
     from printhammer.outputs import make_folder
     from printhammer.report import write_report
 
-    loaded = load(hammer)
+    loaded = load_checked(hammer)
     make_folder(out)
     announce_compiling()
     screen = console()

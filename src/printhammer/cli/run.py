@@ -91,16 +91,15 @@ def run(
     Ends with status 1 where the run stopped before its end, which the status line names.
     """
     from printhammer.cli import run_files, run_screen
-    from printhammer.cli.terminal import announce_compiling, complain, console
+    from printhammer.cli.terminal import announce_compiling, complain, console, load_checked
     from printhammer.drive_input import read_number
-    from printhammer.hammer import load
     from printhammer.problem import TOLERANCE
     from printhammer.simulate import simulate
 
     files = {"csv": csv, "parquet": parquet, "dots": dots, "contacts": contacts, "json": json, "plot": plot}
     wanted = {kind: path for kind, path in files.items() if path is not None}
     run_files.check(wanted, [Path(hammer), *([drive] if drive is not None else [])])
-    loaded = load(hammer)
+    loaded = load_checked(hammer)
     fired = _drive(
         loaded, drive, {"rate": rate, "period": period, "at": at, "pulses": pulses, "overlap": overlap}
     )

@@ -31,6 +31,28 @@ def say(sentence: str) -> None:
     Console(stderr=True, highlight=False, soft_wrap=True).print(f"[dim]{escape(sentence)}[/dim]")
 
 
+def load_checked(name: str) -> Hammer:
+    """Load a hammer that is to be run; print what is odd about it as warnings.
+
+    Raises
+    ------
+    InputError
+        There is no such hammer, or it does not rest at its backstop.
+    """
+    from printhammer.hammer import load
+
+    hammer = load(name)
+    for warning in hammer.warnings():
+        warn(f"{hammer.path}: {warning}")
+    return hammer
+
+
+def warn(sentence: str) -> None:
+    """Print a warning on the standard error."""
+    err = Console(stderr=True, highlight=False, soft_wrap=True)
+    err.print(f"[yellow]warning:[/yellow] {escape(sentence)}")
+
+
 def announce_compiling() -> None:
     """Have the user told when machine code is made, which takes a while once."""
     from printhammer.simulate import announce_compiling

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 import tomllib
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.resources import files
-from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +16,8 @@ from printhammer.errors import InputError, PrinthammerError
 from printhammer.outputs import make_folder, write_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
+    from pathlib import Path
 
     from printhammer.hammer import Hammer
 
@@ -88,7 +88,14 @@ class Report:
         return sum(result.verdict == verdict for result in self.results)
 
 
-def write_report(hammer: Hammer, out: str | Path, *, progress: Callable[[str], None] | None = None) -> Report:
+def write_report(
+    hammer: Hammer,
+    out: str | Path,
+    *,
+    progress: Callable[[str], None] | None = None,
+    claims: Iterable[str] | None = None,
+    figures: Iterable[int] | None = None,
+) -> Report:
     """Judge the claims, draw the figures, and write the report of a hammer.
 
     Parameters
@@ -99,6 +106,8 @@ def write_report(hammer: Hammer, out: str | Path, *, progress: Callable[[str], N
         Folder for `index.html`, `claims.json` and `figures/`; made where it is missing.
     progress : callable, optional
         Called with a phrase before each step.
+    claims, figures : iterable, optional
+        Names and numbers of those to report; by default all.
 
     Returns
     -------
@@ -117,10 +126,13 @@ def write_report(hammer: Hammer, out: str | Path, *, progress: Callable[[str], N
     pictures = make_folder(folder / "figures")
     start = perf_counter()
     context = Context(hammer)
-    results = judge_all(hammer, progress=lambda name: tell(f"claim {name}"), context=context)
+    results = judge_all(hammer, claims, progress=lambda name: tell(f"claim {name}"), context=context)
+    drawn = None if figures is None else set(figures)
     written: list[Path] = []
     drawings = []
     for number, says in _sayings().items():
+        if drawn is not None and number not in drawn:
+            continue
         tell(f"figure {number}")
         drawing = _draw(context, number, says, results, pictures, written)
         if drawing is not None:
@@ -167,14 +179,9 @@ def _draw(
     except InputError as error:
         reason = str(error)
     else:
-        try:
-            with tempfile.TemporaryDirectory(dir=folder, prefix=".drafts.") as drafts:
-                for draft in map(Path, save(figure, drafts, f"figure{number:02d}")):
-                    if draft.suffix == ".svg":
-                        svg = draft.read_bytes()
-                    written.append(draft.replace(folder / draft.name))
-        except OSError as error:
-            raise InputError(f"{folder}: the figures cannot be written ({error.strerror or error})") from None
+        paths = save(figure, folder, f"figure{number:02d}")
+        svg = next(path for path in paths if path.suffix == ".svg").read_bytes()
+        written += paths
     cited = tuple(result for result in results if number in _cited(result.claim.source))
     return Drawing(
         number, entry.title, entry.caption, says["says"], svg, reason, cited, perf_counter() - start
@@ -188,15 +195,17 @@ def _cited(source: str) -> set[int]:
 
 
 def _provenance(hammer: Hammer, context: Context) -> dict[str, Any]:
-    """Return versions and settings, the drive of a single motion apart."""
+    """Return versions and settings; those of a single motion where there is one."""
     import platform
 
     import matplotlib as mpl
 
-    known = {"python": platform.python_version(), "matplotlib": mpl.__version__}
-    try:
-        motion = context.single.provenance
-    except PrinthammerError:
-        motion = {"hammer": hammer.name, "hammer_fingerprint": hammer.fingerprint}
-    left_out = ("drive", "drive_fingerprint", "status")
-    return {key: value for key, value in motion.items() if key not in left_out} | known
+    from printhammer import __version__
+
+    found: dict[str, Any] = {"hammer": hammer.name, "hammer_fingerprint": hammer.fingerprint}
+    with suppress(PrinthammerError):
+        found |= context.single.provenance
+    for name in ("drive", "drive_fingerprint", "status"):
+        found.pop(name, None)
+    found |= {"printhammer": __version__, "matplotlib": mpl.__version__, "python": platform.python_version()}
+    return found
