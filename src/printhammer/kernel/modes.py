@@ -23,6 +23,11 @@ RESTING = 7
 HELD = 8
 """At rest in the backstop, not integrated until the drive changes."""
 
+HELD_LOADING = 9
+"""At rest inside the pack on the loading branch, likewise."""
+HELD_UNLOADING = 10
+"""At rest inside the pack on the unloading branch, likewise."""
+
 # Switches that end a step.
 NO_SWITCH = 0
 EDGE = 1

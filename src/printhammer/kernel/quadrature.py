@@ -6,17 +6,26 @@ integrator. In the backstop the variable is s, in which the power is smooth at t
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled, entry
 from printhammer.kernel.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, POSITION
-from printhammer.kernel.modes import ANY_SCALES, BACKSTOP, BACKSTOP_RELEASED, HELD, RESTING
+from printhammer.kernel.modes import (
+    ANY_SCALES,
+    BACKSTOP,
+    BACKSTOP_RELEASED,
+    HELD,
+    HELD_LOADING,
+    HELD_UNLOADING,
+    RESTING,
+)
 
 if TYPE_CHECKING:
     from printhammer.kernel.contact import contact_rate
     from printhammer.kernel.dop853 import contact_step
     from printhammer.kernel.forces import Hammer, pack_force
-    from printhammer.kernel.laws import FORCE_DRIVE, backstop_elastic, backstop_viscous, magnet_force
+    from printhammer.kernel.laws import FORCE_DRIVE, backstop_energy, backstop_viscous, magnet_force
     from printhammer.kernel.pulses import Drive, drive_value, pass_edges
     from printhammer.kernel.resample import memory_of, s_at, state_in_step
 
@@ -51,10 +60,13 @@ def powers(
     backstop = 0.0
     if mode == BACKSTOP:
         backstop = -backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) * v
-    elif mode == BACKSTOP_RELEASED:
-        # The backstop has let go: what it still stores is lost as it creeps back.
-        backstop = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], max(hammer[POSITION] - x, 0.0) ** 0.5) * v
     return coil, force, pack, backstop
+
+
+@compiled
+def energy_behind(x: float, hammer: Hammer) -> float:
+    """Return the energy [J] stored in the backstop at displacement `x`."""
+    return backstop_energy(hammer[BACKSTOP_PART:MAGNET], math.sqrt(max(hammer[POSITION] - x, 0.0)))
 
 
 @entry
@@ -94,7 +106,7 @@ def quadratures(
             lost = 0.5 * (v0 * v0 - nodes[i + 1, 2] * nodes[i + 1, 2]) / hammer[INVERSE_MASS]
             out[row, 3] = lost if mode != BACKSTOP and x0 != hammer[FRONT] else 0.0
             continue
-        if mode in (RESTING, HELD) or ends[row] <= starts[row]:
+        if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING) or ends[row] <= starts[row]:
             continue
         memory = memory_of(mode, kept, hammer)
         kv0 = contact_rate(kept, v0, t0, hammer, live) if mode == BACKSTOP else 0.0
@@ -120,3 +132,8 @@ def quadratures(
             out[row, 1] += share * force
             out[row, 2] += share * pack
             out[row, 3] += share * backstop
+        if mode == BACKSTOP_RELEASED:
+            # The backstop has let go: what it still stores is lost as it creeps back.
+            first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, live)
+            last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, live)
+            out[row, 3] = energy_behind(first_x, hammer) - energy_behind(last_x, hammer)

@@ -16,6 +16,9 @@ from printhammer.kernel.modes import (
     BACKSTOP,
     BACKSTOP_SURFACE,
     HELD,
+    HELD_LOADING,
+    HELD_UNLOADING,
+    LOADING,
     RELOADING,
     RESTING,
     UNLOADING,
@@ -46,9 +49,17 @@ SAMPLES = 6
 @compiled
 def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
     """Return what the unloading branch needs of the local maximum `kept` at a node."""
-    if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
+    if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING, HELD_UNLOADING):
         return pack_memory(hammer[PACK:BACKSTOP_PART], kept)
     return 0.0
+
+
+@compiled
+def branch_of(mode: int) -> int:
+    """Return the mode whose force acts in `mode`, which may be one of rest."""
+    if mode == HELD_LOADING:
+        return LOADING
+    return UNLOADING if mode == HELD_UNLOADING else mode
 
 
 @compiled
@@ -82,7 +93,7 @@ def state_in_step(
     t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float]:
     """Return displacement, velocity and w at time `t` [s] in the step that begins at a node."""
-    if mode in (RESTING, HELD) or t <= t0:
+    if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING) or t <= t0:
         return x0, v0, kept if mode in (BACKSTOP, HELD) else 0.0
     if mode == BACKSTOP:
         kv0 = contact_rate(kept, v0, t0, hammer, drive)
@@ -144,7 +155,7 @@ def resample(
         out[row, 2] = value
         out[row, 3] = magnet_force(hammer[MAGNET:], x, 0.0 if FORCE_DRIVE else value)
         out[row, 4] = spring_force(hammer[SPRING:PACK], x)
-        out[row, 5] = pack_force(x, v, mode, memory_of(mode, kept, hammer), hammer)
+        out[row, 5] = pack_force(x, v, branch_of(mode), memory_of(mode, kept, hammer), hammer)
         out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if mode in (BACKSTOP, HELD) else 0.0
         out[row, 7] = (
             backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if mode in (BACKSTOP, HELD) else 0.0
@@ -163,7 +174,7 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, drive: Dr
             c = hammer[BACKSTOP_PART:MAGNET]
             force = backstop_elastic(c, w) + backstop_viscous(c, w, v)
         return hammer[POSITION] - x, force
-    return x - hammer[2], -pack_force(x, v, mode, memory_of(mode, node[4], hammer), hammer)
+    return x - hammer[2], -pack_force(x, v, branch_of(mode), memory_of(mode, node[4], hammer), hammer)
 
 
 @compiled

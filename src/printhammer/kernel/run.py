@@ -15,6 +15,8 @@ from printhammer.kernel.modes import (
     EDGE,
     FREE,
     HELD,
+    HELD_LOADING,
+    HELD_UNLOADING,
     LEFT_BACKSTOP,
     LEFT_FRONT,
     LOADING,
@@ -162,7 +164,7 @@ def kick_into_backstop(t: float, a: float, t_next: float, control: Control) -> t
 
     The regularised equations stand still at w = v = 0.
     """
-    depth = 1e-10 * control[0]
+    depth = 1e-15 * control[0]
     pause = min(math.sqrt(2.0 * depth / -a), t_next - t)
     return t + pause, math.sqrt(-0.5 * a) * pause, a * pause
 
@@ -309,6 +311,8 @@ def run(
             if first < last:
                 pause = min(pause, wait)
             least, most = (-math.inf, 0.0) if mode == RESTING else (-still, still)
+            if mode != RESTING:
+                relabel_node(nodes, used, HELD_LOADING if mode == LOADING else HELD_UNLOADING)
             ended, pause = rest_ends(t, x, pause, mode, memory, least, most, hammer, drive)
             wait = WAIT * time_scale if ended or mode == RESTING else min(2.0 * wait, time_scale)
             switch = EDGE if pause == t_next - t else NO_SWITCH
