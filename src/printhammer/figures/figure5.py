@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -14,6 +15,7 @@ from printhammer.figures.scales import label, scale
 from printhammer.figures.style import BLUE, FAINT, HAIR, MUTED, TINY, new_figure, sign, styled
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -68,8 +70,12 @@ def figure5(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
     place_lines(ax, hammer, way, "x")
     curve(ax, way.shown(x), force.shown(total), "force", BLUE, lw=1.0)
-    arrows(ax, way.shown(x), force.shown(total), 12, BLUE, 8.0)
-    _annotate(ax, motion, times, x, total, way, force)
+    touches = [c.t_in for c in motion.contacts if c.surface == "backstop" and not c.initial and c.peak_force]
+    settling = touches[1] if len(touches) > 1 else math.inf
+    # Settle-out runs to and fro on nearly one line: its arrows are in the insert.
+    cycle = times < settling
+    arrows(ax, way.shown(x[cycle]), force.shown(total[cycle]), 10, BLUE, 8.0)
+    _annotate(ax, motion, times >= settling, x, total, way, force)
     label(ax, "x", way)
     label(ax, "y", force, "Total force")
     sign(figure, hammer, motion.message, rigid_remark(motion))
@@ -77,14 +83,18 @@ def figure5(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
 
 
 def _annotate(
-    ax: Axes, motion: Motion, times: FloatArray, x: FloatArray, total: FloatArray, way: Scale, force: Scale
+    ax: Axes,
+    motion: Motion,
+    late: npt.NDArray[np.bool_],
+    x: FloatArray,
+    total: FloatArray,
+    way: Scale,
+    force: Scale,
 ) -> None:
     """Add the insert, if there is a settle-out to show, and what the loops mean, where there is room."""
     points = occupied(ax)
-    touches = [c.t_in for c in motion.contacts if c.surface == "backstop" and not c.initial and c.peak_force]
-    if len(touches) >= 2:
+    if late.any():
         left, bottom, width, height = _place(points)
-        late = times >= touches[1]
         _insert(
             ax,
             (left, bottom, width, height),
