@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
+from printhammer.cli.numbers import whole
 from printhammer.cli.run import HAMMER, HammerArgument
 
 EXAMPLE = "Example: printhammer figure 3 hendriks-1983 --out build/figures"
 
 
 def figure(
-    number: Annotated[int, typer.Argument(metavar="N", help="Number of the figure in the paper.")],
+    number: Annotated[str, typer.Argument(metavar="N", help="Number of the figure in the paper.")],
     hammer: HammerArgument = HAMMER,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write it.")] = Path("build/figures"),
 ) -> None:
@@ -23,14 +24,14 @@ def figure(
     from printhammer.figures import FIGURES, save
     from printhammer.outputs import make_folder
 
-    if number not in FIGURES:
+    entry = FIGURES.get(whole(number, "figure") or 0)
+    if entry is None:
         known = ", ".join(map(str, FIGURES))
-        raise InputError(f"figure {number} is not drawn, expected one of {known}")
+        raise InputError(f"figure = {number}: expected one of {known}")
     loaded = load_checked(hammer)
     make_folder(out)
     announce_compiling()
-    entry = FIGURES[number]
     screen = console()
-    screen.print(f"[bold]Figure {number}[/bold]  {entry.title}")
-    for path in save(entry.draw(loaded), out, f"figure{number:02d}"):
+    screen.print(f"[bold]Figure {entry.number}[/bold]  {entry.title}")
+    for path in save(entry.draw(loaded), out, f"figure{entry.number:02d}"):
         screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from printhammer.cli.numbers import number, whole
 from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
@@ -41,43 +42,43 @@ _DRIVE = "Drive (default: a single pulse)"
 HammerArgument = Annotated[
     str, typer.Argument(metavar="HAMMER", help="A hammer file, or the name of a shipped hammer.")
 ]
-UnitsOption = Annotated[Units, typer.Option(help="Unit system on the terminal.")]
+UnitsOption = Annotated[Units, typer.Option(metavar="si|inch", help="Unit system on the terminal.")]
 
 
 def _file(flag: str, text: str) -> Any:
     return typer.Option(flag, metavar="FILE", help=text, rich_help_panel=_FILES)
 
 
+def _drive_option(metavar: str, text: str) -> Any:
+    return typer.Option(metavar=metavar, help=text, rich_help_panel=_DRIVE)
+
+
 def run(
     hammer: HammerArgument = HAMMER,
-    rate: Annotated[
-        str | None, typer.Option(help="Firings per second, such as '1.2 kHz'.", rich_help_panel=_DRIVE)
-    ] = None,
-    period: Annotated[
-        str | None, typer.Option(help="Time between firings, such as '1.05 ms'.", rich_help_panel=_DRIVE)
-    ] = None,
-    at: Annotated[
-        str | None, typer.Option(help="Firing times, such as '0 us, 700 us'.", rich_help_panel=_DRIVE)
-    ] = None,
+    rate: Annotated[str | None, _drive_option("RATE", "Firings per second, such as '1.2 kHz'.")] = None,
+    period: Annotated[str | None, _drive_option("TIME", "Time between firings, such as '1.05 ms'.")] = None,
+    at: Annotated[str | None, _drive_option("TIMES", "Firing times, such as '0 us, 700 us'.")] = None,
     pulses: Annotated[
-        int | None,
-        typer.Option(help=f"Number of firings with --rate or --period ({PULSES}).", rich_help_panel=_DRIVE),
+        str | None, _drive_option("N", f"Number of firings with --rate or --period ({PULSES}).")
     ] = None,
     overlap: Annotated[
         Overlap | None,
-        typer.Option(
-            help="Overlapping pulses add up (default), or the latest replaces.", rich_help_panel=_DRIVE
-        ),
+        _drive_option("add|replace", "Overlapping pulses add up (default), or the latest replaces."),
     ] = None,
-    drive: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A drive file instead.", rich_help_panel=_DRIVE)
+    drive: Annotated[Path | None, _drive_option("FILE", "A drive file instead.")] = None,
+    duration: Annotated[
+        str | None, typer.Option(metavar="TIME", help="End of the run (4 ms after the last firing).")
     ] = None,
-    duration: Annotated[str | None, typer.Option(help="End of the run (4 ms after the last firing).")] = None,
-    tolerance: Annotated[float | None, typer.Option(help="Error allowed in one step (1e-9).")] = None,
+    tolerance: Annotated[str | None, typer.Option(metavar="X", help="Error allowed in one step.")] = None,
     scheme: Annotated[
-        Scheme, typer.Option(help="Integrator: the exact one, or one of the two of 1983.")
+        Scheme,
+        typer.Option(
+            metavar="NAME", help="Integrator: default, or those of 1983, trapezoid and runge-kutta-4."
+        ),
     ] = Scheme.DEFAULT,
-    points: Annotated[int | None, typer.Option(help="Points in the record of the motion.")] = None,
+    points: Annotated[
+        str | None, typer.Option(metavar="N", help="Points in the record of the motion.")
+    ] = None,
     units: UnitsOption = Units.SI,
     csv: Annotated[Path | None, _file("--csv", "Record of the motion, CSV.")] = None,
     parquet: Annotated[Path | None, _file("--parquet", "Record of the motion, Parquet.")] = None,
@@ -98,18 +99,22 @@ def run(
 
     files = {"csv": csv, "parquet": parquet, "dots": dots, "contacts": contacts, "json": json, "plot": plot}
     wanted = {kind: path for kind, path in files.items() if path is not None}
-    run_files.check(wanted, [Path(hammer), *([drive] if drive is not None else [])])
+    read = [Path(hammer), *([drive] if drive is not None else [])]
+    run_files.check(wanted, read)
     loaded = load_checked(hammer)
     fired = _drive(
-        loaded, drive, {"rate": rate, "period": period, "at": at, "pulses": pulses, "overlap": overlap}
+        loaded,
+        drive,
+        {"rate": rate, "period": period, "at": at, "pulses": whole(pulses, "pulses"), "overlap": overlap},
     )
+    run_files.check(wanted, run_files.tables(loaded, Path(hammer), fired, drive))
     announce_compiling()
     motion: Motion = simulate(
         loaded,
         fired,
         duration=None if duration is None else read_number(duration, "s", "duration"),
-        tolerance=TOLERANCE if tolerance is None else tolerance,
-        points=points,
+        tolerance=TOLERANCE if tolerance is None else number(tolerance, "tolerance") or 0.0,
+        points=whole(points, "points"),
         scheme=scheme.value,
     )
     screen = console()

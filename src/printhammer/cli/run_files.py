@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
+    from printhammer.drive import Drive
+    from printhammer.hammer import Hammer
     from printhammer.motion import Motion
 
 _SUFFIXES: Final = {
@@ -35,6 +37,13 @@ def check(wanted: Mapping[str, Path], inputs: Iterable[Path]) -> None:
         if known is not None and path.suffix.lower() not in known:
             raise InputError(f"--{kind} {path}: expected a name that ends in {' or '.join(known)}")
     check_outputs(wanted.values(), inputs)
+
+
+def tables(hammer: Hammer, path: Path, drive: Drive, drive_path: Path | None) -> list[Path]:
+    """Return the tables that a hammer file and a drive file name, beside them."""
+    named = [(path, hammer.magnet), (path, hammer.waveform), (drive_path, drive.waveform)]
+    found = [(place, getattr(model, "file", None)) for place, model in named]
+    return [place.parent / name for place, name in found if place is not None and name]
 
 
 def write(motion: Motion, wanted: Mapping[str, Path]) -> None:

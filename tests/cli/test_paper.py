@@ -1,0 +1,48 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from printhammer import report
+from printhammer.claims import claims
+
+
+@pytest.fixture
+def quick_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the verb write a report with few claims and one figure; the whole of it takes a while."""
+    whole = report.write_report
+
+    def few(hammer, out, **options):
+        return whole(hammer, out, claims=["geometry", "settle_out", "poincare"], figures=[2], **options)
+
+    monkeypatch.setattr(report, "write_report", few)
+
+
+@pytest.mark.usefixtures("quick_report")
+def test_paper(cli, tmp_path: Path) -> None:
+    outcome = cli("paper", "--out", tmp_path / "paper")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert {path.name for path in (tmp_path / "paper").iterdir()} == {"index.html", "claims.json", "figures"}
+    entries = {entry["name"]: entry for entry in json.loads((tmp_path / "paper" / "claims.json").read_text())}
+    for name, entry in entries.items():
+        (line,) = [line for line in outcome.out.splitlines() if line.startswith(f"{name} ")]
+        assert entry["verdict"] in line
+        assert claims()[name].kind in line
+
+
+@pytest.mark.usefixtures("quick_report")
+def test_strict_ends_with_status_1_where_a_claim_fails(cli, hammer, tmp_path: Path) -> None:
+    moved = tmp_path / "moved.toml"
+    hammer.replace("platen", "0.016 in").save(moved)
+    assert cli("paper", moved, "--out", tmp_path / "paper").status == 0
+    assert cli("paper", moved, "--out", tmp_path / "paper", "--strict").status == 1
+    assert (tmp_path / "paper" / "index.html").is_file()
+
+
+@pytest.mark.slow
+def test_the_whole_report_twice(cli, tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        assert cli("paper", "--out", tmp_path / name).status == 0
+    first, second = ((tmp_path / name / "claims.json").read_bytes() for name in ("first", "second"))
+    assert first == second
+    assert [entry["name"] for entry in json.loads(first)] == list(claims())
