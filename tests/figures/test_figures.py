@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 
 import printhammer as ph
 from printhammer.buzz import BuzzSearch, BuzzTrain, delayed_train, longest_run
-from printhammer.figures import FIGURES, figure
+from printhammer.figures import FIGURES
 from printhammer.figures.motion import plot
 
 OPPOSITE = {"µm": ("10⁻³ in", 25.4), "N": ("lbf", 4.4482216152605), "m/s": ("in/s", 0.0254)}
@@ -40,14 +40,6 @@ def drawn(hammer: "ph.Hammer") -> dict[int, Figure]:
 def test_the_registry_has_the_figures_of_the_paper() -> None:
     assert list(FIGURES) == [2, 3, 4, 5, 6, 7, 10]
     assert all(entry.number == number and entry.title and entry.caption for number, entry in FIGURES.items())
-    assert figure(3) is FIGURES[3]
-
-
-def test_an_unknown_number_is_refused() -> None:
-    with pytest.raises(
-        ph.InputError, match=r"^figure = 11 is not known, expected one of 2, 3, 4, 5, 6, 7, 10$"
-    ):
-        figure(11)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.errors import InputError
 from printhammer.figures.save import FORMATS, save
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
     from printhammer.hammer import Hammer
 
-__all__ = ["FIGURES", "FORMATS", "PaperFigure", "figure", "save"]
+__all__ = ["FIGURES", "FORMATS", "PaperFigure", "save"]
 
 
 @dataclass(frozen=True)
@@ -108,17 +107,3 @@ FIGURES: Final[dict[int, PaperFigure]] = {
     )
 }
 """The figures of the paper by number."""
-
-
-def figure(number: int) -> PaperFigure:
-    """Return a figure of the paper.
-
-    Raises
-    ------
-    InputError
-        There is none of that number here.
-    """
-    if number not in FIGURES:
-        known = ", ".join(map(str, FIGURES))
-        raise InputError(f"figure = {number!r} is not known, expected one of {known}")
-    return FIGURES[number]

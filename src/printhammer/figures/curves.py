@@ -116,14 +116,8 @@ def settled_at(motion: Motion) -> float:
 
 def shown_until(motion: Motion) -> float:
     """Return a round time, s, at which a picture of a motion that settles can end."""
-    settled = max(settled_at(motion), min(motion.drive.end, motion.end) if _is_short(motion) else 0.0)
     step = 10.0 ** math.floor(math.log10(motion.end)) / 4.0
-    return float(min(motion.end, step * math.ceil(1.1 * settled / step)))
-
-
-def _is_short(motion: Motion) -> bool:
-    """Whether the drive ends well before the motion, tail of the current apart."""
-    return motion.drive.end < 0.25 * motion.end
+    return float(min(motion.end, step * math.ceil(1.1 * settled_at(motion) / step)))
 
 
 def reach(hammer: Hammer) -> tuple[float, float]:

@@ -28,7 +28,6 @@ FAINT: Final = "#d9d9d9"
 BLUE: Final = "#0072b2"
 ORANGE: Final = "#d55e00"
 GREEN: Final = "#009e73"
-SKY: Final = "#56b4e9"
 YELLOW: Final = "#e69f00"
 FAMILY: Final = ("#7db7dc", "#4f9bcb", "#2f7fb9", "#1a619f", "#08417a")
 """Light to dark, for a family of curves with one parameter."""
