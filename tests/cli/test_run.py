@@ -80,9 +80,13 @@ def test_files(cli, hammer: "ph.Hammer", tmp_path: Path) -> None:
     import pandas as pd
 
     names = {
-        "csv": "m.csv", "parquet": "m.parquet", "dots": "dots.csv", "contacts": "contacts.parquet", "json": "m.json",
+        "csv": "m.csv",
+        "parquet": "m.parquet",
+        "dots": "dots.csv",
+        "contacts": "contacts.parquet",
+        "json": "m.json",
         "plot": "m.svg",
-    }  # fmt: skip
+    }
     options = [text for kind, name in names.items() for text in (f"--{kind}", tmp_path / name)]
     outcome = cli("run", "--at", "0 us, 660 us", "--points", "101", *options)
     assert outcome.status == 0
@@ -90,7 +94,8 @@ def test_files(cli, hammer: "ph.Hammer", tmp_path: Path) -> None:
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, at=[0.0, 660e-6]), points=101)
     record = pd.read_csv(tmp_path / "m.csv")
     assert record["x [m]"].to_numpy() == pytest.approx(motion.x, rel=1e-15)
-    assert record.equals(pd.read_parquet(tmp_path / "m.parquet"))
+    stored = pd.read_parquet(tmp_path / "m.parquet")
+    pd.testing.assert_frame_equal(record, stored, check_dtype=False, rtol=1e-15, atol=0.0)
     with (tmp_path / "dots.csv").open() as file:
         first, second = csv.DictReader(file)
     assert float(first["flight_time [s]"]) == motion.dots[0].flight_time
@@ -171,13 +176,8 @@ def test_the_second_run_is_quick(tmp_path: Path) -> None:
 
 
 def test_interrupting_is_polite(tmp_path: Path) -> None:
-    process = subprocess.Popen(
-        [SCRIPT, "paper", "--out", "paper"],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen([SCRIPT, "paper", "--out", "paper"], cwd=tmp_path, **pipes)
     # It is at work once its folder is there.
     while not (tmp_path / "paper" / "figures").exists() and process.poll() is None:
         time.sleep(0.02)
@@ -189,8 +189,7 @@ def test_interrupting_is_polite(tmp_path: Path) -> None:
 
 
 def test_a_reader_who_has_had_enough() -> None:
-    done = subprocess.run(
-        f"{SCRIPT} hammer schema | head -1", shell=True, capture_output=True, text=True, check=True
-    )
+    command = f"{SCRIPT} hammer schema | head -1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
     assert done.stdout == "{\n"
     assert "Traceback" not in done.stderr
