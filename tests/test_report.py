@@ -1,4 +1,5 @@
 import json
+import re
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,7 +52,7 @@ class Page(HTMLParser):
 
     @property
     def text(self) -> str:
-        return " ".join(" ".join(self.words).split())
+        return re.sub(r"[ \n]+", " ", " ".join(self.words))
 
 
 @pytest.fixture(scope="module")
@@ -198,4 +199,4 @@ def test_values_are_told_in_both_systems() -> None:
     assert band_text({"at_least": 6}, "") == "≥ 6"
     assert band_text([283.2e-6, 285.8e-6], "m") == "283.2 to 285.8 µm"
     assert band_text({"below": 1e-9}, "N") == "< 1e−9 N"
-    assert typeset("at least 5 us and <= 25 um") == "at least 5 µs and ≤ 25 µm"
+    assert typeset("at least 5 us and <= 25 um") == "at least 5\xa0µs and ≤ 25\xa0µm"

@@ -88,7 +88,7 @@ def _sign(unit: str) -> str:
 
 def typeset(text: str) -> str:
     """Return a sentence of ours with the signs that a page can show."""
-    text = re.sub(r"(?<=\d )u([ms])\b", "µ\\1", text)
+    text = re.sub(r"(?<=\d) u([ms])\b", "\N{NO-BREAK SPACE}µ\\1", text)
     return text.replace(">=", "≥").replace("<=", "≤").replace(" -> ", " → ")
 
 
