@@ -1,0 +1,124 @@
+"""Measure the figures of the page on numerics and print them as tables.
+
+Run it with ``.venv/bin/python docs/measure/accuracy.py``; it takes a minute or two.
+"""
+
+import math
+
+import numpy as np
+
+import printhammer as ph
+from printhammer.kernel.reference import horizon, reference
+
+HAMMER = ph.load("hendriks-1983")
+SINGLE = ph.PulseTrain(HAMMER.waveform)
+GRID = np.linspace(0.0, 4e-3, 4001)
+FINEST = 1e-14
+"""Tolerance of the reference; its error is about 1e-13 of the stroke."""
+
+
+def heading(*cells: str) -> None:
+    """Print the first two lines of a table."""
+    print("\n| " + " | ".join(cells) + " |")
+    print("|" + "---|" * len(cells))
+
+
+def row(*cells: str) -> None:
+    """Print a line of a table."""
+    print("| " + " | ".join(cells) + " |")
+
+
+def single_pulse() -> float:
+    """Errors of a single-pulse cycle against the reference; returns the stroke, m."""
+    exact = reference(HAMMER, SINGLE, GRID[-1], tolerance=FINEST, times=GRID)
+    stroke = float(exact.x.max()) - HAMMER.position
+    finer = reference(HAMMER, SINGLE, GRID[-1], tolerance=1e-13, times=GRID)
+    print(f"\nReferences of 1e-13 and 1e-14: {np.abs(finer.x - exact.x).max() / stroke:.1e} of the stroke")
+    heading("tolerance", "steps", "error / stroke", "ledger residual / throughput")
+    for tolerance in (1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 2e-11, 1e-12, 1e-13):
+        motion = ph.simulate(HAMMER, SINGLE, times=GRID, tolerance=tolerance)
+        error = np.abs(motion.x - exact.x).max() / stroke
+        residual = abs(motion.energy.residual) / motion.energy.throughput
+        row(f"{tolerance:.0e}", str(motion.steps), f"{error:.1e}", f"{residual:.1e}")
+    return stroke
+
+
+def trains(stroke: float) -> None:
+    """Errors of trains up to their horizon."""
+    heading("drive", "horizon (ms)", "largest error / stroke before it")
+    drives = {
+        "two pulses, 700 µs": ph.PulseTrain(HAMMER.waveform, at=[0.0, 700e-6]),
+        "three pulses, 1.2 kHz": ph.PulseTrain(HAMMER.waveform, rate=1200.0, pulses=3),
+        "nine pulses, 1.35 ms": ph.PulseTrain(HAMMER.waveform, period=1.35e-3, pulses=9),
+        "nine pulses, 1.05 ms": ph.PulseTrain(HAMMER.waveform, period=1.05e-3, pulses=9),
+    }
+    for name, drive in drives.items():
+        end = float(drive.times[-1]) + 2e-3
+        grid = np.linspace(0.0, end, 8001)
+        until = horizon(HAMMER, drive, end, grid, stroke=stroke)
+        exact = reference(HAMMER, drive, end, tolerance=1e-13, times=grid)
+        motion = ph.simulate(HAMMER, drive, duration=end, times=grid)
+        before = grid < until
+        error = np.abs(motion.x - exact.x)[before].max() / stroke
+        row(name, f"{1e3 * until:.2f}" + (" (end)" if until == end else ""), f"{error:.1e}")
+
+
+def pack_alone(tolerance: float) -> float:
+    """Relative error of the rebound from the pack, sqrt(3.7/12) of the speed of approach."""
+    pack = {"law": "power", "stiffness": "259 N", "front": "0 m", "thickness": "178 um"}
+    mass = ph.Hammer.build("0.4 g", pack=pack)
+    still = ph.SineForce(0.0, 1.0)
+    motion = ph.simulate(mass, still, state=(-1e-5, 1.5), duration=1e-3, tolerance=tolerance)
+    return abs(-motion.contacts[0].v_out / 1.5 / math.sqrt(3.7 / 12.0) - 1.0)
+
+
+def backstop_alone(tolerance: float) -> float:
+    """Error of z - ln(1 + z) = -(y + ln(1 - y)) for a free rebound from the backstop, over its value."""
+    backstop = {"law": "hertz", "position": "0 m", "stiffness": 1.2e9, "damping": 4.2e8}
+    mass = ph.Hammer.build("0.4 g", backstop=backstop)
+    still = ph.SineForce(0.0, 1.0)
+    motion = ph.simulate(mass, still, state=(1e-5, -1.95), duration=1e-3, tolerance=tolerance)
+    z, y = (4.2e8 / 1.2e9 * abs(v) for v in (motion.contacts[0].v_in, motion.contacts[0].v_out))
+    left, right = z - math.log1p(z), -(y + math.log1p(-y))
+    return abs(left / right - 1.0)
+
+
+def oracles() -> None:
+    """Errors against closed forms, at the default and at a tight tolerance."""
+    heading("closed form", "error at 2e-11", "error at 1e-12")
+    for name, measure in (("pack alone", pack_alone), ("backstop alone", backstop_alone)):
+        row(name, f"{measure(2e-11):.1e}", f"{measure(1e-12):.1e}")
+
+
+def schemes(stroke: float) -> None:
+    """Order of the schemes of 1983 in smooth motion, and their errors on a cycle with contacts."""
+    flight = {"state": (80e-6, 1.6), "duration": 80e-6, "times": [80e-6]}
+    never = ph.PulseTrain(HAMMER.waveform, at=[1.0])
+    landing = ph.simulate(HAMMER, never, tolerance=1e-14, **flight)
+    assert not landing.contacts
+    exact = ph.simulate(HAMMER, SINGLE, times=GRID, tolerance=1e-13).x
+    heading(
+        "factor on all steps", "trapezoidal rule, flight", "Runge-Kutta, flight",
+        "trapezoidal rule, single pulse", "Runge-Kutta, single pulse",
+    )  # fmt: skip
+    for scale in (4.0, 2.0, 1.0, 0.5, 0.25, 0.125):
+        cells = []
+        for scheme in ("trapezoid", "runge-kutta-4"):
+            motion = ph.simulate(HAMMER, never, scheme=scheme, step_scale=scale, **flight)
+            cells.append(f"{abs(motion.x[0] - landing.x[0]) / stroke:.1e}")
+        for scheme in ("trapezoid", "runge-kutta-4"):
+            motion = ph.simulate(HAMMER, SINGLE, times=GRID, scheme=scheme, step_scale=scale)
+            cells.append(f"{np.abs(motion.x - exact).max() / stroke:.1e}" if motion.ok else motion.status)
+        row(f"{scale:g}", *cells)
+
+
+def main() -> None:
+    """Print all tables."""
+    stroke = single_pulse()
+    trains(stroke)
+    oracles()
+    schemes(stroke)
+
+
+if __name__ == "__main__":
+    main()

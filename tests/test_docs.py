@@ -1,0 +1,126 @@
+"""The documentation: what it names exists, it builds without a warning, it fetches nothing from elsewhere."""
+
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import printhammer as ph
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted(path for path in DOCS.rglob("*.md") if "gallery" not in path.parts)
+# A path of the repository in code quotes, possibly with the name of a test behind it.
+NAMED = re.compile(r"`((?:src|tests|docs|examples|benchmarks)/[\w./*-]+?)(?:::(\w+))?`")
+LINKED = re.compile(r"\]\((?!https?:|#)([^)#]+)(?:#[^)]*)?\)")
+EXTERNAL = re.compile(r"(?:https?:)?//")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
+def test_what_a_page_names_is_there(page: Path) -> None:
+    missing = []
+    for name, test in NAMED.findall(page.read_text("utf-8")):
+        path = ROOT / name
+        if not path.exists() or (test and f"def {test}(" not in path.read_text("utf-8")):
+            missing.append(f"{name}::{test}" if test else name)
+    assert missing == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
+def test_links_lead_to_files(page: Path) -> None:
+    missing = []
+    for target in LINKED.findall(page.read_text("utf-8")):
+        path = (page.parent / target).resolve()
+        made = path.is_relative_to(DOCS / "gallery")
+        there = (
+            (ROOT / "examples" / f"{path.stem}.py").exists() or path.stem == "index"
+            if made
+            else path.exists()
+        )
+        if not there:
+            missing.append(target)
+    assert missing == []
+
+
+def test_every_equation_of_the_paper_has_file_constants_test_and_figure() -> None:
+    text = (DOCS / "model.md").read_text("utf-8")
+    labels = re.findall(r"\$\$ \((eq-[a-z]+)\)", text)
+    # The numbers on the page are those of the paper.
+    assert labels == ["eq-motion", "eq-sum", "eq-magnet", "eq-spring", "eq-pack", "eq-hertz", "eq-damping"]
+    after = re.split(r"\$\$ \(eq-(?:sum|magnet|spring|pack|damping)\)", text)[1:]
+    assert len(after) == 5
+    for part in after:
+        section = part.partition("\n## ")[0]
+        assert re.search(r"^\| file \| `src/", section, re.MULTILINE)
+        assert re.search(r"^\| constants? \| `", section, re.MULTILINE)
+        assert re.search(r"^\| tests? \| `tests/", section, re.MULTILINE)
+        assert re.search(r"^\| figures? \| .*`src/printhammer/figures/figure\d+\.py`", section, re.MULTILINE)
+
+
+def test_every_public_name_is_in_the_reference() -> None:
+    text = (DOCS / "api.md").read_text("utf-8")
+    described = set(re.findall(r"^\.\. auto(?:class|function|exception):: (\w+)", text, re.MULTILINE))
+    assert set(ph.__all__) - {"__version__"} <= described
+
+
+class Requests(HTMLParser):
+    """Collects what a page makes a browser fetch: scripts, styles, images, fonts, frames."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        fetched = [values.get("src"), values.get("srcset"), values.get("poster"), values.get("data")]
+        if tag == "link":
+            fetched.append(values.get("href"))
+        if tag in ("image", "use"):
+            fetched += [values.get("href"), values.get("xlink:href")]
+        self.found += [value for value in fetched if value and EXTERNAL.match(value.strip())]
+
+
+def test_a_request_is_recognised() -> None:
+    requests = Requests()
+    requests.feed('<a href="https://a.org">a</a><script src="//b.org/x.js"></script><img src="c.png">')
+    assert requests.found == ["//b.org/x.js"]
+
+
+@pytest.mark.slow
+def test_the_documentation_builds_and_fetches_nothing_from_elsewhere(tmp_path: Path) -> None:
+    out = tmp_path / "html"
+    command = [
+        "-W",
+        "--keep-going",
+        "-q",
+        "-b",
+        "html",
+        "-d",
+        str(tmp_path / "doctrees"),
+        str(DOCS),
+        str(out),
+    ]
+    done = subprocess.run(
+        [sys.executable, "-m", "sphinx", *command], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    pages = sorted(out.rglob("*.html"))
+    assert {"index.html", "model.html", "numerics.html", "api.html"} <= {page.name for page in pages}
+    for page in pages:
+        requests = Requests()
+        requests.feed(page.read_text("utf-8"))
+        assert requests.found == [], page.name
+    for style in out.rglob("*.css"):
+        assert not re.search(r"(?:url\(|@import)\s*['\"]?(?:https?:)?//", style.read_text("utf-8")), (
+            style.name
+        )
+    formulas = (out / "model.html").read_text("utf-8")
+    assert formulas.count('<math alttext="') > 20
+    assert not re.search(r"<code>\\|merror", formulas)
+    for script in (ROOT / "examples").glob("*.py"):
+        if script.stem != "cubic_spring":
+            assert (out / "gallery" / f"{script.stem}.html").exists()
+            assert f"sphx_glr_{script.stem}_thumb" in (out / "gallery" / "index.html").read_text("utf-8")
