@@ -107,8 +107,8 @@ def scales_of(hammer: Hammer, drive: Drive, state: tuple[float, float]) -> tuple
 
     static = StaticForce(hammer)
     origin = hammer.origin
-    current = 0.0 if drive.quantity == "force" else drive.peak
-    push = drive.peak if drive.quantity == "force" else 0.0
+    largest_value = drive.waveform.peak
+    current, push = (0.0, largest_value) if drive.quantity == "force" else (largest_value, 0.0)
 
     def force(x: float) -> float:
         found = [abs(static.free(x, i)) for i in (0.0, current)]

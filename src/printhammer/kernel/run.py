@@ -42,7 +42,7 @@ from printhammer.kernel.modes import (
 if TYPE_CHECKING:
     from printhammer.kernel.contact import advance_contact, contact_rate
     from printhammer.kernel.forces import Hammer, acceleration
-    from printhammer.kernel.landing import advance
+    from printhammer.kernel.landing import State, advance, land_on_level
     from printhammer.kernel.laws import (
         BACKSTOP_PULLS,
         HAS_BACKSTOP,
@@ -126,6 +126,28 @@ def out_of_bounds(x: float, bounds: Any) -> int:
     if abs(x - bounds[2]) > bounds[3]:
         return RUNAWAY
     return OK
+
+
+@compiled
+def at_bound(
+    start: State,
+    end: State,
+    mode: int,
+    memory: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+    bounds: Any,
+) -> State:
+    """Return the state at which a step from `start` to `end` leaves the range, the last one inside it."""
+    sign = 1.0 if end[1] > bounds[1] else -1.0
+    bound = bounds[1] if sign > 0.0 else bounds[0]
+    if start[1] == bound:
+        return start
+    fraction = (bound - start[1]) / (end[1] - start[1])
+    return land_on_level(
+        start, end[0] - start[0], fraction, 1.0, bound, sign, mode, memory, hammer, drive, control
+    )
 
 
 @compiled
@@ -280,7 +302,7 @@ def run(
         if steps > max_steps:
             status = STEP_LIMIT
             break
-        switch = NO_SWITCH
+        switch, left = NO_SWITCH, OK
         if mode == BACKSTOP:
             if entered:
                 kv = contact_rate(w, v, t, hammer, drive)
@@ -318,6 +340,9 @@ def run(
             switch = EDGE if pause == t_next - t else NO_SWITCH
             t = t_next if switch == EDGE else t + pause
             a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
+            if not ended and switch == NO_SWITCH:
+                # The node at which the rest began holds on.
+                continue
             if ended and mode != RESTING and not goes_on_in(a, mode):
                 mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
                 a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
@@ -327,7 +352,11 @@ def run(
             fresh = started != mode
             started = mode
             h = sensible_step(h, x, v, a, mode, hammer)
-            switch, end, h = advance((t, x, v, a), h, t_next, mode, memory, peak, hammer, drive, control)
+            start = (t, x, v, a)
+            switch, end, h = advance(start, h, t_next, mode, memory, peak, hammer, drive, control)
+            if switch != FAILED and out_of_bounds(end[1], bounds) == RANGE_LEFT:
+                end = at_bound(start, end, mode, memory, hammer, drive, control, bounds)
+                switch, left = NO_SWITCH, RANGE_LEFT
             t, x, v, a = end
             if fresh and mode == FREE:
                 h_free = h
@@ -336,7 +365,7 @@ def run(
         if switch == FAILED:
             status = failure(x, v, bounds, control)
             break
-        status = out_of_bounds(x, bounds)
+        status = left if left != OK else out_of_bounds(x, bounds)
         entered = entered or switch != NO_SWITCH
         if switch == EDGE:
             first, last, edge = pass_edges(t, firings, pieces, replace, under_way, first, last, live)
