@@ -337,8 +337,10 @@ class _Run:
             self._log(kind)
             if self.mode == "recurve":
                 self.mode = "curve"
-            else:
+            elif self.y > 0.0:
                 self.mode, self.peak = "curve", self.y
+            else:
+                self.mode = "free"
         elif kind == "rejoin":
             self.y = self.peak
             self.mode = "load"
@@ -359,6 +361,10 @@ class _Run:
         self.v = 0.0
         self.mode = "load"
         if _first_sign(self._expand(self._contact(), self.guess)[1]) > 0:
+            return
+        if self.y <= 0.0:
+            # A touch without velocity, pulled back at once.
+            self.mode = "free"
             return
         self.mode, self.peak = "curve", self.y
         self._log("pack-peak")
