@@ -60,6 +60,7 @@ sphinx_gallery_conf = {
     "image_scrapers": ("gallery_style.figures",),
     "abort_on_example_error": True,
     "backreferences_dir": None,
+    "capture_repr": (),
     "default_thumb_file": None,
     "download_all_examples": False,
     "min_reported_time": 1e9,

@@ -2,10 +2,10 @@
 Three backstops
 ===============
 
-The paper knows two ways to settle out: a hard backstop, with many rebounds of falling height, and an
-elastomer, with few. A third description, a rigid surface with a coefficient of restitution, is what is
-often adopted when the source of the loss is not known. Each is a part; the kernel is compiled once for
-each.
+The paper knows two ways to settle out: a hard backstop, with many rebounds of
+falling height, and an elastomer, with few. A third description, a rigid surface
+with a coefficient of restitution, is what is often adopted when the source of the
+loss is not known. Each is a part; the kernel is compiled once for each.
 """
 
 import matplotlib.pyplot as plt
@@ -15,8 +15,9 @@ import printhammer as ph
 hard = ph.load("hendriks-1983")
 
 # %%
-# The settle-out begins when the armature comes back from the paper. Its state at that moment is taken
-# from a single pulse, and the three hammers start from there, without current.
+# The settle-out begins when the armature comes back from the paper. Its state at
+# that moment is taken from a single pulse, and the three hammers start from there,
+# without current.
 
 pulse = ph.simulate(hard, ph.PulseTrain(hard.waveform))
 printing = next(c for c in pulse.contacts if c.surface == "pack")
@@ -24,17 +25,26 @@ state = (hard.front, printing.v_out)
 print(f"return speed {-printing.v_out:.3f} m/s")
 
 # %%
-# The rigid backstop gets the restitution of the first rebound from the hard one. The elastomer is a
-# viscoelastic Hertz contact; it must be stiff enough to hold the pull of this magnet, which grows as
-# the armature moves behind the backstop position. One of 8e7 N/m^1.5, which deforms by 25 um at 10 N,
-# is not, and the program says so.
+# The rigid backstop gets the restitution of the first rebound from the hard one.
+# The elastomer is a viscoelastic Hertz contact; it must be stiff enough to hold the
+# pull of this magnet, which grows as the armature moves behind the backstop
+# position. One of 8e7 N/m^1.5, which deforms by 25 um at 10 N, is not, and the
+# program says so.
 
 first = next(c for c in pulse.contacts if c.surface == "backstop" and not c.initial)
 restitution = -first.v_out / first.v_in
-rigid = hard.replace("backstop", {"law": "rigid", "position": hard.position, "restitution": restitution})
+rigid = hard.replace(
+    "backstop",
+    {"law": "rigid", "position": hard.position, "restitution": restitution},
+)
 elastomer = hard.replace(
     "backstop",
-    {"law": "elastomer", "position": hard.position, "stiffness": 2e8, "relaxation_time": "10 us"},
+    {
+        "law": "elastomer",
+        "position": hard.position,
+        "stiffness": 2e8,
+        "relaxation_time": "10 us",
+    },
 )
 try:
     ph.rest_state(elastomer.replace("backstop.stiffness", 8e7))
@@ -46,7 +56,10 @@ except ph.InputError as error:
 
 never = ph.PulseTrain(hard.waveform, at=["1 s"])
 hammers = {"hard": hard, "rigid": rigid, "elastomer": elastomer}
-motions = {name: ph.simulate(hammer, never, state=state, duration="1 ms") for name, hammer in hammers.items()}
+motions = {
+    name: ph.simulate(hammer, never, state=state, duration="1 ms")
+    for name, hammer in hammers.items()
+}
 
 figure, axes = plt.subplots(3, 1, sharex=True, sharey=True, figsize=(6.8, 5.0))
 for panel, (name, motion) in zip(axes, motions.items(), strict=True):
@@ -57,15 +70,18 @@ axes[0].set_title("Settle-out on three backstops")
 axes[-1].set_xlabel("time since the return from the paper (µs)")
 
 # %%
-# On the rigid surface the bounces accumulate at a point in time: infinitely many in a finite time,
-# after which the armature rests. The run counts the ones that it can resolve and goes on. A rigid
-# contact has neither depth nor a finite force; its peak force is None.
+# On the rigid surface the bounces accumulate at a point in time: infinitely many in
+# a finite time, after which the armature rests. The run counts the ones that it can
+# resolve and goes on. A rigid contact has neither depth nor a finite force; its
+# peak force is None.
 
 for name, motion in motions.items():
     touches = [c for c in motion.contacts if c.surface == "backstop"]
-    strongest = max((c.peak_force for c in touches if c.peak_force is not None), default=None)
+    strongest = max(
+        (c.peak_force for c in touches if c.peak_force is not None), default=None
+    )
     force = "not finite" if strongest is None else f"{strongest:.1f} N"
     depth = 1e6 * max(c.depth for c in touches)
-    print(f"{name:10s} {len(touches):3d} touches, deepest {depth:5.1f} um, strongest {force}")
+    print(f"{name:10s} {len(touches):3d} touches, deepest {depth:5.1f} um, {force}")
 
 plt.show()

@@ -3,7 +3,8 @@
     Fs = -(K (x - b) + D (x - b)^3)
 
 Source: G. Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (1918).
-Validity: deflections for which higher terms are small. Weakness: neither mass nor damping of its own.
+Validity: deflections for which higher terms are small. Weakness: neither mass nor
+damping of its own.
 
 Packed constants: c = [K, D, b].
 """

@@ -2,9 +2,9 @@
 The energy ledger
 =================
 
-What the coil gives, what ribbon, paper and backstop take, and what remains. Every term has a quadrature
-of its own along the run; none is computed as a difference of the others, so that their sum is a check
-of the whole run.
+What the coil gives, what ribbon, paper and backstop take, and what remains. Every
+term has a quadrature of its own along the run; none is computed as a difference of
+the others, so that their sum is a check of the whole run.
 """
 
 import matplotlib.pyplot as plt
@@ -16,8 +16,8 @@ drive = ph.PulseTrain(hammer.waveform)
 motion = ph.simulate(hammer, drive)
 
 # %%
-# From rest to rest, kinetic and stored energy come back to where they were, and the coil's work is what
-# the contacts took.
+# From rest to rest, kinetic and stored energy come back to where they were, and the
+# coil's work is what the contacts took.
 
 ledger = motion.energy
 for name in ("coil_work", "pack_loss", "backstop_loss", "kinetic", "stored"):
@@ -26,7 +26,8 @@ share = abs(ledger.residual) / ledger.throughput
 print(f"{'residual':14s} {ledger.residual:10.1e} J, {share:.0e} of the throughput")
 
 # %%
-# Contact by contact. Where rebounds follow ever faster, small losses add up to a high power.
+# Contact by contact. Where rebounds follow ever faster, small losses add up to a
+# high power.
 
 contacts = [c for c in motion.contacts if not c.initial]
 figure, axes = plt.subplots()
@@ -38,8 +39,9 @@ axes.bar_label(bars, [f"{loss:.2g}" for loss in losses], fontsize=8)
 axes.set(ylabel="loss (mJ)", title="What each contact took, and when it began")
 
 # %%
-# The force of the pack against displacement: the area of the loop is the net loss, the area below its
-# upper branch the loading work. Loading follows r to the power 2.7, unloading the power 11.
+# The force of the pack against displacement: the area of the loop is the net loss,
+# the area below its upper branch the loading work. Loading follows r to the power
+# 2.7, unloading the power 11.
 
 dot = motion.dots[0]
 touch = next(c for c in contacts if c.surface == "pack")
@@ -52,12 +54,12 @@ axes.plot(1e6 * (x - hammer.front), force)
 axes.set(
     xlabel="indentation (µm)",
     ylabel="force on the pack (N)",
-    title=f"Loading work {1e3 * dot.loading_work:.3f} mJ, net loss {1e3 * dot.net_loss:.3f} mJ",
+    title=f"Work {1e3 * dot.loading_work:.3f} mJ, loss {1e3 * dot.net_loss:.3f} mJ",
 )
 
 # %%
-# The residual follows the tolerance of the run. At the default of 2e-11 it is far below a billionth of
-# the throughput.
+# The residual follows the tolerance of the run. At the default of 2e-11 it is far
+# below a billionth of the throughput.
 
 tolerances = [10.0**-k for k in range(4, 14)]
 residuals = []
@@ -67,6 +69,10 @@ for tolerance in tolerances:
 figure, axes = plt.subplots()
 axes.loglog(tolerances, residuals, "o-")
 axes.invert_xaxis()
-axes.set(xlabel="tolerance", ylabel="|residual| / throughput", title="Closure of the ledger")
+axes.set(
+    xlabel="tolerance",
+    ylabel="|residual| / throughput",
+    title="Closure of the ledger",
+)
 
 plt.show()

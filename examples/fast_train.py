@@ -2,8 +2,9 @@
 A fast train that loses dots
 ============================
 
-At low rates every dot is like the first. At rates for which the settle-out is incomplete, flight times
-and forces begin to differ, and at some rates dots are lost: here every second one.
+At low rates every dot is like the first. At rates for which the settle-out is
+incomplete, flight times and forces begin to differ, and at some rates dots are
+lost: here every second one.
 """
 
 import matplotlib.pyplot as plt
@@ -21,31 +22,40 @@ for panel, motion, name in zip(axes, (slow, fast), ("500 Hz", "1 kHz"), strict=T
     panel.axhline(1e6 * hammer.front, color="0.6", linewidth=0.8, zorder=0)
     for dot in motion.dots:
         colour = "C2" if dot.struck else "C3"
-        panel.plot(1e3 * dot.fired_at, 30.0, "^", color=colour, markersize=4, clip_on=False)
+        panel.plot(
+            1e3 * dot.fired_at, 30.0, "^", color=colour, markersize=4, clip_on=False
+        )
     panel.set(ylabel="displacement (µm)", title=name, ylim=(30.0, 320.0))
 axes[0].set_title("Nine pulses at 500 Hz; triangles: firings, green struck, red lost")
 axes[1].set_title("Nine pulses at 1 kHz")
 axes[1].set_xlabel("time (ms)")
 
 # %%
-# One line for each firing. The contact that makes a dot is the first one with the pack after the firing
-# and before the next; further ones are counted as extra contacts.
+# One line for each firing. The contact that makes a dot is the first one with the
+# pack after the firing and before the next; further ones are counted as extra
+# contacts.
 
 for dot in fast.dots:
     if dot.struck:
-        print(f"{dot.index}: flight time {1e6 * dot.flight_time:6.1f} us, peak force {dot.peak_force:5.2f} N")
+        flight = 1e6 * dot.flight_time
+        print(
+            f"{dot.index}: flight time {flight:6.1f} us, force {dot.peak_force:5.2f} N"
+        )
     else:
         print(f"{dot.index}: lost")
 
 # %%
-# Nine-pulse bursts at many rates. The abstract of the paper says in which order things go wrong: first
-# the flight times and forces vary, then strict periodicity is lost.
+# Nine-pulse bursts at many rates. The abstract of the paper says in which order
+# things go wrong: first the flight times and forces vary, then strict periodicity
+# is lost.
 
 rates = np.arange(400.0, 2001.0, 25.0)
 lost = np.zeros(len(rates))
 spread = np.full(len(rates), np.nan)
 for i, rate in enumerate(rates):
-    motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, rate=rate, pulses=9), points=2)
+    motion = ph.simulate(
+        hammer, ph.PulseTrain(hammer.waveform, rate=rate, pulses=9), points=2
+    )
     flights = [dot.flight_time for dot in motion.dots if dot.struck]
     lost[i] = sum(not dot.struck for dot in motion.dots)
     spread[i] = max(flights) - min(flights)

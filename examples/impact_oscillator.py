@@ -2,9 +2,10 @@
 The linear impact oscillator
 ============================
 
-The standard system of nonsmooth dynamics, built from replaceable parts: a mass on a linear spring,
-driven by a sinusoidal force, in front of a rigid stop. Between impacts its motion is known in closed
-form, so the run can be held against the exact solution.
+The standard system of nonsmooth dynamics, built from replaceable parts: a mass on a
+linear spring, driven by a sinusoidal force, in front of a rigid stop. Between
+impacts its motion is known in closed form, so the run can be held against the exact
+solution.
 """
 
 import math
@@ -23,24 +24,25 @@ oscillator = ph.Hammer.build(
 )
 
 # %%
-# A spring counts its travel from the backstop, b of equation (4). So that this one is relaxed at x = 0,
-# its force at the stop, the preload, is -1 N/m times the position of the stop.
+# A spring counts its travel from the backstop, b of equation (4). So that this one
+# is relaxed at x = 0, its force at the stop, the preload, is -1 N/m times the
+# position of the stop.
 
 drive = ph.SineForce("1 N", frequency=omega / (2.0 * math.pi), phase="90 deg")
 motion = ph.simulate(oscillator, drive, state=(0.0, 0.0), duration=60.0, points=6001)
 print(motion.status, len(motion.contacts), "impacts")
 
 # %%
-# The exact solution of x'' + x = cos(omega t) from a state (t0, x0, v0) is a forced oscillation and a
-# free one. The next impact is the first zero of x - b after t0: bracketed on a fine grid and refined by
-# bisection to the last bit. This is all there is to an oracle for this system; it shares nothing with
-# the program.
+# The exact solution of x'' + x = cos(omega t) from a state (t0, x0, v0) is a forced
+# oscillation and a free one. The next impact is the first zero of x - b after t0:
+# bracketed on a fine grid and refined by bisection to the last bit. This is all
+# there is to an oracle for this system; it shares nothing with the program.
 
 gain = 1.0 / (1.0 - omega**2)
 
 
 def exact(t, t0, x0, v0):
-    """Displacement and velocity at times t of the motion that starts at (t0, x0, v0)."""
+    """Displacement and velocity at times t of the motion from (t0, x0, v0) on."""
     a = x0 - gain * math.cos(omega * t0)
     b = v0 + gain * omega * math.sin(omega * t0)
     x = a * np.cos(t - t0) + b * np.sin(t - t0) + gain * np.cos(omega * t)
@@ -49,7 +51,7 @@ def exact(t, t0, x0, v0):
 
 
 def next_impact(start):
-    """Time of the first fall through the stop after the start of a piece, and the velocity there."""
+    """Time and velocity of the first fall through the stop in a piece."""
     grid = start[0] + np.linspace(1e-9, 20.0, 40_001)
     below = np.flatnonzero(exact(grid, *start)[0] < stop)
     low, high = (grid[below[0] - 1] if below[0] else start[0]), grid[below[0]]
@@ -67,11 +69,13 @@ while True:
 
 starts = np.array([piece[0] for piece in pieces])
 which = np.searchsorted(starts, motion.t, side="right") - 1
-x_exact = np.array([exact(t, *pieces[i])[0] for t, i in zip(motion.t, which, strict=True)])
+x_exact = np.array(
+    [exact(t, *pieces[i])[0] for t, i in zip(motion.t, which, strict=True)]
+)
 
 # %%
-# The two lie upon one another; the difference grows slowly, since errors made at one impact are carried
-# on.
+# The two lie upon one another; the difference grows slowly, since errors made at
+# one impact are carried on.
 
 figure, (above, below) = plt.subplots(2, 1, sharex=True, height_ratios=(3, 2))
 above.plot(motion.t, motion.x, label="printhammer")
@@ -84,12 +88,20 @@ below.set(xlabel="time (s)", ylabel="difference (m)")
 
 impacts = np.array([contact.t_in for contact in motion.contacts])
 print(f"largest difference of the motion    {np.abs(motion.x - x_exact).max():.1e} m")
-print(f"largest difference of impact times  {np.abs(impacts - starts[1:]).max():.1e} s")
+apart = np.abs(impacts - starts[1:]).max()
+print(f"largest difference of impact times  {apart:.1e} s")
 
 # %%
 # A tighter tolerance makes the difference smaller.
 
-finer = ph.simulate(oscillator, drive, state=(0.0, 0.0), duration=60.0, times=motion.t, tolerance=1e-13)
+finer = ph.simulate(
+    oscillator,
+    drive,
+    state=(0.0, 0.0),
+    duration=60.0,
+    times=motion.t,
+    tolerance=1e-13,
+)
 print(f"at the tolerance 1e-13              {np.abs(finer.x - x_exact).max():.1e} m")
 
 # %%

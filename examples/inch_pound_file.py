@@ -2,9 +2,9 @@
 A hammer file in inches and pounds
 ==================================
 
-Units exist at the edges of the program only. A hammer file may mix them freely; what is read is SI, and
-what is written back is the file as it was, comments and units included, with the replaced constants in
-the units in which they were given.
+Units exist at the edges of the program only. A hammer file may mix them freely;
+what is read is SI, and what is written back is the file as it was, comments and
+units included, with the replaced constants in the units in which they were given.
 """
 
 import tempfile
@@ -26,36 +26,36 @@ platen = { value = 15, unit = "mil", status = "stated", source = "feeler gauge" 
 [spring]
 law = "linear"
 Bs = { value = 3.2, unit = "lbf", status = "stated", source = "spring balance" }
-As = { value = 18.4, unit = "mil", status = "derived", source = "slope of the force over 10 mil" }
+As = { value = 18.4, unit = "mil", status = "derived", source = "slope over 10 mil" }
 
 [magnet]
 law = "inverse-root"
-F0 = { value = 0.55, unit = "lbf", status = "reconstructed", source = "fit" }
-Am = { value = 2.92, unit = "lbf^0.5 mil^0.25", status = "reconstructed", source = "fit" }
-Bm = { value = 0.622, unit = "lbf^0.5 mil^0.25/A", status = "reconstructed", source = "fit" }
+F0 = { value = 0.55, unit = "lbf", status = "derived", source = "fit" }
+Am = { value = 2.92, unit = "lbf^0.5 mil^0.25", status = "derived", source = "fit" }
+Bm = { value = 0.622, unit = "lbf^0.5 mil^0.25/A", status = "derived", source = "fit" }
 
 [pack]
 law = "power"
-stiffness = { value = 58, unit = "lbf", status = "assumed", source = "one-part form" }
+stiffness = { value = 58, unit = "lbf", status = "assumed", source = "one part" }
 front = { value = 8, unit = "mil", status = "stated", source = "feeler gauge" }
-thickness = { value = 7, unit = "mil", status = "derived", source = "platen less front" }
+thickness = { value = 7, unit = "mil", status = "derived", source = "15 - 8" }
 
 [backstop]
 law = "hertz"
-position = { value = 2, unit = "mil", status = "stated", source = "origin of the drawing" }
+position = { value = 2, unit = "mil", status = "stated", source = "drawing" }
 # A ball of 1/8 in on a flat, both of steel; e = 0.55 at 75 in/s.
 radius1 = { value = 0.0625, unit = "in", status = "stated", source = "ball gauge" }
-youngs_modulus1 = { value = 30000, unit = "ksi", status = "assumed", source = "steel" }
-youngs_modulus2 = { value = 30000, unit = "ksi", status = "assumed", source = "steel" }
+youngs_modulus1 = { value = 30000, unit = "ksi", status = "stated", source = "steel" }
+youngs_modulus2 = { value = 30000, unit = "ksi", status = "stated", source = "steel" }
 poisson_ratio1 = { value = 0.29, unit = "1", status = "assumed", source = "steel" }
 poisson_ratio2 = { value = 0.29, unit = "1", status = "assumed", source = "steel" }
-restitution = { value = 0.55, unit = "1", status = "assumed", source = "high-speed film" }
-restitution_speed = { value = 75, unit = "in/s", status = "assumed", source = "high-speed film" }
+restitution = { value = 0.55, unit = "1", status = "stated", source = "film" }
+restitution_speed = { value = 75, unit = "in/s", status = "stated", source = "film" }
 
 [waveform]
 shape = "half-sine"
-amplitude = { value = 1.2, unit = "A", status = "assumed", source = "current probe" }
-width = { value = 420, unit = "us", status = "assumed", source = "current probe" }
+amplitude = { value = 1.2, unit = "A", status = "stated", source = "probe" }
+width = { value = 420, unit = "us", status = "stated", source = "probe" }
 """
 
 folder = Path(tempfile.mkdtemp())
@@ -64,14 +64,17 @@ path.write_text(text, encoding="utf-8")
 hammer = ph.load(path)
 
 # %%
-# Each constant keeps the text of the file beside its SI value, and says where it comes from.
+# Each constant keeps the text of the file beside its SI value, and says where it
+# comes from.
 
 for constant in hammer.constants.values():
     given = f"{constant.value:g} {constant.unit}"
-    print(f"{constant.key:26s} {given:28s} {constant.si:11.5g} {constant.si_unit:16s} {constant.status}")
+    si = f"{constant.si:.5g} {constant.si_unit}"
+    print(f"{constant.key:27s} {given:25s} {si:25s} {constant.status}")
 
 # %%
-# Stiffness and damping of the backstop follow from the two bodies and from one measured rebound.
+# Stiffness and damping of the backstop follow from the two bodies and from one
+# measured rebound.
 
 print(f"k = {hammer.backstop.k:.4g} N/m^1.5, l = {hammer.backstop.l:.4g} N s/m^2.5")
 
@@ -81,25 +84,34 @@ print(f"k = {hammer.backstop.k:.4g} N/m^1.5, l = {hammer.backstop.l:.4g} N s/m^2
 print(hammer.warnings() or "nothing to warn about")
 motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
 dot = motion.dots[0]
-print(
-    f"peak force {dot.peak_force / 4.4482216152605:.2f} lbf, indentation {dot.indentation / 25.4e-6:.2f} mil"
-)
+print(f"peak force  {dot.peak_force / 4.4482216152605:.2f} lbf")
+print(f"indentation {dot.indentation / 25.4e-6:.2f} mil")
 figure, axes = plt.subplots()
 axes.plot(1e3 * motion.t, motion.x / 25.4e-6)
 for place in (hammer.position, hammer.front, hammer.platen):
     axes.axhline(place / 25.4e-6, color="0.7", linewidth=0.8, zorder=0)
-axes.set(xlabel="time (ms)", ylabel="displacement (mil)", title="The hammer of the workshop, fired once")
+axes.set(
+    xlabel="time (ms)",
+    ylabel="displacement (mil)",
+    title="The hammer of the workshop, fired once",
+)
 
 # %%
-# Replacing gives a new hammer and leaves the old one as it is. The fingerprint covers the physics only:
-# the same constant in another unit is the same hammer.
+# Replacing gives a new hammer and leaves the old one as it is. The fingerprint
+# covers the physics only: the same constant in another unit is the same hammer.
 
-stiffer = hammer.replace("pack.stiffness", "70 lbf", status="stated", source="four-part form")
+stiffer = hammer.replace(
+    "pack.stiffness", "70 lbf", status="stated", source="four-part form"
+)
 metric = hammer.replace("mass", hammer.mass)
-print(stiffer.fingerprint == hammer.fingerprint, metric.fingerprint == hammer.fingerprint)
+print(
+    stiffer.fingerprint == hammer.fingerprint,
+    metric.fingerprint == hammer.fingerprint,
+)
 
 # %%
-# Written and read back, nothing is lost: the comments are there, and one line has changed.
+# Written and read back, nothing is lost: the comments are there, and one line has
+# changed.
 
 stiffer.save(folder / "stiffer.toml")
 again = ph.load(folder / "stiffer.toml")

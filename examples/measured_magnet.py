@@ -2,10 +2,11 @@
 A magnet from a measured force table
 ====================================
 
-Equation (3) of the paper is a fit to measured forces. The table itself will do as well: forces on a
-grid of displacements and currents, read from a CSV file and joined by a bicubic spline, which is smooth
-enough for the integrator. Here a table is made from equation (3), so that the result can be compared
-with what it should be.
+Equation (3) of the paper is a fit to measured forces. The table itself will do as
+well: forces on a grid of displacements and currents, read from a CSV file and
+joined by a bicubic spline, which is smooth enough for the integrator. Here a table
+is made from equation (3), so that the result can be compared with what it should
+be.
 """
 
 import tempfile
@@ -21,7 +22,7 @@ folder = Path(tempfile.mkdtemp())
 
 
 def write_table(path: Path, columns: int) -> None:
-    """Write the forces at 5 currents and at displacements that are closer where the force is steep."""
+    """Write the forces at 5 currents and at displacements closer where it is steep."""
     magnet = hammer.magnet
     lines = ["displacement [um],current [A],force [N]"]
     for x in np.geomspace(25.4e-6, 420e-6, columns):
@@ -52,20 +53,24 @@ below.plot(1e3 * exact.t, 1e9 * (spline.x - exact.x), color="C1")
 below.set(xlabel="time (ms)", ylabel="difference (nm)")
 
 # %%
-# A spline through more points comes closer, with the fourth power of the spacing.
+# A spline through more points comes closer, with the fourth power of the spacing;
+# here over the first 600 us.
 
 counts = (13, 25, 49, 97)
 largest = []
 for count in counts:
     write_table(folder / f"forces-{count}.csv", count)
-    other = hammer.replace("magnet", {"law": "table", "file": str(folder / f"forces-{count}.csv")})
+    other = hammer.replace(
+        "magnet", {"law": "table", "file": str(folder / f"forces-{count}.csv")}
+    )
     motion = ph.simulate(other, drive, duration="600 us", times=exact.t)
     largest.append(np.abs(motion.x - exact.x[: len(motion.t)]).max())
-    print(f"{count:3d} displacements: largest difference over 600 us {1e9 * largest[-1]:.4f} nm")
+    print(f"{count:3d} displacements: largest difference {1e9 * largest[-1]:.4f} nm")
 
 # %%
-# Nothing is extrapolated. A run that leaves the table ends there, with a status that says so: here the
-# armature is thrown at the backstop so fast that it is compressed beyond the table.
+# Nothing is extrapolated. A run that leaves the table ends there, with a status
+# that says so: here the armature is thrown at the backstop so fast that it is
+# compressed beyond the table.
 
 thrown = ph.simulate(measured, drive, state=(hammer.front, -6.0), duration="1 ms")
 print(thrown.status, "-", thrown.message)

@@ -2,9 +2,10 @@
 Two pulses
 ==========
 
-A second pulse while the armature still settles out meets it at some phase of its rebounds. Hendriks
-(1983), figure 6, shows that 40 microseconds decide: fired 660 microseconds after the first, the second
-dot is lost; at 700 microseconds it is stronger than the first.
+A second pulse while the armature still settles out meets it at some phase of its
+rebounds. Hendriks (1983), figure 6, shows that 40 microseconds decide: fired 660
+microseconds after the first, the second dot is lost; at 700 microseconds it is
+stronger than the first.
 """
 
 import matplotlib.pyplot as plt
@@ -20,7 +21,8 @@ for delay in delays:
     motions[delay] = ph.simulate(hammer, drive, duration="2 ms")
 
 # %%
-# The currents of overlapping pulses would add; here the first has ended when the second begins.
+# The currents of overlapping pulses would add; here the first has ended when the
+# second begins.
 
 figure, axes = plt.subplots()
 for delay, motion in motions.items():
@@ -28,29 +30,34 @@ for delay, motion in motions.items():
 for place in (hammer.position, hammer.front, hammer.platen):
     axes.axhline(1e6 * place, color="0.7", linewidth=0.8, zorder=0)
 axes.set(
-    xlabel="time (ms)", ylabel="displacement (µm)", title="Two pulses", xlim=(0.0, 2.0), ylim=(30.0, 400.0)
+    xlabel="time (ms)",
+    ylabel="displacement (µm)",
+    title="Two pulses",
+    xlim=(0.0, 2.0),
+    ylim=(30.0, 400.0),
 )
 axes.legend(loc="upper right")
 
 # %%
-# The dots, and the state of the armature at the second firing. A dot is lost when no pack contact
-# begins between its firing and the next one.
+# The dots, and the state of the armature at the second firing. A dot is lost when
+# no pack contact begins between its firing and the next one.
 
 for delay, motion in motions.items():
     first, second = motion.dots
     _, x, v = motion.strobe
-    print(
-        f"{delay}: at the second firing x - b = {1e6 * (x[1] - hammer.position):+.2f} um, v = {v[1]:+.3f} m/s"
-    )
+    way = 1e6 * (x[1] - hammer.position)
+    print(f"{delay}: at the second firing x - b = {way:+.2f} um, v = {v[1]:+.3f} m/s")
     if second.struck:
         ratio = second.peak_force / first.peak_force
-        print(f"        {ratio:.3f} times the peak force, flight time {1e6 * second.flight_time:.1f} us")
+        flight = 1e6 * second.flight_time
+        print(f"        {ratio:.3f} times the peak force, flight time {flight:.1f} us")
     else:
-        print(f"        lost, largest displacement {1e6 * motion.peak_after(1)[1]:.1f} um")
+        largest = 1e6 * motion.peak_after(1)[1]
+        print(f"        lost, largest displacement {largest:.1f} um")
 
 # %%
-# The same for all delays. Each run is independent and takes milliseconds, so a loop will do. Gaps are
-# lost dots.
+# The same for all delays. Each run is independent and takes milliseconds, so a loop
+# will do. Gaps are lost dots.
 
 swept = np.arange(500e-6, 1500e-6, 5e-6)
 peaks = np.full(len(swept), np.nan)
@@ -64,7 +71,10 @@ for i, delay in enumerate(swept):
 figure, (above, below) = plt.subplots(2, 1, sharex=True)
 above.plot(1e6 * swept, peaks, ".", markersize=4)
 above.axhline(motions["660 us"].dots[0].peak_force, color="0.6", linewidth=0.8)
-above.set(ylabel="peak force (N)", title="The second dot against the delay; grey: the first dot")
+above.set(
+    ylabel="peak force (N)",
+    title="The second dot against the delay; grey: the first dot",
+)
 below.plot(1e6 * swept, 1e6 * flights, ".", markersize=4, color="C1")
 below.axhline(1e6 * motions["660 us"].dots[0].flight_time, color="0.6", linewidth=0.8)
 below.set(xlabel="delay of the second pulse (µs)", ylabel="flight time (µs)")
