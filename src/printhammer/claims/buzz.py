@@ -36,12 +36,13 @@ def _told(train: BuzzTrain) -> str:
 
 
 @measures("buzz_printing", *_WHOLE)
-def buzz_printing(context: Context, _claim: Claim) -> Measured:
+def buzz_printing(context: Context, claim: Claim) -> Measured:
     """Dots of the best train without a touch of the backstop, and their forces."""
     found = buzz_search(context)
     train = found.best
     if train is None or not train.count:
-        return Measured({"dots": 0, "trains_tried": found.tried}, f"No train does: {found.reason}.")
+        nothing = {**dict.fromkeys(claim.band), "dots": 0, "trains_tried": found.tried}
+        return Measured(nothing, f"No train does: {found.reason}.")
     motion = context.run(PulseTrain(context.waveform, at=train.times), train.times[-1] + TAIL)
     dots = motion.dots[train.first : train.first + train.count]
     struck = [dot.fired_at + dot.flight_time for dot in dots if dot.flight_time is not None]
