@@ -58,7 +58,7 @@ axes.set(
 )
 
 # %%
-# The residual follows the tolerance of the run. At the default of 2e-11 it is far
+# The residual follows the tolerance of the run. At the default of 2e-11 it is
 # below a billionth of the throughput.
 
 tolerances = [10.0**-k for k in range(4, 14)]

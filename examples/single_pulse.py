@@ -98,4 +98,10 @@ axes.set(
 )
 axes.legend()
 
+# %%
+# The motion also draws itself, with both unit systems on its axes as in the paper. The
+# result is a figure of matplotlib, to be saved or changed.
+
+picture = motion.plot(until="2 ms")
+
 plt.show()

@@ -36,7 +36,7 @@ axes.set(
     xlim=(0.0, 2.0),
     ylim=(30.0, 400.0),
 )
-axes.legend(loc="upper right")
+axes.legend(loc="center right")
 
 # %%
 # The dots, and the state of the armature at the second firing. A dot is lost when
