@@ -177,6 +177,10 @@ def longest_still_step(
     """
     t, x, v, _a = start
     small = 1e-5 * control[0]
+    if HAS_PACK and mode in (LOADING, UNLOADING, RELOADING):
+        small = min(small, 1e-3 * (x - hammer[FRONT]))
+    if small <= 1e-14 * abs(x):
+        return math.inf
     rise = acceleration(t, x + small, v, mode, memory, hammer, drive)
     slope = abs(rise - acceleration(t, x - small, v, mode, memory, hammer, drive)) / (2.0 * small)
     return 2.0 / math.sqrt(slope) if slope > 0.0 else math.inf

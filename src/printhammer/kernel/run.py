@@ -62,6 +62,9 @@ STILL = 1e-12
 """Share of the scales below which the motion in one characteristic time counts as none."""
 
 
+STUCK = 1000
+"""Steps in a row that do not move time after which a run is given up."""
+
 WAIT = 0.005
 """Shortest wait, in characteristic times, before a resting armature is looked at again."""
 
@@ -287,6 +290,8 @@ def run(
     )
     entered = True
     wait = WAIT * time_scale
+    stuck = 0
+    t_before = t - time_scale
     while t < t_end and status == OK:
         t_next = min(edge, t_end)
         if t_next <= t:
@@ -301,6 +306,11 @@ def run(
         steps += 1
         if steps > max_steps:
             status = STEP_LIMIT
+            break
+        stuck = stuck + 1 if t == t_before else 0
+        t_before = t
+        if stuck > STUCK:
+            status = STEP_UNDERFLOW
             break
         switch, left = NO_SWITCH, OK
         if mode == BACKSTOP:
