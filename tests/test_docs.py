@@ -1,5 +1,6 @@
 """The documentation: what it names exists, it builds without a warning, it fetches nothing from elsewhere."""
 
+import os
 import re
 import subprocess
 import sys
@@ -16,6 +17,7 @@ PAGES = sorted(path for path in DOCS.rglob("*.md") if "gallery" not in path.part
 # A path of the repository in code quotes, possibly with the name of a test behind it.
 NAMED = re.compile(r"`((?:src|tests|docs|examples|benchmarks)/[\w./*-]+?)(?:::(\w+))?`")
 LINKED = re.compile(r"\]\((?!https?:|#)([^)#]+)(?:#[^)]*)?\)")
+BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EXTERNAL = re.compile(r"(?:https?:)?//")
 
 
@@ -64,6 +66,24 @@ def test_every_public_name_is_in_the_reference() -> None:
     text = (DOCS / "api.md").read_text("utf-8")
     described = set(re.findall(r"^\.\. auto(?:class|function|exception):: (\w+)", text, re.MULTILINE))
     assert set(ph.__all__) - {"__version__"} <= described
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if BLOCK.search(page.read_text("utf-8"))], ids=lambda path: path.stem
+)
+def test_the_code_on_a_page_runs(page: Path, tmp_path: Path) -> None:
+    (tmp_path / "my-hammer.toml").write_text(ph.load("hendriks-1983").to_toml(), "utf-8")
+    script = "\n".join(BLOCK.findall(page.read_text("utf-8")))
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT / "examples"), "MPLCONFIGDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
 
 
 class Requests(HTMLParser):
