@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.pulses import Drive, drive_value, pass_edges
 
 GOLDEN = 0.3819660112501051
-SAMPLES = 6
+SAMPLES = 4
 """Samples in each step of a contact among which its largest depth and force are looked for."""
 
 
@@ -186,7 +186,7 @@ def refined(
     t2 = high - GOLDEN * (high - low)
     f1 = depth_and_force(t1, node, surface, hammer, drive)[which]
     f2 = depth_and_force(t2, node, surface, hammer, drive)[which]
-    for _ in range(42):
+    for _ in range(36):
         if f1 > f2:
             high, t2, f2 = t2, t1, f1
             t1 = low + GOLDEN * (high - low)
@@ -216,44 +216,48 @@ def peaks(
     `contacts` are as recorded; the steps of a contact begin at its node and end at the first node not before
     its end.
     """
-    first, last = 0, 0
     for row in range(contacts.shape[0]):
         surface = int(contacts[row, 0])
-        i = int(contacts[row, 5])
-        deepest = (nodes[i, 0], 0.0)
-        strongest = 0.0
-        while i + 1 < nodes.shape[0] and not (nodes[i, 0] >= contacts[row, 3]):
-            node = nodes[i]
+        begin = int(contacts[row, 5])
+        end = begin
+        best = (begin, 0)
+        strongest = (begin, 0)
+        deepest_value = 0.0
+        strongest_value = 0.0
+        first, last = 0, 0
+        while end + 1 < nodes.shape[0] and not (nodes[end, 0] >= contacts[row, 3]):
+            node = nodes[end]
             first, last, _edge = pass_edges(node[0], firings, pieces, replace, under_way, first, last, live)
-            start, stop = node[0], nodes[i + 1, 0]
-            best = 0
-            best_force = 0
-            best_value = -1.0
-            best_force_value = -1.0
             for j in range(SAMPLES + 1):
-                depth, force = depth_and_force(
-                    start + (stop - start) * j / SAMPLES, node, surface, hammer, live
-                )
-                if depth > best_value:
-                    best, best_value = j, depth
-                if force > best_force_value:
-                    best_force, best_force_value = j, force
-            # An extremum inside the step may lie beside the best sample and exceed all values so far.
-            if best_value >= 0.9 * deepest[1] and stop > start:
-                low = start + (stop - start) * max(best - 1, 0) / SAMPLES
-                high = start + (stop - start) * min(best + 1, SAMPLES) / SAMPLES
-                found = refined(0, low, high, node, surface, hammer, live)
-                if best_value >= found[1]:
-                    found = (start + (stop - start) * best / SAMPLES, best_value)
-                if found[1] > deepest[1]:
-                    deepest = found
-            if best_force_value >= 0.9 * strongest and stop > start:
-                low = start + (stop - start) * max(best_force - 1, 0) / SAMPLES
-                high = start + (stop - start) * min(best_force + 1, SAMPLES) / SAMPLES
-                strongest = max(
-                    strongest, best_force_value, refined(1, low, high, node, surface, hammer, live)[1]
-                )
-            i += 1
-        out[row, 0] = deepest[0]
-        out[row, 1] = deepest[1]
-        out[row, 2] = strongest
+                t = node[0] + (nodes[end + 1, 0] - node[0]) * j / SAMPLES
+                depth, force = depth_and_force(t, node, surface, hammer, live)
+                if depth > deepest_value:
+                    best, deepest_value = (end, j), depth
+                if force > strongest_value:
+                    strongest, strongest_value = (end, j), force
+            end += 1
+        out[row, 0] = nodes[best[0], 0]
+        if end > best[0]:
+            out[row, 0] += (nodes[best[0] + 1, 0] - nodes[best[0], 0]) * best[1] / SAMPLES
+        out[row, 1] = deepest_value
+        out[row, 2] = strongest_value
+        for which in range(2):
+            i, j = best if which == 0 else strongest
+            # The extremum lies beside the best sample, perhaps in the step before or after it.
+            for beside in range(-1, 2):
+                k = i + beside
+                if k < begin or k >= end or (beside < 0 and j > 0) or (beside > 0 and j < SAMPLES):
+                    continue
+                part = (nodes[k + 1, 0] - nodes[k, 0]) / SAMPLES
+                lowest = j - 1 if beside == 0 else (SAMPLES - 1 if beside < 0 else 0)
+                highest = j + 1 if beside == 0 else (SAMPLES if beside < 0 else 1)
+                low = nodes[k, 0] + part * max(lowest, 0)
+                high = nodes[k, 0] + part * min(highest, SAMPLES)
+                if not high > low:
+                    continue
+                pass_edges(nodes[k, 0], firings, pieces, replace, under_way, 0, 0, live)
+                t, value = refined(which, low, high, nodes[k], surface, hammer, live)
+                if value > out[row, 1 + which]:
+                    out[row, 1 + which] = value
+                    if which == 0:
+                        out[row, 0] = t
