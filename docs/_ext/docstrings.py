@@ -1,0 +1,36 @@
+"""What the numpydoc reader of Sphinx makes of three kinds of docstrings here, put right."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+# Napoleon runs at 500, the default.
+BEFORE, AFTER = 400, 600
+LETTER = re.compile(r"^(:param [^:]+: )(?=[A-Za-z]\.$)")
+NAMES = re.compile(r"^:(?:ivar|vartype) \w+(?:, \w+)+:")
+written: dict[str, list[str]] = {}
+
+
+def keep(_app: Sphinx, what: str, name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+    """Remember a property's docstring as it is written."""
+    if what == "property" and not any(re.match(r"^\s*-{3,}\s*$", line) for line in lines):
+        written[name] = list(lines)
+
+
+def restore(_app: Sphinx, _what: str, name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+    """Undo three readings: "How it ended: ..." as a type, "N." as a list, "a, b" as a type and a name."""
+    if name in written:
+        lines[:] = written.pop(name)
+    lines[:] = [LETTER.sub(r"\1\\", line) for line in lines]
+    lines[:] = [NAMES.sub(lambda found: found[0].replace(", ", ","), line) for line in lines]
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Connect to autodoc."""
+    app.connect("autodoc-process-docstring", keep, priority=BEFORE)
+    app.connect("autodoc-process-docstring", restore, priority=AFTER)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
