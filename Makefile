@@ -57,7 +57,7 @@ docs: $(INSTALLED) ## the documentation, into build/docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs build/docs
 
 bench: $(INSTALLED) ## the benchmark table
-	$(BIN)/python benchmarks/single_run.py
+	$(BIN)/python benchmarks/single_run.py --markdown docs/benchmarks.md
 
 # Resolve again; the files name versions and hashes only, never an address.
 LOCK := build/lock-venv/bin/uv pip compile --quiet --universal --fork-strategy fewest --python-version 3.11 \

@@ -32,6 +32,8 @@ FAR: Final = 1e4
 
 _NODES: Final = 2048
 _CONTACTS: Final = 256
+_NODES_A_FLIGHT: Final = 40
+_MOST_FLIGHTS: Final = 1e6
 
 
 @dataclass(frozen=True)
@@ -180,7 +182,10 @@ class Problem:
 
     def run(self, end: float) -> Record:
         """Integrate to time `end`, s."""
-        capacity, contact_capacity = _NODES, _CONTACTS
+        # A generous guess; memory that is not written to costs nothing, a repeated run does.
+        flights = min(max(end - self.start, 0.0) * self.scales[1] / self.scales[0], _MOST_FLIGHTS)
+        capacity = _NODES + int(_NODES_A_FLIGHT * flights)
+        contact_capacity = _CONTACTS + int(flights)
         while True:
             firings, pieces, replace, under_way, live = self._drive_arrays()
             nodes = np.empty((capacity, 5))

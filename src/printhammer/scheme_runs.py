@@ -78,12 +78,12 @@ class SchemeProblem(Problem):
         module = self._modules.get(name.partition("_")[0], absent)
         return getattr(module, name, None) or getattr(absent, name)
 
-    def run(self, end: float) -> Record:
-        """Integrate to time `end`, s; a run that diverged has the status of a step that cannot be taken."""
+    def integrate(self, end: float) -> schemes_1983.SchemeRun:
+        """Integrate to time `end`, s, and return the ends of the steps as the scheme leaves them."""
         hammer = self.hammer
-        run = schemes_1983.integrate(
+        return schemes_1983.integrate(
             {name: self._law(name) for name in schemes_1983.LAW_NAMES},
-            {role: self._packed[role] for role in hammer.parts},
+            self._packed,
             self.drive.kernel_arrays(),
             mass=hammer.mass,
             front=hammer.front if hammer.front is not None else math.inf,
@@ -95,6 +95,10 @@ class SchemeProblem(Problem):
             rigid=self._rigid,
             reload_along_unloading=self.laws.reload_along_unloading,
         )
+
+    def run(self, end: float) -> Record:
+        """Integrate to time `end`, s; a run that diverged has the status of a step that cannot be taken."""
+        run = self.integrate(end)
         nodes = self._nodes(run.t, run.x, run.v)
         return Record(OK if run.status == "ok" else STEP_UNDERFLOW, nodes, _contacts(nodes), len(nodes) - 1)
 

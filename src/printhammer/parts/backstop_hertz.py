@@ -37,7 +37,7 @@ def backstop_elastic(c: Any, w: float) -> float:
     float
         Force, N, not negative.
     """
-    return float(c[0] * w * w * w)
+    return float(c[0] * (w * w * w))
 
 
 def backstop_viscous(c: Any, w: float, v: float) -> float:
@@ -58,7 +58,7 @@ def backstop_viscous(c: Any, w: float, v: float) -> float:
     rate = c[1] * v
     if rate > c[0] and c[2] == 0.0:
         rate = c[0]
-    return float(-rate * w * w * w)
+    return float(-rate * (w * w * w))
 
 
 def backstop_energy(c: Any, w: float) -> float:
