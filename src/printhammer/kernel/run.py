@@ -42,7 +42,7 @@ from printhammer.kernel.modes import (
 if TYPE_CHECKING:
     from printhammer.kernel.contact import advance_contact, contact_rate
     from printhammer.kernel.forces import Hammer, acceleration
-    from printhammer.kernel.landing import State, advance, land_on_level
+    from printhammer.kernel.landing import State, advance, land_on_level, level_switch
     from printhammer.kernel.laws import (
         BACKSTOP_PULLS,
         HAS_BACKSTOP,
@@ -132,7 +132,7 @@ def out_of_bounds(x: float, bounds: Any) -> int:
 
 
 @compiled
-def at_bound(
+def left_range(
     start: State,
     end: State,
     mode: int,
@@ -141,16 +141,23 @@ def at_bound(
     drive: Drive,
     control: Control,
     bounds: Any,
-) -> State:
-    """Return the state at which a step from `start` to `end` leaves the range, the last one inside it."""
-    sign = 1.0 if end[1] > bounds[1] else -1.0
-    bound = bounds[1] if sign > 0.0 else bounds[0]
-    if start[1] == bound:
-        return start
-    fraction = (bound - start[1]) / (end[1] - start[1])
-    return land_on_level(
-        start, end[0] - start[0], fraction, 1.0, bound, sign, mode, memory, hammer, drive, control
-    )
+) -> tuple[bool, State]:
+    """Tell whether a step from `start` to `end` leaves the range, even briefly, and the state there."""
+    h = end[0] - start[0]
+    for side in range(2):
+        bound = bounds[side]
+        sign = 1.0 if side == 1 else -1.0
+        # A backstop that does not lie outside the range keeps the armature off its lower end.
+        if math.isinf(bound) or h <= 0.0 or (HAS_BACKSTOP and side == 0 and mode == FREE):
+            continue
+        if start[1] == bound and sign * end[1] > sign * bound:
+            return True, start
+        code, fraction, upper = level_switch(start, end, h, bound, sign, mode, memory, hammer, drive, control)
+        if code == REACHED_FRONT:
+            return True, land_on_level(
+                start, h, fraction, upper, bound, sign, mode, memory, hammer, drive, control
+            )
+    return out_of_bounds(end[1], bounds) == RANGE_LEFT, end
 
 
 @compiled
@@ -364,9 +371,9 @@ def run(
             h = sensible_step(h, x, v, a, mode, hammer)
             start = (t, x, v, a)
             switch, end, h = advance(start, h, t_next, mode, memory, peak, hammer, drive, control)
-            if switch != FAILED and out_of_bounds(end[1], bounds) == RANGE_LEFT:
-                end = at_bound(start, end, mode, memory, hammer, drive, control, bounds)
-                switch, left = NO_SWITCH, RANGE_LEFT
+            outside, bound_state = left_range(start, end, mode, memory, hammer, drive, control, bounds)
+            if switch != FAILED and outside:
+                end, switch, left = bound_state, NO_SWITCH, RANGE_LEFT
             t, x, v, a = end
             if fresh and mode == FREE:
                 h_free = h
