@@ -1,0 +1,143 @@
+"""The kernel against the reference for all combinations of parts and kinds of drives.
+
+Few combinations are worth the time to compile them: the fast tests and the full product run the same source
+as plain Python, the tests on traps and oracles run machine code, and the slow tests both.
+"""
+
+import functools
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests import hammers
+from tests.hammers import BACKSTOPS, PACKS, SPRINGS, STOP, compare, drives, interpreted, made_of
+
+import printhammer as ph
+from printhammer import problem
+
+DURATION = 2.4e-3
+PAIRS = [pair for pair in itertools.product(PACKS, BACKSTOPS) if pair != ("", "")]
+ALL = list(itertools.product(["inverse-root", "table", ""], SPRINGS, PACKS, BACKSTOPS))
+
+
+@pytest.fixture(autouse=True)
+def _few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(problem, "MAX_STEPS", 100_000)
+
+
+@functools.cache
+def table(folder: Path) -> dict[str, str]:
+    return hammers.magnet_table(folder)
+
+
+def hammer_of(magnet: str, spring: str, pack: str, backstop: str, folder: Path) -> ph.Hammer:
+    chosen = table(folder) if magnet == "table" else hammers.MAGNETS[magnet]
+    return made_of(magnet=chosen, spring=SPRINGS[spring], pack=PACKS[pack], backstop=BACKSTOPS[backstop])
+
+
+def check(hammer: ph.Hammer, drive: ph.PulseTrain | ph.SineForce) -> None:
+    """Motion, touches and ledger; the start is beyond the backstop, moving, so that all hammers have one."""
+    state = STOP + 20e-6, -0.4
+    found = compare(hammer, drive, DURATION, state=state, sensitive=True)
+    motion, truth = found.motion, found.truth
+    if motion.status == "runaway":
+        # The reference has no such limit.
+        assert truth.status == "ok"
+    elif found.horizon == DURATION:
+        assert motion.status == truth.status
+    tabulated = hammer.magnet is not None and hammer.magnet.law == "table"
+    # The knots of a table are no switches.
+    assert found.error < (5e-8 if tabulated else 1e-8)
+    for surface in ("pack", "backstop"):
+        mine, theirs = found.touches(surface)
+        assert len(mine) == len(theirs)
+    fastest = float(np.abs(motion.v).max())
+    size = max(motion.energy.throughput, 0.5 * hammer.mass * fastest**2)
+    if motion.ok:
+        assert abs(motion.energy.residual) < (1e-7 if tabulated else 1e-8) * size
+
+
+def kind_of(magnet: str) -> str:
+    return "current" if magnet else "force"
+
+
+@pytest.mark.parametrize(("pack", "backstop"), PAIRS, ids=lambda name: name or "none")
+def test_pairs_of_contacts(pack: str, backstop: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Each pack with each backstop, the other parts and the drives in turn."""
+    turn = PAIRS.index((pack, backstop))
+    magnet = ["inverse-root", "", "table"][turn % 3]
+    spring = list(SPRINGS)[turn % 2]
+    hammer = hammer_of(magnet, spring, pack, backstop, tmp_path_factory.getbasetemp())
+    chosen = list(drives(kind_of(magnet)).values())
+    with interpreted():
+        check(hammer, chosen[turn % len(chosen)])
+
+
+def test_the_pairs_meet_every_drive() -> None:
+    names = set()
+    for turn in range(len(PAIRS)):
+        kind = kind_of(["inverse-root", "", "table"][turn % 3])
+        chosen = list(drives(kind))
+        names.add(chosen[turn % len(chosen)])
+    assert names == set(drives("force"))
+
+
+@pytest.mark.parametrize("drive", drives("current"))
+def test_every_current_drives_the_shipped_hammer(drive: str) -> None:
+    check(hammers.shipped(), drives("current")[drive])
+
+
+@pytest.mark.parametrize("drive", drives("force"))
+def test_every_force_drives_a_hammer_without_magnet(drive: str) -> None:
+    check(hammers.shelf(-4.0), drives("force")[drive])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("magnet", ["inverse-root", "table", ""], ids=lambda name: name or "none")
+@pytest.mark.parametrize("spring", SPRINGS, ids=lambda name: name or "none")
+@pytest.mark.parametrize("pack", PACKS, ids=lambda name: name or "none")
+def test_all_combinations_of_parts(
+    magnet: str, spring: str, pack: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    chosen = list(drives(kind_of(magnet)).values())
+    for backstop in BACKSTOPS:
+        turn = ALL.index((magnet, spring, pack, backstop))
+        hammer = hammer_of(magnet, spring, pack, backstop, folder)
+        with interpreted():
+            for shift in (0, 5):
+                check(hammer, chosen[(turn + shift) % len(chosen)])
+
+
+COMPILED = [
+    ("inverse-root", "linear", "power", "hertz"),
+    ("inverse-root", "linear", "curve", "hertz-no-pull"),
+    ("", "preload", "power", "rigid"),
+    ("", "preload", "dashpot", "elastomer"),
+    ("", "preload", "dashpot-pull", "elastomer-pull"),
+    ("table", "linear", "dashpot", "rigid"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("parts", COMPILED, ids="-".join)
+def test_every_drive_on_compiled_combinations(
+    parts: tuple[str, str, str, str], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    hammer = hammer_of(*parts, tmp_path_factory.getbasetemp())
+    for drive in drives(kind_of(parts[0])).values():
+        check(hammer, drive)
+
+
+def test_machine_code_and_plain_python_agree() -> None:
+    """Contraction of multiply and add is the only freedom of the compiler."""
+    hammer = hammers.shipped()
+    drive = ph.PulseTrain(hammer.waveform)
+    times = np.linspace(0.0, 2e-3, 201)
+    compiled = ph.simulate(hammer, drive, times=times)
+    with interpreted():
+        plain = ph.simulate(hammer, drive, times=times)
+        np.testing.assert_allclose(plain.x, compiled.x, rtol=0.0, atol=1e-9 * hammers.STROKE)
+        assert len(plain.contacts) == len(compiled.contacts)
+    assert abs(plain.steps - compiled.steps) <= 2
