@@ -9,6 +9,7 @@ from tests.hammers import FRONT, MASS, STOP, STROKE
 from tests.truth import oracles
 
 import printhammer as ph
+from printhammer.contacts import Contact
 from printhammer.kernel.reference import reference
 from printhammer.waveforms import HalfSine, Rectangle, Trapezoid
 
@@ -27,7 +28,7 @@ def falling(depth: float, speed: float = 1.0) -> tuple[float, float]:
     return STOP - depth + speed**2 / (2.0 * PULL), -speed
 
 
-def touches(motion: ph.Motion) -> list[ph.motion.Contact]:
+def touches(motion: ph.Motion) -> list[Contact]:
     return [c for c in motion.contacts if c.surface == "backstop" and not c.initial]
 
 

@@ -12,6 +12,7 @@ from tests import hammers
 from tests.hammers import FRONT, MASS, STOP, STROKE
 
 import printhammer as ph
+from printhammer.contacts import Contact
 from printhammer.kernel.landing import step_factor
 from printhammer.kernel.reference import reference
 from printhammer.waveforms import Rectangle, Trapezoid
@@ -31,7 +32,7 @@ def thrown(excess: float, speed: float = 1.0) -> tuple[float, float]:
     return FRONT + excess - speed**2 / (2.0 * PULL), speed
 
 
-def pack_contacts(motion: ph.Motion) -> list[ph.motion.Contact]:
+def pack_contacts(motion: ph.Motion) -> list[Contact]:
     return [c for c in motion.contacts if c.surface == "pack"]
 
 
