@@ -38,6 +38,8 @@ STROKE = FRONT - STOP
 THICKNESS = 177.8e-6
 TRUTH = 1e-14
 """Tolerance of a reference that is taken for the truth."""
+SLOW = 1e-4
+"""Speed, m/s, below which touches are not counted one by one."""
 
 MAGNETS: dict[str, Part | None] = {"inverse-root": InverseRootMagnet(F0=2.47, Am=0.437, Bm=0.0931), "": None}
 SPRINGS: dict[str, Part | None] = {
@@ -198,9 +200,20 @@ class Comparison:
     horizon: float
 
     def touches(self, surface: str) -> tuple[list[float], list[float]]:
-        """Return the times of all touches before the horizon, of the motion and of the reference, s."""
-        mine = [c.t_in for c in self.motion.contacts if c.surface == surface and not c.initial]
-        theirs = [event.time for event in self.truth.events if event.kind == f"{surface}-touch"]
+        """Return the times of all touches before the horizon, of the motion and of the reference, s.
+
+        The last bounces on a rigid backstop, below 0.1 mm/s, are left out: both stop counting somewhere.
+        """
+        mine = [
+            c.t_in
+            for c in self.motion.contacts
+            if c.surface == surface and not c.initial and abs(c.v_in) > SLOW
+        ]
+        theirs = [
+            event.time
+            for event in self.truth.events
+            if event.kind == f"{surface}-touch" and abs(event.v) > SLOW
+        ]
         # A touch at the horizon itself may fall on either side of it.
         end = self.horizon * (1.0 - 1e-6)
         return [t for t in mine if t < end], [t for t in theirs if t < end]
