@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from printhammer.drive import Burst, PulseTrain, SineForce
+    from printhammer.ensemble import Ensemble, EnsembleResult
     from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
     from printhammer.errors import InputError, PrinthammerError
     from printhammer.hammer import Hammer, load
@@ -24,6 +25,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Burst",
+    "Ensemble",
+    "EnsembleResult",
     "Hammer",
     "InputError",
     "Motion",
@@ -42,6 +45,8 @@ __all__ = [
 
 _HOME = {
     "Burst": "drive",
+    "Ensemble": "ensemble",
+    "EnsembleResult": "ensemble",
     "Hammer": "hammer",
     "InputError": "errors",
     "Motion": "motion",

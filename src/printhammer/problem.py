@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.kernel import layout
+from printhammer.kernel import carry, layout
 from printhammer.kernel.laws import Laws
 from printhammer.kernel.modes import OK, STATUS_NAMES, STEP_LIMIT
 
@@ -61,6 +61,13 @@ class Record:
     def status_name(self) -> str:
         """Name of the status."""
         return STATUS_NAMES[self.status]
+
+
+def fresh_carry(pause_after: float = math.inf) -> FloatArray:
+    """Return what the kernel's `run` needs to begin, and to pause after so many nodes."""
+    array = np.zeros(carry.SIZE)
+    array[carry.PAUSE_AFTER] = pause_after
+    return array
 
 
 def laws_of(hammer: Hammer, drive: Drive) -> Laws:
@@ -206,6 +213,7 @@ class Problem:
                 live,
                 nodes,
                 contacts,
+                fresh_carry(),
             )
             if used <= capacity and touched <= contact_capacity:
                 return Record(status, nodes[:used].copy(), contacts[:touched].copy(), steps)

@@ -50,8 +50,12 @@ RANGE_LEFT = 1
 RUNAWAY = 2
 STEP_LIMIT = 3
 STEP_UNDERFLOW = 4
+PAUSED = 5
+"""Not the end of a run: it goes on with the next call."""
+LOST = 6
+"""Not the end of a run: its worker did not come back."""
 
-STATUS_NAMES = ("ok", "range left", "runaway", "step limit", "step underflow")
+STATUS_NAMES = ("ok", "range left", "runaway", "step limit", "step underflow", "paused", "worker lost")
 """Public names of the statuses, by code."""
 
 # Surfaces of a contact.

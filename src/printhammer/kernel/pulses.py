@@ -88,3 +88,21 @@ def pass_edges(
         i += LIVE_WIDTH
     live[0] = last - first
     return first, last, edge
+
+
+@compiled
+def edges_at(
+    t: float, firings: Any, pieces: Any, replace: bool, under_way: Any, live: Drive
+) -> tuple[int, int, float]:
+    """Do as `pass_edges` does from the start, but leave out the pulses that ended before time `t` [s]."""
+    oldest = t - pieces[pieces.shape[0] - 1, 0]
+    low, high = 0, firings.size
+    while low < high:
+        middle = (low + high) // 2
+        if firings[middle] < oldest:
+            low = middle + 1
+        else:
+            high = middle
+    # One more than needed: a pulse may end at `t` by rounding.
+    low = max(low - 1, 0)
+    return pass_edges(t, firings, pieces, replace, under_way, low, low, live)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.dop853 import contact_step
     from printhammer.kernel.forces import Hammer, pack_force
     from printhammer.kernel.laws import FORCE_DRIVE, backstop_energy, backstop_viscous, magnet_force
-    from printhammer.kernel.pulses import Drive, drive_value, pass_edges
+    from printhammer.kernel.pulses import Drive, drive_value, edges_at, pass_edges
     from printhammer.kernel.resample import memory_of, s_at, state_in_step
 
 POINTS = (
@@ -97,6 +97,8 @@ def quadratures(
     first, last = 0, 0
     for row in range(steps.size):
         i = steps[row]
+        if row == 0:
+            first, last, _edge = edges_at(nodes[i, 0], firings, pieces, replace, under_way, live)
         t0, x0, v0, mode, kept = nodes[i, 0], nodes[i, 1], nodes[i, 2], int(nodes[i, 3]), nodes[i, 4]
         first, last, _edge = pass_edges(t0, firings, pieces, replace, under_way, first, last, live)
         for j in range(4):

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from printhammer.kernel.compiling import compiled
+from printhammer.kernel.modes import FREE
 
 NODE_WIDTH = 5
 CONTACT_WIDTH = 7
@@ -64,3 +65,12 @@ def close_contact(contacts: Rows, used: int, t: float, v: float) -> None:
     i = min(used, contacts.shape[0]) - 1
     contacts[i, 3] = t
     contacts[i, 4] = v
+
+
+@compiled
+def carry_contact(contacts: Rows, mode: int) -> int:
+    """Keep the contact in row 0 that goes on after a pause in `mode`; return the number of contacts."""
+    if mode == FREE:
+        return 0
+    contacts[0, 5] = -1.0
+    return 1

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         pack_memory,
         spring_force,
     )
-    from printhammer.kernel.pulses import Drive, drive_value, pass_edges
+    from printhammer.kernel.pulses import Drive, drive_value, edges_at, pass_edges
 
 GOLDEN = 0.3819660112501051
 SAMPLES = 4
@@ -133,8 +133,7 @@ def resample(
         Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
         the backstop, mode. At the time of an impact or a switch: the state after it.
     """
-    first, last = 0, 0
-    first, last, _edge = pass_edges(nodes[0, 0], firings, pieces, replace, under_way, first, last, live)
+    first, last, _edge = edges_at(nodes[0, 0], firings, pieces, replace, under_way, live)
     i = 0
     for row in range(times.size):
         t = times[row]
@@ -198,6 +197,66 @@ def refined(
     return (t1, f1) if f1 > f2 else (t2, f2)
 
 
+@compiled
+def peaks_of(
+    contact: Any,
+    nodes: Any,
+    firings: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Any,
+    hammer: Hammer,
+) -> tuple[float, float, float]:
+    """Return time [s] of the largest depth, that depth [m] and the peak force [N] of a contact.
+
+    Its steps begin at its node and end at the first node not before its end.
+    """
+    surface = int(contact[0])
+    begin = int(contact[5])
+    end = begin
+    best = (begin, 0)
+    strongest = (begin, 0)
+    deepest_value = 0.0
+    strongest_value = 0.0
+    first, last, _edge = edges_at(nodes[begin, 0], firings, pieces, replace, under_way, live)
+    while end + 1 < nodes.shape[0] and not (nodes[end, 0] >= contact[3]):
+        node = nodes[end]
+        first, last, _edge = pass_edges(node[0], firings, pieces, replace, under_way, first, last, live)
+        for j in range(SAMPLES + 1):
+            t = node[0] + (nodes[end + 1, 0] - node[0]) * j / SAMPLES
+            depth, force = depth_and_force(t, node, surface, hammer, live)
+            if depth > deepest_value:
+                best, deepest_value = (end, j), depth
+            if force > strongest_value:
+                strongest, strongest_value = (end, j), force
+        end += 1
+    peak_time = nodes[best[0], 0]
+    if end > best[0]:
+        peak_time += (nodes[best[0] + 1, 0] - nodes[best[0], 0]) * best[1] / SAMPLES
+    for which in range(2):
+        i, j = best if which == 0 else strongest
+        # The extremum lies beside the best sample, perhaps in the step before or after it.
+        for beside in range(-1, 2):
+            k = i + beside
+            if k < begin or k >= end or (beside < 0 and j > 0) or (beside > 0 and j < SAMPLES):
+                continue
+            part = (nodes[k + 1, 0] - nodes[k, 0]) / SAMPLES
+            lowest = j - 1 if beside == 0 else (SAMPLES - 1 if beside < 0 else 0)
+            highest = j + 1 if beside == 0 else (SAMPLES if beside < 0 else 1)
+            low = nodes[k, 0] + part * max(lowest, 0)
+            high = nodes[k, 0] + part * min(highest, SAMPLES)
+            if not high > low:
+                continue
+            edges_at(nodes[k, 0], firings, pieces, replace, under_way, live)
+            t, value = refined(which, low, high, nodes[k], surface, hammer, live)
+            if which == 0 and value > deepest_value:
+                peak_time, deepest_value = t, value
+            elif which == 1 and value > strongest_value:
+                strongest_value = value
+    return peak_time, deepest_value, strongest_value
+
+
 @entry
 def peaks(
     contacts: Any,
@@ -210,54 +269,8 @@ def peaks(
     hammer: Hammer,
     out: Any,
 ) -> None:
-    """Fill `out` with the peaks of all contacts.
-
-    Each row has the time [s] of the largest depth, that depth [m] and the peak force [N].
-    `contacts` are as recorded; the steps of a contact begin at its node and end at the first node not before
-    its end.
-    """
+    """Fill `out`, shape (m, 3), with what `peaks_of` tells of all recorded contacts."""
     for row in range(contacts.shape[0]):
-        surface = int(contacts[row, 0])
-        begin = int(contacts[row, 5])
-        end = begin
-        best = (begin, 0)
-        strongest = (begin, 0)
-        deepest_value = 0.0
-        strongest_value = 0.0
-        first, last = 0, 0
-        while end + 1 < nodes.shape[0] and not (nodes[end, 0] >= contacts[row, 3]):
-            node = nodes[end]
-            first, last, _edge = pass_edges(node[0], firings, pieces, replace, under_way, first, last, live)
-            for j in range(SAMPLES + 1):
-                t = node[0] + (nodes[end + 1, 0] - node[0]) * j / SAMPLES
-                depth, force = depth_and_force(t, node, surface, hammer, live)
-                if depth > deepest_value:
-                    best, deepest_value = (end, j), depth
-                if force > strongest_value:
-                    strongest, strongest_value = (end, j), force
-            end += 1
-        out[row, 0] = nodes[best[0], 0]
-        if end > best[0]:
-            out[row, 0] += (nodes[best[0] + 1, 0] - nodes[best[0], 0]) * best[1] / SAMPLES
-        out[row, 1] = deepest_value
-        out[row, 2] = strongest_value
-        for which in range(2):
-            i, j = best if which == 0 else strongest
-            # The extremum lies beside the best sample, perhaps in the step before or after it.
-            for beside in range(-1, 2):
-                k = i + beside
-                if k < begin or k >= end or (beside < 0 and j > 0) or (beside > 0 and j < SAMPLES):
-                    continue
-                part = (nodes[k + 1, 0] - nodes[k, 0]) / SAMPLES
-                lowest = j - 1 if beside == 0 else (SAMPLES - 1 if beside < 0 else 0)
-                highest = j + 1 if beside == 0 else (SAMPLES if beside < 0 else 1)
-                low = nodes[k, 0] + part * max(lowest, 0)
-                high = nodes[k, 0] + part * min(highest, SAMPLES)
-                if not high > low:
-                    continue
-                pass_edges(nodes[k, 0], firings, pieces, replace, under_way, 0, 0, live)
-                t, value = refined(which, low, high, nodes[k], surface, hammer, live)
-                if value > out[row, 1 + which]:
-                    out[row, 1 + which] = value
-                    if which == 0:
-                        out[row, 0] = t
+        out[row, 0], out[row, 1], out[row, 2] = peaks_of(
+            contacts[row], nodes, firings, pieces, replace, under_way, live, hammer
+        )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from printhammer.kernel import carry as C
 from printhammer.kernel.compiling import compiled, entry
 from printhammer.kernel.landing import FAILED
 from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control
@@ -24,6 +25,7 @@ from printhammer.kernel.modes import (
     OK,
     PACK_RELEASED,
     PACK_SURFACE,
+    PAUSED,
     PUSH_BEGAN,
     PUSH_ENDED,
     RANGE_LEFT,
@@ -55,7 +57,13 @@ if TYPE_CHECKING:
         pack_memory,
     )
     from printhammer.kernel.pulses import Drive, pass_edges
-    from printhammer.kernel.record import add_node, close_contact, open_contact, relabel_node
+    from printhammer.kernel.record import (
+        add_node,
+        carry_contact,
+        close_contact,
+        open_contact,
+        relabel_node,
+    )
     from printhammer.kernel.rest import goes_on_in, rest_ends
 
 STILL = 1e-12
@@ -225,8 +233,9 @@ def run(
     live: Any,
     nodes: Any,
     contacts: Any,
+    carry: Any,
 ) -> tuple[int, int, int, int]:
-    """Integrate from state (`t`, `x`, `v`) to time `t_end`.
+    """Integrate from state (`t`, `x`, `v`) to time `t_end`, or go on from where a run paused.
 
     Parameters
     ----------
@@ -251,7 +260,11 @@ def run(
         Working space, see :mod:`printhammer.kernel.pulses`.
     nodes : float64 array, shape (any, 5)
     contacts : float64 array, shape (any, 7)
-        Filled with the record, see :mod:`printhammer.kernel.record`.
+        Filled with the record, see :mod:`printhammer.kernel.record`. The first node of a run that goes on is
+        the last one before the pause; a contact that was open then is the first contact and keeps its row,
+        its number of the node before it is negative.
+    carry : float64 array, shape (24,)
+        See :mod:`printhammer.kernel.carry`; `t`, `x` and `v` are not looked at where a run goes on.
 
     Returns
     -------
@@ -259,7 +272,6 @@ def run(
         Status, and the numbers of nodes, contacts and steps; the first two may exceed the arrays' lengths.
     """
     drive = live
-    first, last, edge = pass_edges(t, firings, pieces, replace, under_way, 0, 0, live)
     used = 0
     touched = 0
     steps = 0
@@ -270,22 +282,42 @@ def run(
     peak = x
     w = 0.0
     kv = 0.0
-    a = acceleration(t, x, v, FREE, memory, hammer, drive)
-    mode = first_mode(x, v, a, hammer)
-    if mode == UNLOADING:
-        memory = pack_memory(hammer[PACK:BACKSTOP_PART], peak)
-    h_free = 0.02 * time_scale
-    h_pack = 0.005 * time_scale
-    h_contact = 0.05
-    h = h_pack if mode in (LOADING, UNLOADING) else h_free
-    if mode in (LOADING, UNLOADING):
-        touched = open_contact(contacts, touched, PACK_SURFACE, t, v, 0, True)
-    elif mode in (BACKSTOP, BACKSTOP_RELEASED, RESTING):
-        touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, 0, True)
-    if mode in (BACKSTOP, BACKSTOP_RELEASED):
-        w = math.sqrt(hammer[POSITION] - x)
-    a = acceleration(t, x, v, mode, memory, hammer, drive)
-    started = mode
+    pause_after = carry[C.PAUSE_AFTER]
+    if carry[C.STATE] == C.GOES_ON:
+        mode, peak, memory = int(carry[C.MODE]), carry[C.PEAK], carry[C.MEMORY_NOW]
+        t, x, v, a = carry[C.TIME], carry[C.POSITION_NOW], carry[C.VELOCITY], carry[C.ACCELERATION]
+        w, kv = carry[C.ROOT], carry[C.ROOT_RATE]
+        h, h_free, h_pack = carry[C.STEP], carry[C.FREE_STEP], carry[C.PACK_STEP]
+        h_contact = carry[C.CONTACT_STEP]
+        started, entered = int(carry[C.STARTED]), carry[C.ENTERED] != 0.0
+        wait, stuck, t_before = carry[C.WAIT], int(carry[C.STUCK]), carry[C.TIME_BEFORE]
+        first, last, edge = int(carry[C.FIRST]), int(carry[C.LAST]), carry[C.EDGE]
+        steps = int(carry[C.STEPS])
+        touched = carry_contact(contacts, mode)
+    else:
+        first, last, edge = pass_edges(t, firings, pieces, replace, under_way, 0, 0, live)
+        a = acceleration(t, x, v, FREE, memory, hammer, drive)
+        mode = first_mode(x, v, a, hammer)
+        if carry[C.STATE] == C.ON_BRANCH:
+            mode, peak = int(carry[C.MODE]), carry[C.PEAK]
+        if mode in (UNLOADING, RELOADING):
+            memory = pack_memory(hammer[PACK:BACKSTOP_PART], peak)
+        h_free = 0.02 * time_scale
+        h_pack = 0.005 * time_scale
+        h_contact = 0.05
+        h = h_pack if mode in (LOADING, UNLOADING) else h_free
+        if mode in (LOADING, UNLOADING, RELOADING):
+            touched = open_contact(contacts, touched, PACK_SURFACE, t, v, 0, True)
+        elif mode in (BACKSTOP, BACKSTOP_RELEASED, RESTING):
+            touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, 0, True)
+        if mode in (BACKSTOP, BACKSTOP_RELEASED):
+            w = math.sqrt(hammer[POSITION] - x)
+        a = acceleration(t, x, v, mode, memory, hammer, drive)
+        started = mode
+        entered = True
+        wait = WAIT * time_scale
+        stuck = 0
+        t_before = t - time_scale
     used = add_node(
         nodes,
         used,
@@ -295,11 +327,10 @@ def run(
         mode,
         w if mode == BACKSTOP else (peak if mode in (UNLOADING, RELOADING) else 0.0),
     )
-    entered = True
-    wait = WAIT * time_scale
-    stuck = 0
-    t_before = t - time_scale
     while t < t_end and status == OK:
+        if used >= pause_after and mode in (FREE, BACKSTOP):
+            status = PAUSED
+            break
         t_next = min(edge, t_end)
         if t_next <= t:
             first, last, edge = pass_edges(t, firings, pieces, replace, under_way, first, last, live)
@@ -437,4 +468,17 @@ def run(
             a = acceleration(t, x, v, mode, memory, hammer, drive)
         kept = w if mode == BACKSTOP else (peak if mode in (UNLOADING, RELOADING) else 0.0)
         used = add_node(nodes, used, t, x, v, mode, kept)
+    carry[C.STATE] = C.GOES_ON
+    carry[C.MODE], carry[C.PEAK], carry[C.MEMORY_NOW] = mode, peak, memory
+    carry[C.TIME], carry[C.POSITION_NOW], carry[C.VELOCITY], carry[C.ACCELERATION] = t, x, v, a
+    carry[C.ROOT], carry[C.ROOT_RATE] = w, kv
+    carry[C.STEP], carry[C.FREE_STEP], carry[C.PACK_STEP], carry[C.CONTACT_STEP] = (
+        h,
+        h_free,
+        h_pack,
+        h_contact,
+    )
+    carry[C.STARTED], carry[C.ENTERED] = started, entered
+    carry[C.WAIT], carry[C.STUCK], carry[C.TIME_BEFORE] = wait, stuck, t_before
+    carry[C.FIRST], carry[C.LAST], carry[C.EDGE], carry[C.STEPS] = first, last, edge, steps
     return status, used, touched, steps

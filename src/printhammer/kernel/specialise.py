@@ -36,10 +36,12 @@ TEMPLATES = (
     "run",
     "resample",
     "quadrature",
+    "stretch",
+    "members",
 )
 """Template modules in the order in which they use one another."""
 
-_PLAIN = ("modes", "layout", "hermite", "compiling", "dop853_tableau", "nystrom8_tableau")
+_PLAIN = ("modes", "layout", "carry", "hermite", "compiling", "dop853_tableau", "nystrom8_tableau")
 
 _LAW_FUNCTIONS = {
     "magnet": ("magnet_force", "magnet_energy"),
@@ -63,7 +65,7 @@ class Kernel:
 
     Attributes
     ----------
-    run, resample, quadratures, peaks
+    run, resample, quadratures, peaks, members
         Entry points; see the template modules of the same names.
     """
 
@@ -75,6 +77,7 @@ class Kernel:
             "resample": modules["resample"].resample,
             "peaks": modules["resample"].peaks,
             "quadratures": modules["quadrature"].quadratures,
+            "members": modules["members"].members,
         }
 
     def __getattr__(self, name: str) -> Any:
@@ -149,17 +152,19 @@ def specialise(laws: Laws) -> Kernel:
 
     bindings, text = _law_bindings(laws)
     here = Path(__file__).parent
-    for name in (*_PLAIN, *TEMPLATES):
+    for name in _PLAIN:
         text += (here / f"{name}.py").read_bytes()
-    digest = hashlib.sha256(text + repr((laws, numba.__version__)).encode()).hexdigest()[:16]
+    sources = hashlib.sha256(text + repr((laws, numba.__version__)).encode())
     compiled = importlib.import_module("printhammer.kernel.compiling").compiled
     namespace = {
         name: _compile_law(value, compiled) if isinstance(value, FunctionType) else value
         for name, value in bindings.items()
     }
-    namespace["DIGEST"] = digest
     modules: dict[str, ModuleType] = {}
     for name in TEMPLATES:
+        # A template uses only those before it: a change of a later one leaves its machine code valid.
+        sources.update((here / f"{name}.py").read_bytes())
+        namespace["DIGEST"] = digest = sources.hexdigest()[:16]
         module = _execute(here / f"{name}.py", f"printhammer.kernel.{name}_{digest}", namespace)
         modules[name] = module
         namespace.update(

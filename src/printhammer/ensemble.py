@@ -1,0 +1,390 @@
+"""Ensembles: many runs, integrated together on all cores.
+
+Every member has its own hammer, drive, state, steps and contacts. What is kept of a run is only what is
+asked for, so that memory does not grow with its length. The results of a member do not depend on what else is
+in the ensemble, nor on the number of threads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+import numpy as np
+
+from printhammer.ensemble_group import Group, Job
+from printhammer.errors import InputError
+from printhammer.hammer import Hammer
+from printhammer.kernel.modes import OK, STATUS_NAMES
+from printhammer.problem import TOLERANCE, laws_of
+from printhammer.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive import Drive
+    from printhammer.kernel.laws import Laws
+    from printhammer.motion import Motion
+    from printhammer.segments import FloatArray
+    from printhammer.threads import Progress
+
+Engine = Literal["auto", "plain"]
+ENGINES: Final = get_args(Engine)
+
+
+@dataclass(frozen=True)
+class DotTable:
+    """What the firings did: arrays of shape (members, most firings of any member).
+
+    Attributes
+    ----------
+    fired : bool array
+        Whether the member has such a firing, and its run came so far.
+    fired_at : array
+        Time of the firing, s; NaN where there is none.
+    struck : bool array
+        False for a lost dot; the values of a lost dot are NaN.
+    flight_time : array
+        From firing to touch, s.
+    impact_speed : array
+        At touch, m/s.
+    peak_force : array
+        Largest pack force, N.
+    indentation : array
+        Largest indentation, m.
+    contact_time : array
+        From touch to leaving, s; NaN also while the contact is open.
+    extra_contacts : int array
+        Further pack contacts before the next firing.
+    """
+
+    fired: npt.NDArray[np.bool_]
+    fired_at: FloatArray
+    struck: npt.NDArray[np.bool_]
+    flight_time: FloatArray
+    impact_speed: FloatArray
+    peak_force: FloatArray
+    indentation: FloatArray
+    contact_time: FloatArray
+    extra_contacts: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Strobes:
+    """States at given times: arrays (members, most times of any member), NaN where a run did not get.
+
+    Attributes
+    ----------
+    t : array
+        Time, s.
+    x, v : array
+        Displacement, m, and velocity, m/s.
+    branch : int array
+        Code of the mode, see `printhammer.kernel.modes`; -1 where a run did not get.
+    memory : array
+        Displacement of the latest local maximum, m, on the unloading branch inside the pack, else 0.
+    """
+
+    t: FloatArray
+    x: FloatArray
+    v: FloatArray
+    branch: npt.NDArray[np.int64]
+    memory: FloatArray
+
+
+@dataclass(frozen=True)
+class EnsembleResult:
+    """What is kept of the runs of an ensemble.
+
+    Attributes
+    ----------
+    status : int array, shape (M,)
+        Codes of the statuses; 0 is ok.
+    reached : array, shape (M,)
+        Time at which each run ended, s.
+    steps : int array, shape (M,)
+        Number of steps of each run.
+    dots : DotTable or None
+        What the firings did, if asked for.
+    strobes : Strobes or None
+        States at the times asked for.
+    x : float32 array, shape (M, T), or None
+        Displacement at the common times, m; NaN where a run did not get.
+    """
+
+    status: npt.NDArray[np.int64]
+    reached: FloatArray
+    steps: npt.NDArray[np.int64]
+    dots: DotTable | None = None
+    strobes: Strobes | None = None
+    x: npt.NDArray[np.float32] | None = None
+
+    @property
+    def ok(self) -> npt.NDArray[np.bool_]:
+        """Which runs went as asked."""
+        return self.status == OK
+
+    @property
+    def status_names(self) -> list[str]:
+        """Names of the statuses."""
+        return [STATUS_NAMES[code] for code in self.status]
+
+
+class Ensemble:
+    """Many runs, integrated together, on all cores.
+
+    Parameters
+    ----------
+    hammers : Hammer or sequence of Hammer
+        One for all members, or one for each.
+    drives : Drive or sequence of Drive
+        Likewise.
+    ends : float or array
+        End of the runs, s, one for all or one for each.
+    states : tuple or array, optional
+        Displacement, m, and velocity, m/s, at time 0: one for all or one row for each member; by default
+        the rest state of the member's hammer. Rows of four also hold the mode and the memory, as in
+        `Strobes`, for a start inside the pack.
+    tolerance : float, optional
+        Error allowed in one step, in units of the way from backstop to pack and of a typical speed.
+
+    Raises
+    ------
+    InputError
+        Numbers of hammers, drives, ends and states that do not fit together; an end not positive; a state not
+        finite; a hammer without a rest state where no states are given.
+    """
+
+    def __init__(
+        self,
+        hammers: Hammer | Sequence[Hammer],
+        drives: Drive | Sequence[Drive],
+        ends: float | npt.ArrayLike,
+        *,
+        states: npt.ArrayLike | None = None,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        if not 1e-15 <= tolerance <= 1e-2:
+            raise InputError(f"tolerance = {tolerance!r}, expected a number from 1e-15 to 1e-2")
+        self.tolerance = tolerance
+        one_hammer, one_drive = isinstance(hammers, Hammer), not isinstance(drives, list | tuple)
+        many_hammers = [hammers] if isinstance(hammers, Hammer) else list(hammers)
+        many_drives = list(drives) if isinstance(drives, list | tuple) else [drives]
+        moments = np.atleast_1d(np.asarray(ends, dtype=np.float64))
+        rows = None if states is None else np.asarray(states, dtype=np.float64)
+        counts = {
+            "hammers": 1 if one_hammer else len(many_hammers),
+            "drives": 1 if one_drive else len(many_drives),
+            "ends": len(moments) if np.ndim(ends) else 1,
+            "states": 1 if rows is None or rows.ndim == 1 else len(rows),
+        }
+        self.size = max(counts.values()) if min(counts.values()) > 0 else 0
+        for name, count in counts.items():
+            if count not in (1, self.size):
+                raise InputError(f"{name}: {count} are given, expected 1 or {self.size}")
+        if not (np.isfinite(moments) & (moments > 0.0)).all():
+            raise InputError(f"ends = {moments[~(moments > 0.0)][:1]} s, expected positive numbers")
+        self.hammers: list[Hammer] = many_hammers * (self.size if len(many_hammers) == 1 else 1)
+        self.drives: list[Drive] = many_drives * (self.size if len(many_drives) == 1 else 1)
+        self.ends = np.broadcast_to(moments, (self.size,)).astype(np.float64)
+        self.states = self._states(rows)
+        self._groups: list[Group] | None = None
+
+    def _states(self, rows: FloatArray | None) -> FloatArray:
+        full = np.zeros((self.size, 5))
+        full[:, 3] = -1.0
+        if rows is None:
+            from printhammer.equilibrium import rest_state
+
+            rest: dict[int, float] = {}
+            for i, hammer in enumerate(self.hammers):
+                if id(hammer) not in rest:
+                    rest[id(hammer)] = rest_state(hammer)
+                full[i, 1] = rest[id(hammer)]
+            return full
+        if rows.shape[-1] not in (2, 4) or rows.ndim > 2 or not np.isfinite(rows).all():
+            raise InputError("states: expected rows of two finite numbers, or of four with mode and memory")
+        full[:, 1 : 1 + rows.shape[-1]] = rows
+        return full
+
+    @property
+    def groups(self) -> list[Group]:
+        """The members, sorted by the laws of their parts."""
+        if self._groups is None:
+            by_laws: dict[tuple[Laws, bool], list[int]] = {}
+            laws: dict[tuple[int, str], Laws] = {}
+            for i, (hammer, drive) in enumerate(zip(self.hammers, self.drives, strict=True)):
+                key = (id(hammer), drive.quantity)
+                if key not in laws:
+                    laws[key] = laws_of(hammer, drive)
+                by_laws.setdefault((laws[key], bool(drive.kernel_arrays()[2])), []).append(i)
+            self._groups = [
+                Group(
+                    np.array(members),
+                    [self.hammers[i] for i in members],
+                    [self.drives[i] for i in members],
+                    self.states[members],
+                    self.ends[members],
+                    self.tolerance,
+                )
+                for members in by_laws.values()
+            ]
+        return self._groups
+
+    def motion(self, member: int) -> Motion:
+        """Return everything about one member.
+
+        Parameters
+        ----------
+        member : int
+            Its number.
+        """
+        from printhammer.simulate import simulate
+
+        if self.states[member, 3] >= 0.0:
+            raise InputError(f"member {member} starts on a branch inside the pack, which a motion cannot yet")
+        x, v = self.states[member, 1:3]
+        return simulate(
+            self.hammers[member],
+            self.drives[member],
+            duration=float(self.ends[member]),
+            state=(float(x), float(v)),
+            tolerance=self.tolerance,
+        )
+
+    def run(
+        self,
+        *,
+        dots: bool = False,
+        strobes: Literal["firings"] | Sequence[npt.ArrayLike] | None = None,
+        times: npt.ArrayLike | None = None,
+        x: npt.NDArray[np.float32] | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        engine: Engine = "auto",
+    ) -> EnsembleResult:
+        """Integrate all members.
+
+        Parameters
+        ----------
+        dots : bool, optional
+            Keep what each firing did.
+        strobes : str or sequence of arrays, optional
+            Keep the state at every firing ("firings"), or at ascending times, s, one array for each member.
+        times : array, optional
+            Keep the displacement at these ascending times, s.
+        x : float32 array, shape (M, T), optional
+            Where to put it; by default a new array.
+        threads : int, optional
+            By default as many as there are cores.
+        progress : callable, optional
+            Called now and then with the number of members done and of all.
+        engine : str, optional
+            "plain": one member at a time; "auto": the fastest there is for the laws of the members.
+
+        Returns
+        -------
+        EnsembleResult
+            With a status for each member; a run that could not go on is no exception.
+
+        Raises
+        ------
+        InputError
+            An argument is not what is described above.
+        """
+        if engine not in ENGINES:
+            raise InputError(f"engine = {engine!r}, expected one of {', '.join(ENGINES)}")
+        workers = thread_count(threads)
+        grid = np.zeros(0) if times is None else _ascending(times, "times")
+        if x is None:
+            x = np.empty((self.size, grid.size), np.float32)
+        elif x.shape != (self.size, grid.size) or x.dtype != np.float32 or not x.flags.c_contiguous:
+            raise InputError(
+                f"x: an array of shape {x.shape} and type {x.dtype}, expected {(self.size, grid.size)} and"
+                " float32, without gaps"
+            )
+        moments = self._moments(strobes)
+        jobs = [Job(group, dots, moments, grid, x) for group in self.groups]
+        in_threads([job.piece for job in jobs], [len(job.group.members) for job in jobs], workers, progress)
+        for job in jobs:
+            job.finish(x)
+        return EnsembleResult(
+            status=self._gathered([job.status for job in jobs]),
+            reached=self._gathered([job.reached for job in jobs]),
+            steps=self._gathered([job.steps for job in jobs]),
+            dots=self._dot_table(jobs) if dots else None,
+            strobes=None if strobes is None else self._strobes(jobs, moments),
+            x=None if times is None else x,
+        )
+
+    def _gathered(self, parts: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        whole = np.empty(self.size, parts[0].dtype) if parts else np.empty(0)
+        for group, part in zip(self.groups, parts, strict=True):
+            whole[group.members] = part
+        return whole
+
+    def _spread(self, jobs: Sequence[Job], which: str) -> FloatArray:
+        """Return ragged rows of the results as one array (members, rows, columns), filled up with NaN."""
+        tables = [getattr(job, which) for job in jobs]
+        starts = [getattr(job, f"{which}_starts") for job in jobs]
+        most = max((int(np.diff(start).max(initial=0)) for start in starts), default=0)
+        whole = np.full((self.size, most, tables[0].shape[1] if tables else 0), np.nan)
+        for group, table, start in zip(self.groups, tables, starts, strict=True):
+            counts = np.diff(start)
+            column = np.arange(len(table)) - np.repeat(start[:-1], counts)
+            whole[np.repeat(group.members, counts), column] = table
+        return whole
+
+    def _dot_table(self, jobs: Sequence[Job]) -> DotTable:
+        found = self._spread(jobs, "dots")
+        fired_at = np.full(found.shape[:2], np.nan)
+        for i, drive in enumerate(self.drives):
+            fired_at[i, : len(drive.times)] = drive.times
+        reached = self._gathered([job.reached for job in jobs])
+        fired = fired_at <= reached[:, np.newaxis]
+        contacts = np.nan_to_num(found[:, :, 0]).astype(np.int64)
+        return DotTable(
+            fired=fired,
+            fired_at=fired_at,
+            struck=contacts > 0,
+            flight_time=found[:, :, 1] - fired_at,
+            impact_speed=found[:, :, 2],
+            peak_force=found[:, :, 5],
+            indentation=found[:, :, 4],
+            contact_time=found[:, :, 3] - found[:, :, 1],
+            extra_contacts=np.maximum(contacts - 1, 0),
+        )
+
+    def _strobes(self, jobs: Sequence[Job], moments: Sequence[FloatArray]) -> Strobes:
+        found = self._spread(jobs, "strobes")
+        t = np.full(found.shape[:2], np.nan)
+        for i, moment in enumerate(moments):
+            t[i, : len(moment)] = moment
+        mode = found[:, :, 2]
+        return Strobes(
+            t=t,
+            x=found[:, :, 0],
+            v=found[:, :, 1],
+            branch=np.where(np.isnan(mode), -1, np.nan_to_num(mode)).astype(np.int64),
+            memory=found[:, :, 3],
+        )
+
+    def _moments(self, strobes: Literal["firings"] | Sequence[npt.ArrayLike] | None) -> list[FloatArray]:
+        if strobes is None:
+            return [np.zeros(0)] * self.size
+        if isinstance(strobes, str):
+            if strobes != "firings":
+                raise InputError(f'strobes = {strobes!r}, expected "firings" or an array for each member')
+            return [np.asarray(drive.times, dtype=np.float64) for drive in self.drives]
+        if len(strobes) != self.size:
+            raise InputError(f"strobes: {len(strobes)} arrays, expected {self.size}")
+        return [_ascending(moment, "strobes") for moment in strobes]
+
+
+def _ascending(times: npt.ArrayLike, name: str) -> FloatArray:
+    found = np.array(times, dtype=np.float64).reshape(-1)
+    if not np.isfinite(found).all() or (np.diff(found) < 0.0).any() or (found < 0.0).any():
+        raise InputError(f"{name}: expected ascending numbers, not negative")
+    return found

@@ -1,0 +1,184 @@
+"""Members of an ensemble whose parts have the same laws, as the arrays of the kernel, and their results."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.kernel import carry
+from printhammer.problem import MAX_STEPS, Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive import Drive
+    from printhammer.hammer import Hammer
+    from printhammer.kernel.specialise import Kernel
+    from printhammer.segments import FloatArray
+
+_NODES: Final = 2048
+_CONTACTS: Final = 256
+_DOT_WIDTH: Final = 6
+_STROBE_WIDTH: Final = 4
+
+
+def starts_of(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.int64]:
+    """Return where each of some arrays begins when they are put one after the other, and the end of all."""
+    return np.concatenate([[0], np.cumsum([len(array) for array in arrays])]).astype(np.int64)
+
+
+class Group:
+    """Members whose parts have the same laws.
+
+    Parameters
+    ----------
+    members : int array
+        Their numbers in the ensemble.
+    hammers, drives : sequence
+        One for each of them.
+    states : array, shape (n, 5)
+        Time, displacement, velocity, mode, memory at the start.
+    ends : array, shape (n,)
+        Ends of the runs, s.
+    tolerance : float
+        Error allowed in one step.
+    """
+
+    def __init__(
+        self,
+        members: npt.NDArray[np.int64],
+        hammers: Sequence[Hammer],
+        drives: Sequence[Drive],
+        states: FloatArray,
+        ends: FloatArray,
+        tolerance: float,
+    ) -> None:
+        self.members = members
+        self.states = states
+        self.ends = ends
+        rows: dict[tuple[Any, ...], int] = {}
+        waves: dict[bytes, int] = {}
+        problems: list[Problem] = []
+        tables: list[FloatArray] = []
+        self.hammer_of = np.zeros(len(members), np.int64)
+        self.waveform_of = np.zeros(len(members), np.int64)
+        for i, (hammer, drive) in enumerate(zip(hammers, drives, strict=True)):
+            pieces = np.asarray(drive.kernel_arrays()[1], dtype=np.float64)
+            x, v = float(states[i, 1]), float(states[i, 2])
+            key: tuple[Any, ...] = (id(hammer), drive.waveform.peak, drive.quantity, v)
+            if hammer.position is None or hammer.front is None:
+                key = (*key, x, drive.period)
+            if key not in rows:
+                rows[key] = len(problems)
+                problems.append(Problem(hammer, drive, (x, v), 0.0, tolerance))
+            self.hammer_of[i] = rows[key]
+            form = pieces.tobytes()
+            if form not in waves:
+                waves[form] = len(tables)
+                tables.append(pieces)
+            self.waveform_of[i] = waves[form]
+        firings = [np.asarray(drive.times, dtype=np.float64) for drive in drives]
+        self.replace = bool(drives[0].kernel_arrays()[2])
+        self.kernel: Kernel = problems[0].kernel
+        width = max(problem.constants.size for problem in problems)
+        self.hammers = np.zeros((len(problems), width))
+        for row, problem in enumerate(problems):
+            self.hammers[row, : problem.constants.size] = problem.constants
+        self.controls = np.array([problem.control for problem in problems])
+        self.bounds = np.array([problem.bounds for problem in problems])
+        self.piece_starts = starts_of(tables)
+        self.pieces = np.concatenate(tables)
+        self.firing_starts = starts_of(firings)
+        self.firings = np.concatenate(firings)
+        self.most_firings = max(len(times) for times in firings)
+
+
+class Job:
+    """One integration of a group: what to keep, and the arrays that it goes to.
+
+    Parameters
+    ----------
+    group : Group
+        The members.
+    want_dots : bool
+        Whether to keep what each firing did.
+    moments : sequence of arrays
+        Times of the strobes, s, for each member of the ensemble.
+    grid : array
+        Common times of the displacements, s.
+    x : float32 array
+        Displacements of the whole ensemble; used as it is where the group is the whole.
+    """
+
+    def __init__(
+        self,
+        group: Group,
+        want_dots: bool,
+        moments: Sequence[FloatArray],
+        grid: FloatArray,
+        x: npt.NDArray[np.float32],
+    ) -> None:
+        self.group = group
+        self.want_dots = want_dots
+        self.grid = grid
+        count = len(group.members)
+        own = [moments[member] for member in group.members]
+        self.strobes_starts = starts_of(own)
+        self.strobe_times = np.concatenate(own)
+        self.strobes = np.empty((self.strobe_times.size, _STROBE_WIDTH))
+        self.dots_starts = group.firing_starts
+        self.dots = np.empty((group.firings.size if want_dots else 0, _DOT_WIDTH))
+        self.status = np.zeros(count, np.int64)
+        self.steps = np.zeros(count, np.int64)
+        self.reached = np.zeros(count)
+        self.x = x if count == len(x) else np.empty((count, grid.size), np.float32)
+
+    def finish(self, x: npt.NDArray[np.float32]) -> None:
+        """Put the displacements of a group that is not the whole where they belong."""
+        if self.x is not x:
+            x[self.group.members] = self.x
+
+    def piece(self, first: int, last: int) -> None:
+        """Integrate the members `first` to `last` - 1 of the group, in this thread."""
+        group = self.group
+        nodes, contacts = _NODES, _CONTACTS
+        which = np.arange(first, last)
+        under_way = np.zeros((2, group.most_firings), np.int64)
+        live = np.zeros((2, 1 + 7 * group.most_firings))
+        while which.size:
+            done = group.kernel.members(
+                which,
+                group.hammer_of,
+                group.hammers,
+                group.controls,
+                group.bounds,
+                group.waveform_of,
+                group.piece_starts,
+                group.pieces,
+                group.firing_starts,
+                group.firings,
+                group.replace,
+                group.states,
+                group.ends,
+                MAX_STEPS,
+                self.strobes_starts,
+                self.strobe_times,
+                self.grid,
+                self.want_dots,
+                under_way,
+                live,
+                np.empty((nodes, 5)),
+                np.empty((contacts, 7)),
+                np.zeros(carry.SIZE),
+                self.status,
+                self.reached,
+                self.steps,
+                self.dots,
+                self.strobes,
+                self.x,
+            )
+            which = which[done:]
+            nodes, contacts = 4 * nodes, 4 * contacts

@@ -1,0 +1,108 @@
+"""Work in threads: pieces of a range, handed out one by one."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from typing import Final
+
+from printhammer.errors import InputError
+
+Progress = Callable[[int, int], None]
+Piece = Callable[[int, int], None]
+
+_PIECES_A_THREAD: Final = 32
+_INTERVAL: Final = 0.1
+
+
+def thread_count(threads: int | None) -> int:
+    """Return a number of threads; by default that of the cores that this process may use.
+
+    Raises
+    ------
+    InputError
+        It is less than 1.
+    """
+    if threads is None:
+        if hasattr(os, "sched_getaffinity"):
+            return len(os.sched_getaffinity(0))
+        return os.cpu_count() or 1
+    if threads < 1:
+        raise InputError(f"threads = {threads}, expected at least 1")
+    return int(threads)
+
+
+def in_threads(
+    works: Sequence[Piece], sizes: Sequence[int], threads: int, progress: Progress | None = None
+) -> None:
+    """Do all of several works, each on a range of numbers from 0, in threads.
+
+    Parameters
+    ----------
+    works : sequence of callable
+        Each takes the first number of a piece and the one after its last.
+    sizes : sequence of int
+        Length of the range of each work.
+    threads : int
+        Number of threads; with one, the calling thread does all.
+    progress : callable, optional
+        Called now and then, in the calling thread, with how many numbers are done and how many there are.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Where it is interrupted; the pieces under way are done before.
+    """
+    total = sum(sizes)
+    length = max(1, total // (_PIECES_A_THREAD * threads))
+    pieces = [
+        (work, first, min(first + length, size))
+        for work, size in zip(works, sizes, strict=True)
+        for first in range(0, size, length)
+    ]
+    if threads == 1 or len(pieces) <= 1:
+        done = 0
+        for work, first, last in pieces:
+            work(first, last)
+            done += last - first
+            if progress is not None:
+                progress(done, total)
+        return
+    _hand_out(pieces, threads, total, progress)
+
+
+def _hand_out(
+    pieces: Sequence[tuple[Piece, int, int]], threads: int, total: int, progress: Progress | None
+) -> None:
+    left = iter(pieces)
+    lock = threading.Lock()
+    stop = threading.Event()
+    done = 0
+
+    def worker() -> None:
+        nonlocal done
+        while not stop.is_set():
+            with lock:
+                piece = next(left, None)
+            if piece is None:
+                return
+            work, first, last = piece
+            work(first, last)
+            with lock:
+                done += last - first
+
+    with ThreadPoolExecutor(threads) as pool:
+        futures = {pool.submit(worker) for _ in range(threads)}
+        try:
+            while futures:
+                finished, futures = wait(
+                    futures, timeout=None if progress is None else _INTERVAL, return_when=FIRST_COMPLETED
+                )
+                for future in finished:
+                    future.result()
+                if progress is not None:
+                    progress(done, total)
+        finally:
+            stop.set()
