@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
     from printhammer.errors import InputError, PrinthammerError
     from printhammer.hammer import Hammer, load
+    from printhammer.maps import frequency_map
     from printhammer.motion import Motion
     from printhammer.simulate import simulate
     from printhammer.waveforms import Waveform
@@ -36,6 +37,7 @@ __all__ = [
     "Waveform",
     "__version__",
     "equilibria",
+    "frequency_map",
     "holding_margin",
     "load",
     "release_current",
@@ -55,6 +57,7 @@ _HOME = {
     "SineForce": "drive",
     "Waveform": "waveforms",
     "equilibria": "equilibrium",
+    "frequency_map": "maps",
     "holding_margin": "equilibrium",
     "load": "hammer",
     "release_current": "equilibrium",
