@@ -124,7 +124,7 @@ class EnsembleResult:
     @property
     def ok(self) -> npt.NDArray[np.bool_]:
         """Which runs went as asked."""
-        return self.status == OK
+        return np.equal(self.status, OK)
 
     @property
     def status_names(self) -> list[str]:
@@ -171,7 +171,7 @@ class Ensemble:
         self.tolerance = tolerance
         one_hammer, one_drive = isinstance(hammers, Hammer), not isinstance(drives, list | tuple)
         many_hammers = [hammers] if isinstance(hammers, Hammer) else list(hammers)
-        many_drives = list(drives) if isinstance(drives, list | tuple) else [drives]
+        many_drives: list[Drive] = list(drives) if isinstance(drives, list | tuple) else [drives]  # type: ignore[list-item]
         moments = np.atleast_1d(np.asarray(ends, dtype=np.float64))
         rows = None if states is None else np.asarray(states, dtype=np.float64)
         counts = {

@@ -181,4 +181,4 @@ def members(
         status[m] = code
         steps[m] = count
         reached[m] = carry[C.TIME]
-    return which.size
+    return len(which)
