@@ -100,6 +100,18 @@ FIGURES: Final[dict[int, PaperFigure]] = {
             " backstop; numbers are peak forces in units of that of a single pulse.",
         ),
         PaperFigure(
+            8,
+            "Nine pulses: displacement against time and rate",
+            "Displacement under nine pulses at gradually rising rates, one curve for each, hiding those"
+            " behind it; blue inside the ribbon and paper pack.",
+        ),
+        PaperFigure(
+            9,
+            "Nine pulses: frequency-time map",
+            "The same in colours, at more rates. Thin lines are firings, orange lost dots; backstop, pack and"
+            " platen are marked on the scale.",
+        ),
+        PaperFigure(
             10,
             "A single pulse: phase plane",
             "Velocity against displacement after a single current pulse; arrows point to later times.",

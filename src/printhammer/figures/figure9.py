@@ -1,0 +1,63 @@
+"""Figure 9: displacement in colours, against time and firing rate, in bursts of nine pulses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from printhammer.figures.map_marks import (
+    chart_of,
+    colour_bar,
+    failures,
+    firing_lines,
+    key,
+    norm_of,
+    picture,
+    sign_map,
+    way_of,
+)
+from printhammer.figures.style import new_figure, styled
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from printhammer.hammer import Hammer
+
+
+@styled
+def figure9(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None) -> Figure:
+    """Draw Fig. 9: the frequency-time map in colours.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        Any hammer with a waveform; not looked at where a map is given.
+    chart : xarray.Dataset, optional
+        A map from `printhammer.frequency_map`; by default the one of the hammer.
+    rates : array, optional
+        Rates of the map that is computed, Hz.
+
+    Returns
+    -------
+    Figure
+        The figure. Thin lines are firings, strong ones lost dots; the gids are "firing 1" and so on, and
+        "lost dots".
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform or no rest state.
+    """
+    found = chart_of(hammer, rates) if chart is None else chart
+    way = way_of(found)
+    norm = norm_of(way, found)
+    figure = new_figure(4.6)
+    grid = figure.add_gridspec(1, 2, width_ratios=(30.0, 1.0))
+    panel, bar = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
+    picture(panel, found, norm)
+    firing_lines(panel, found)
+    key(panel, found)
+    colour_bar(bar, found, norm, way)
+    sign_map(figure, found, failures(found))
+    return figure

@@ -1,0 +1,238 @@
+"""What the pictures of frequency-time maps share: scales, firings, lost dots, the colour bar."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.figures.scales import scale
+from printhammer.figures.style import HAIR, INK, MUTED, ORANGE, SMALL, TINY
+from printhammer.map_layout import places_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    from printhammer.figures.scales import Scale
+    from printhammer.hammer import Hammer
+    from printhammer.segments import FloatArray
+
+COLOURS: Final = "viridis"
+"""Perceptually uniform, and told apart by the colour-blind (N. Smith and S. van der Walt, 2015)."""
+
+LINES: Final = "white"
+"""Of the firings."""
+
+LOST: Final = "lost dots"
+"""The gid of the marks of lost dots."""
+
+UNKNOWN: Final = "#e4e4e4"
+"""Where the displacement is not known."""
+
+LOWEST, HIGHEST, RATES, TIMES = 500.0, 2500.0, 640, 1024
+"""Range of the rates in the paper's figures as drawn here, Hz, and the numbers of rates and times."""
+
+_KILO: Final = 1e3
+_LOST: Final = 2.0
+
+
+def chart_of(
+    hammer: Hammer, rates: npt.ArrayLike | None = None, times: npt.ArrayLike | None = TIMES
+) -> xr.Dataset:
+    """Return the map of a hammer that a figure shows.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform or no rest state, or the rates are not usable.
+    """
+    from printhammer.maps import frequency_map
+
+    return frequency_map(hammer, np.linspace(LOWEST, HIGHEST, RATES) if rates is None else rates, times=times)
+
+
+def edges(centres: FloatArray) -> FloatArray:
+    """Return the borders of cells about ascending centres, one more than there are."""
+    if len(centres) == 1:
+        return np.asarray([0.98 * centres[0], 1.02 * centres[0]], dtype=np.float64)
+    middle = 0.5 * (centres[1:] + centres[:-1])
+    ends = 2.0 * centres[[0, -1]] - middle[[0, -1]]
+    return np.concatenate([ends[:1], middle, ends[1:]], dtype=np.float64)
+
+
+def rate_unit(rates: FloatArray) -> tuple[float, str]:
+    """Return the factor from Hz to the unit in which rates are shown, and that unit."""
+    return (1.0 / _KILO, "kHz") if rates[-1] >= _KILO else (1.0, "Hz")
+
+
+def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
+    """Return the smallest and the largest displacement of maps, m."""
+    low = min(float(np.nanmin(chart["displacement"])) for chart in charts)
+    high = max(float(np.nanmax(chart["displacement"])) for chart in charts)
+    return low, high if high > low else low + 1e-6
+
+
+def way_of(*charts: xr.Dataset) -> Scale:
+    """Return how the displacements and places of maps are shown."""
+    ends = [*limits_of(*charts), *(place for chart in charts for place in places_of(chart).values())]
+    return scale("displacement", max(map(abs, ends)))
+
+
+def picture(ax: Axes, chart: xr.Dataset, norm: Normalize) -> QuadMesh:
+    """Draw the displacement of a map in colours, time to the right and rate upward; cells as pixels."""
+    from matplotlib import colormaps
+
+    way, time = way_of(chart), scale("time", float(chart["time"][-1]))
+    factor, unit = rate_unit(chart["rate"].values)
+    colours = colormaps[COLOURS].with_extremes(bad=UNKNOWN)
+    moments = edges(chart["time"].values)
+    mesh = ax.pcolormesh(
+        time.shown(moments),
+        factor * edges(chart["rate"].values),
+        np.ma.masked_invalid(way.shown(chart["displacement"].values)),
+        cmap=colours,
+        norm=norm,
+        rasterized=True,
+        zorder=0.5,
+    )
+    mesh.set_gid("displacement")
+    ax.set_facecolor(UNKNOWN)
+    ax.set_xlim(float(time.shown(chart["time"][0])), float(time.shown(chart["time"][-1])))
+    ax.set_xlabel(f"Time from the first firing  [{time.sign}]")
+    ax.set_ylabel(f"Rate  [{unit}]")
+    return mesh
+
+
+def firing_lines(ax: Axes, chart: xr.Dataset) -> None:
+    """Draw a thin line along each firing, and a strong one where its dot is lost."""
+    if "fired_at" not in chart:
+        return
+    time = scale("time", float(chart["time"][-1]))
+    factor, _unit = rate_unit(chart["rate"].values)
+    rates = chart["rate"].values
+    rows = edges(rates)
+    fired, struck = chart["fired_at"].values, chart["struck"].values
+    lost_at: list[float] = []
+    lost_rates: list[float] = []
+    for firing in range(fired.shape[1]):
+        at = time.shown(fired[:, firing])
+        ax.plot(at, factor * rates, color=LINES, lw=HAIR, alpha=0.6, zorder=2.0, gid=f"firing {firing + 1}")
+        for row in np.flatnonzero(~struck[:, firing] & np.isfinite(at)):
+            # The line leans as the firing times do, from one border of the cell to the other.
+            slope = -at[row] / rates[row] if firing else 0.0
+            low, high = rows[row], rows[row + 1]
+            lost_at += [at[row] + slope * (low - rates[row]), at[row] + slope * (high - rates[row]), np.nan]
+            lost_rates += [factor * low, factor * high, np.nan]
+    if lost_at:
+        ax.plot(
+            lost_at, lost_rates, color=ORANGE, lw=_LOST, solid_capstyle="projecting", zorder=2.5, gid=LOST
+        )
+
+
+def key(ax: Axes, chart: xr.Dataset) -> None:
+    """Write above a picture what its lines are."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patheffects import Stroke
+
+    if "fired_at" not in chart:
+        return
+    lost = int((~chart["struck"].values & np.isfinite(chart["fired_at"].values)).sum())
+    fired = int(np.isfinite(chart["fired_at"].values).sum())
+    around = [Stroke(linewidth=3.0, foreground=MUTED), Stroke(linewidth=1.4, foreground=LINES)]
+    handles = [
+        Line2D([], [], color=LINES, lw=HAIR, path_effects=around, label="firings"),
+        Line2D([], [], color=ORANGE, lw=_LOST + 0.8, label=f"lost dots, {lost} of {fired}"),
+    ]
+    ax.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.2,
+        fontsize=SMALL,
+        frameon=False,
+        ncols=2,
+    )
+
+
+def colour_bar(ax: Axes, chart: xr.Dataset, norm: Normalize, way: Scale) -> None:
+    """Draw the scale of the colours from the lowest place to the highest, with marks; white: not reached."""
+    from matplotlib import colormaps
+
+    low, high = float(norm.vmin or 0.0), float(norm.vmax or 1.0)
+    places = {name: float(way.shown(place)) for name, place in places_of(chart).items()}
+    ends = [low, high, *places.values()]
+    room = 0.02 * (max(ends) - min(ends))
+    ax.imshow(
+        np.linspace(0.0, 1.0, 256)[:, np.newaxis],
+        extent=(0.0, 1.0, low, high),
+        origin="lower",
+        aspect="auto",
+        cmap=colormaps[COLOURS],
+        interpolation="nearest",
+    )
+    ax.set_xlim(0.0, 1.0)
+    ax.set_ylim(min(ends) - room, max(ends) + room)
+    ax.set_xticks([])
+    ax.yaxis.set_label_position("right")
+    ax.yaxis.tick_right()
+    ax.tick_params(axis="y", left=False, right=True)
+    ax.set_ylabel(f"Displacement  [{way.sign}]")
+    for name, at in places.items():
+        for colour, width in (("white", 2.0), (INK, 0.9)):
+            ax.axhline(at, color=colour, lw=width, gid=name)
+        ax.annotate(
+            name,
+            (0.0, at),
+            xycoords=("axes fraction", "data"),
+            xytext=(-3.0, 0.0),
+            textcoords="offset points",
+            ha="right",
+            va="center",
+            fontsize=SMALL,
+            color=INK,
+        )
+
+
+def failures(chart: xr.Dataset) -> str:
+    """Say how many runs of a map did not reach their end, and why; empty if all did."""
+    if "status" not in chart:
+        return ""
+    status = chart["status"].values
+    codes = dict(
+        part.split(" ", 1) for part in str(chart["status"].attrs.get("codes", "")).split(", ") if part
+    )
+    failed = status[status != 0]
+    if not failed.size:
+        return ""
+    names = ", ".join(
+        f"{codes.get(str(code), str(code))} ({int((failed == code).sum())})" for code in np.unique(failed)
+    )
+    return f"{failed.size} of {status.size} runs did not reach their end: {names}; grey after it."
+
+
+def sign_map(figure: Figure, chart: xr.Dataset, *remarks: str) -> None:
+    """Write below a figure where its map comes from, and remarks above it."""
+    told = [str(chart.attrs.get("hammer", chart.attrs.get("source", "")))]
+    if "hammer_fingerprint" in chart.attrs:
+        told.append(str(chart.attrs["hammer_fingerprint"])[:8])
+    constants = str(chart.attrs.get("hammer_constants", ""))
+    if constants.startswith("in part"):
+        told.append(f"constants {constants}")
+    text = figure.supxlabel(" · ".join(filter(None, told)), x=0.99, ha="right", fontsize=TINY, color=MUTED)
+    text.set_in_layout(True)
+    shown = [remark for remark in remarks if remark]
+    if shown:
+        figure.suptitle("\n".join(shown), x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
+
+
+def norm_of(way: Scale, *charts: xr.Dataset) -> Any:
+    """Return the scale of the colours that holds the displacements of maps."""
+    from matplotlib.colors import Normalize
+
+    low, high = limits_of(*charts)
+    return Normalize(float(way.shown(low)), float(way.shown(high)))
