@@ -38,6 +38,9 @@ TEMPLATES = (
     "quadrature",
     "stretch",
     "members",
+    "slopes",
+    "variation",
+    "tangent",
 )
 """Template modules in the order in which they use one another."""
 
@@ -65,7 +68,7 @@ class Kernel:
 
     Attributes
     ----------
-    run, resample, quadratures, peaks, members
+    run, resample, quadratures, peaks, members, tangent
         Entry points; see the template modules of the same names.
     """
 
@@ -78,6 +81,7 @@ class Kernel:
             "peaks": modules["resample"].peaks,
             "quadratures": modules["quadrature"].quadratures,
             "members": modules["members"].members,
+            "tangent": modules["tangent"].tangent,
         }
 
     def __getattr__(self, name: str) -> Any:

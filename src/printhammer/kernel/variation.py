@@ -1,0 +1,291 @@
+"""The variational equations between two switches, integrated together with the motion by DOP853.
+
+A column is a variation (dx, dv, dp) of displacement [m], velocity [m/s] and latest local maximum in the pack
+[m], all at one time. Off the backstop
+
+    d(dx)/dt = dv,    d(dv)/dt = a_x dx + a_v dv + a_p dp,    dp constant,
+
+and in the backstop, with w = sqrt(b - x) and dt = 2 w ds,
+
+    d(dx)/ds = 2 w dv,    d(dv)/ds = -a_w dx + 2 w a_v dv,
+
+which is smooth where a_x = -a_w / (2 w) is not. The derivation is in docs/tangent.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from printhammer.kernel import dop853_tableau as T
+from printhammer.kernel.compiling import compiled
+from printhammer.kernel.layout import FRONT, INVERSE_MASS, POSITION
+from printhammer.kernel.modes import (
+    ANY_SCALES,
+    BACKSTOP,
+    HELD,
+    HELD_LOADING,
+    HELD_UNLOADING,
+    LOADING,
+    RELOADING,
+    RESTING,
+    UNLOADING,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.contact import contact_rate
+    from printhammer.kernel.dop853 import contact_step
+    from printhammer.kernel.forces import Hammer, acceleration, backstop_acceleration
+    from printhammer.kernel.laws import HAS_BACKSTOP, HAS_PACK, MEMORY
+    from printhammer.kernel.pulses import Drive, drive_value
+    from printhammer.kernel.resample import memory_of, state_in_step
+    from printhammer.kernel.slopes import (
+        contact_slopes,
+        field_slope,
+        memory_slope,
+        note_memories,
+        pack_slopes,
+    )
+
+STAGES = 12
+A = np.array(
+    [[getattr(T, f"A{i:02d}_{j:02d}", 0.0) for j in range(1, STAGES + 1)] for i in range(1, STAGES + 1)]
+)
+B = np.array([getattr(T, f"B{j:02d}", 0.0) for j in range(1, STAGES + 1)])
+
+START, STAGE, MEMORIES = STAGES, STAGES + 1, STAGES + 2
+WORK_ROWS = STAGES + 3
+"""Rows of the working space: slopes of the stages, state at the start, state at a stage, memories."""
+FIRST_COLUMN = 3
+"""Place of the first column in a row of the working space, after displacement or w, velocity and time."""
+
+GRADING = 1.0 / 64.0
+"""Shortest share of a step after a touch of the pack, whose slope is not smooth there."""
+
+
+def work_width(columns: int) -> int:
+    """Return the length of the rows of the working space."""
+    return max(FIRST_COLUMN + 2 * columns, 5)
+
+
+@compiled
+def variation_rates(
+    rates: Any,
+    y: Any,
+    columns: Any,
+    mode: int,
+    memory: float,
+    peak: float,
+    memories: Any,
+    scales: Any,
+    bounds: Any,
+    hammer: Hammer,
+    drive: Drive,
+) -> None:
+    """Fill `rates` with the rates of displacement or w, velocity, time and columns at `y`."""
+    v, t = y[1], y[2]
+    if HAS_BACKSTOP and mode == BACKSTOP:
+        w = y[0]
+        rates[0] = -v
+        rates[1] = 2.0 * w * backstop_acceleration(t, w, v, hammer, drive)
+        rates[2] = 2.0 * w
+        with_w, with_v = contact_slopes(w, v, scales, hammer)
+        field = field_slope(hammer[POSITION] - w * w, drive_value(t, drive), scales, bounds, hammer)
+        by_x = (2.0 * w * field - with_w) * hammer[INVERSE_MASS]
+        by_v = 2.0 * w * with_v * hammer[INVERSE_MASS]
+        for j in range(FIRST_COLUMN, FIRST_COLUMN + 2 * columns.shape[1], 2):
+            rates[j] = 2.0 * w * y[j + 1]
+            rates[j + 1] = by_x * y[j] + by_v * y[j + 1]
+        return
+    x = y[0]
+    rates[0] = v
+    rates[1] = acceleration(t, x, v, mode, memory, hammer, drive)
+    rates[2] = 1.0
+    by_x = field_slope(x, drive_value(t, drive), scales, bounds, hammer)
+    by_v, by_peak = 0.0, 0.0
+    if HAS_PACK and mode in (LOADING, UNLOADING, RELOADING):
+        pack_x, by_v = pack_slopes(x, v, mode, memory, scales, hammer)
+        by_x += pack_x
+        if MEMORY and mode != LOADING:
+            by_peak = memory_slope(x, v, peak, memories, scales, hammer)
+    for k in range(columns.shape[1]):
+        j = FIRST_COLUMN + 2 * k
+        rates[j] = y[j + 1]
+        rates[j + 1] = (by_x * y[j] + by_v * y[j + 1] + by_peak * columns[2, k]) * hammer[INVERSE_MASS]
+
+
+@compiled
+def variation_step(
+    length: float,
+    columns: Any,
+    work: Any,
+    mode: int,
+    memory: float,
+    peak: float,
+    scales: Any,
+    bounds: Any,
+    hammer: Hammer,
+    drive: Drive,
+) -> None:
+    """Take one step of `length` (s, or of the variable s in the backstop) from row START of `work`."""
+    count = FIRST_COLUMN + 2 * columns.shape[1]
+    start, y = work[START], work[STAGE]
+    for stage in range(STAGES):
+        for i in range(count):
+            total = 0.0
+            for j in range(stage):
+                total += A[stage, j] * work[j, i]
+            y[i] = start[i] + length * total
+        variation_rates(
+            work[stage], y, columns, mode, memory, peak, work[MEMORIES], scales, bounds, hammer, drive
+        )
+    for i in range(count):
+        total = 0.0
+        for j in range(STAGES):
+            total += B[j] * work[j, i]
+        start[i] += length * total
+
+
+@compiled
+def set_out(work: Any, place: float, v: float, t: float, columns: Any) -> None:
+    """Put a state, `place` being displacement or w, and the columns in row START of `work`."""
+    work[START, 0], work[START, 1], work[START, 2] = place, v, t
+    for k in range(columns.shape[1]):
+        work[START, FIRST_COLUMN + 2 * k] = columns[0, k]
+        work[START, FIRST_COLUMN + 2 * k + 1] = columns[1, k]
+
+
+@compiled
+def bring_back(work: Any, columns: Any) -> None:
+    """Take the columns out of row START of `work`."""
+    for k in range(columns.shape[1]):
+        columns[0, k] = work[START, FIRST_COLUMN + 2 * k]
+        columns[1, k] = work[START, FIRST_COLUMN + 2 * k + 1]
+
+
+@compiled
+def forget(columns: Any) -> None:
+    """Make all columns zero: what was before no longer matters."""
+    for i in range(columns.shape[0]):
+        for k in range(columns.shape[1]):
+            columns[i, k] = 0.0
+
+
+@compiled
+def length_in_contact(
+    t: float, leaves: bool, t0: float, w0: float, v0: float, hammer: Hammer, drive: Drive
+) -> tuple[float, float, float]:
+    """Return the s, from a state in the backstop at time `t0`, of the time `t` [s], and w and velocity there.
+
+    As `printhammer.kernel.resample.s_at`, but content with what the variation needs. Where the armature
+    `leaves` at `t`, w = 0 is solved for in the end: the time stands still there.
+    """
+    kv0 = contact_rate(w0, v0, t0, hammer, drive)
+    s, change = 0.0, math.inf
+    t1, w1, v1 = t0, w0, v0
+    for number in range(12):
+        if abs(change) <= 1e-8 * s:
+            break
+        left = t - t1
+        under_root = max(w1 * w1 - v1 * left, 0.0)
+        if leaves and number > 0 and v1 > 0.0:
+            change = w1 / v1
+        elif w1 > 0.0 and under_root > 0.0:
+            change = left / (w1 + math.sqrt(under_root))
+        else:
+            change = (w1 - math.sqrt(under_root)) / v1
+        s += change
+        t1, w1, v1, _kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
+    return s, w1, v1
+
+
+@compiled
+def held_in_backstop(
+    pause: float, x: float, w: float, columns: Any, scales: Any, bounds: Any, hammer: Hammer
+) -> float:
+    """Let the columns die out for `pause` [s] about a place of rest in the backstop.
+
+    The linear oscillator with the slopes of that place, in closed form. Returns the logarithm of a factor
+    taken out of the columns.
+    """
+    with_w, with_v = contact_slopes(w, 0.0, scales, hammer)
+    by_x = (field_slope(x, 0.0, scales, bounds, hammer) - with_w / (2.0 * w)) * hammer[INVERSE_MASS]
+    by_v = with_v * hammer[INVERSE_MASS]
+    half = 0.5 * by_v
+    under_root = half * half + by_x
+    if under_root < 0.0:
+        rate = math.sqrt(-under_root)
+        grown, even, odd = half * pause, math.cos(rate * pause), math.sin(rate * pause) / rate
+    else:
+        rate = math.sqrt(under_root)
+        grown = (half + rate) * pause
+        once = math.exp(-2.0 * rate * pause)
+        even = 0.5 * (1.0 + once)
+        odd = 0.5 * (1.0 - once) / rate if rate * pause > 1e-8 else pause
+    for k in range(columns.shape[1]):
+        dx, dv = columns[0, k], columns[1, k]
+        columns[0, k] = (even - half * odd) * dx + odd * dv
+        columns[1, k] = by_x * odd * dx + (even + half * odd) * dv
+    return float(grown)
+
+
+@compiled
+def vary(
+    t_from: float,
+    t_to: float,
+    leaves: bool,
+    node: Any,
+    columns: Any,
+    work: Any,
+    scales: Any,
+    bounds: Any,
+    hammer: Hammer,
+    drive: Drive,
+) -> float:
+    """Carry the columns from `t_from` to `t_to` [s] inside the step that begins at `node`.
+
+    `leaves` tells that a contact with the backstop ends at `t_to` by leaving.
+
+    Returns the logarithm of a factor taken out of the columns.
+    """
+    if t_to <= t_from:
+        return 0.0
+    mode, kept = int(node[3]), node[4]
+    if mode in (RESTING, HELD_LOADING, HELD_UNLOADING):
+        forget(columns)
+        return 0.0
+    if HAS_BACKSTOP and mode == HELD:
+        return held_in_backstop(t_to - t_from, node[1], kept, columns, scales, bounds, hammer)
+    if HAS_BACKSTOP and mode == BACKSTOP:
+        t, v, w = node[0], node[2], kept
+        if w == 0.0 and v == 0.0:
+            # The step that only gets the regularised equations going.
+            for k in range(columns.shape[1]):
+                columns[0, k] += (t_to - t_from) * columns[1, k]
+            return 0.0
+        if t_from > t:
+            _s, w, v = length_in_contact(t_from, False, t, w, v, hammer, drive)
+            t = t_from
+        length, _w, _v = length_in_contact(t_to, leaves, t, w, v, hammer, drive)
+        set_out(work, w, v, t, columns)
+        variation_step(length, columns, work, mode, 0.0, 0.0, scales, bounds, hammer, drive)
+        bring_back(work, columns)
+        return 0.0
+    x, v, _w = state_in_step(t_from, node[0], node[1], node[2], mode, kept, hammer, drive)
+    memory = memory_of(mode, kept, hammer)
+    set_out(work, x, v, t_from, columns)
+    if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
+        note_memories(work[MEMORIES], kept, scales, hammer)
+    while work[START, 2] < t_to:
+        left = t_to - work[START, 2]
+        length = left
+        if HAS_PACK and mode == LOADING and work[START, 1] > 0.0:
+            since = (work[START, 0] - hammer[FRONT]) / work[START, 1]
+            length = min(left, max(since, GRADING * (t_to - t_from)))
+        variation_step(length, columns, work, mode, memory, kept, scales, bounds, hammer, drive)
+        if length == left:
+            break
+    bring_back(work, columns)
+    return 0.0
