@@ -10,8 +10,10 @@ from __future__ import annotations
 import shutil
 import tempfile
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
-NETCDF: Final = (".nc", ".nc4", ".h5")
 ZARR: Final = ".zarr"
 FILES: Final = (".nc", ZARR)
 """Endings of the files that a map is written to."""
@@ -147,7 +148,10 @@ def _save_zarr(chart: xr.Dataset, target: Path) -> None:
     draft: Path | None = None
     try:
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
-        chart.to_zarr(draft / target.name, mode="w", consolidated=False)
+        with catch_warnings():
+            # Metadata in one place spare readers a warning; each array has its own as well.
+            simplefilter("ignore", UserWarning)
+            chart.to_zarr(draft / target.name, mode="w", zarr_format=3, consolidated=True)
         if target.exists():
             target.rename(draft / "before")
         (draft / target.name).rename(target)
@@ -169,12 +173,8 @@ def need_zarr(path: Path) -> None:
     InputError
         It is not installed.
     """
-    try:
-        import zarr  # noqa: F401
-    except ImportError:
-        raise InputError(
-            f"{path}: Zarr stores need zarr, which the extra printhammer[sweep] installs"
-        ) from None
+    if find_spec("zarr") is None:
+        raise InputError(f"{path}: Zarr stores need zarr, which the extra printhammer[sweep] installs")
 
 
 def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

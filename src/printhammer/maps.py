@@ -123,7 +123,7 @@ def frequency_map(
     codes = ", ".join(f"{code} {name}" for code, name in sorted(named.items()))
     variables: dict[str, npt.NDArray[Any]] = {
         "displacement": x,
-        "fired_at": dots.fired_at,
+        "fired_at": np.where(dots.fired, dots.fired_at, np.nan),
         "struck": dots.struck,
         "flight_time": dots.flight_time,
         "peak_force": dots.peak_force,
