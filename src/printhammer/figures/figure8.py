@@ -14,11 +14,9 @@ from printhammer.figures.map_marks import (
     chart_of,
     failures,
     limits_of,
-    rate_unit,
+    scales_of,
     sign_map,
-    way_of,
 )
-from printhammer.figures.scales import scale
 from printhammer.figures.style import BLUE, HAIR, INK, MUTED, SMALL, new_figure, styled
 from printhammer.map_layout import places_of
 
@@ -47,10 +45,13 @@ _TALL: Final = 0.22
 
 _TICK: Final = 0.008
 
+_SHEETS: Final = 2.0
+"""One for curves and sheets alike, so that they are drawn in the order in which they are made."""
+
 _FLAT: Final = 4e-4
 """How far a drawn curve may be from the computed one, in the units of the picture: 0.15 points."""
 
-_POST: Final = 0.12
+_POST: Final = 0.13
 """Way from the displacement axis to the curves."""
 
 
@@ -104,7 +105,7 @@ def figure8(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
     """
     if chart is None:
         chart = chart_of(hammer, np.linspace(LOWEST, HIGHEST, CURVES) if rates is None else rates, _TIMES)
-    way = way_of(chart)
+    scales = scales_of(chart)
     places = places_of(chart)
     low, high = limits_of(chart)
     every = chart["rate"].values
@@ -120,10 +121,10 @@ def figure8(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
     rows = np.unique(np.linspace(0, len(every) - 1, min(CURVES, len(every))).round().astype(int))
     for row in rows[::-1]:
         _sheet(ax, view, time, chart["displacement"].values[row], float(every[row]), places.get("pack"))
-    _time_axis(ax, view)
-    _height_axis(ax, view, way, places)
-    _rate_axis(ax, view, every)
-    ax.set_xlim(-0.25, 1.10)
+    _time_axis(ax, view, scales.time)
+    _height_axis(ax, view, scales.way, places)
+    _rate_axis(ax, view, scales.rate)
+    ax.set_xlim(-0.26, 1.10)
     ax.set_ylim(-0.09, _LEAN[1] + _TALL)
     sign_map(figure, chart, failures(chart))
     return figure
@@ -137,12 +138,12 @@ def _sheet(ax: Axes, view: _View, time: FloatArray, x: FloatArray, rate: float, 
     t, x = time[known], x[known].astype(np.float64)
     across, up = thinned(view.across(t, rate), view.up(x, rate), _FLAT)
     foot = float(view.up(view.heights[0], rate))
-    ax.fill([across[0], *across, across[-1]], [foot, *up, foot], color="white", lw=0.0)
-    (line,) = ax.plot(across, up, color=INK, lw=0.4)
+    ax.fill([across[0], *across, across[-1]], [foot, *up, foot], color="white", lw=0.0, zorder=_SHEETS)
+    (line,) = ax.plot(across, up, color=INK, lw=0.4, zorder=_SHEETS)
     line.set_gid(f"rate {rate:.6g}")
     if front is not None and (x > front).any():
         level = float(view.up(front, rate))
-        (line,) = ax.plot(*_above(across, up, level), color=BLUE, lw=0.6)
+        (line,) = ax.plot(*_above(across, up, level), color=BLUE, lw=0.6, zorder=_SHEETS)
         line.set_gid(f"in the pack at {rate:.6g}")
 
 
@@ -176,9 +177,8 @@ def _above(x: FloatArray, y: FloatArray, level: float) -> tuple[FloatArray, Floa
     return x, np.where(y >= level, y, np.nan)
 
 
-def _time_axis(ax: Axes, view: _View) -> None:
+def _time_axis(ax: Axes, view: _View, time: Scale) -> None:
     first, last = view.times
-    time = scale("time", last)
     foot = float(view.up(view.heights[0], view.rates[0]))
     ax.plot(view.across([first, last], view.rates[0]), [foot, foot], color=INK, lw=HAIR)
     for tick in _ticks(float(time.shown(first)), float(time.shown(last)), 9):
@@ -216,22 +216,21 @@ def _height_axis(ax: Axes, view: _View, way: Scale, places: dict[str, float]) ->
     _text(ax, text, (at, middle), (-26.0, 0.0), ha="right", va="center", fontsize="medium", rotation=90.0)
 
 
-def _rate_axis(ax: Axes, view: _View, rates: FloatArray) -> None:
-    factor, unit = rate_unit(rates)
+def _rate_axis(ax: Axes, view: _View, shown: Scale) -> None:
     end, floor = view.times[1], view.heights[0]
     first, last = view.rates
     across = [float(view.across(end, rate)) for rate in (first, last)]
     up = [float(view.up(floor, rate)) for rate in (first, last)]
     ax.plot(across, up, color=INK, lw=HAIR)
-    for tick in _ticks(factor * first, factor * last, 5):
-        rate = tick / factor
+    for tick in _ticks(float(shown.shown(first)), float(shown.shown(last)), 5):
+        rate = tick / shown.factor
         at = float(view.across(end, rate)), float(view.up(floor, rate))
         ax.plot([at[0], at[0] + _TICK], [at[1], at[1]], color=INK, lw=HAIR)
         _text(ax, f"{tick:g}", (at[0] + _TICK, at[1]), (2.0, 0.0), ha="left", va="center")
     middle = 0.5 * (across[0] + across[1]), 0.5 * (up[0] + up[1])
     _text(
         ax,
-        f"Rate  [{unit}]",
+        f"{shown.label}  [{shown.sign}]",
         middle,
         (32.0, -4.0),
         ha="center",

@@ -12,8 +12,8 @@ from printhammer.figures.map_marks import (
     key,
     norm_of,
     picture,
+    scales_of,
     sign_map,
-    way_of,
 )
 from printhammer.figures.style import new_figure, styled
 
@@ -50,14 +50,14 @@ def figure9(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
         The hammer has no waveform or no rest state.
     """
     found = chart_of(hammer, rates) if chart is None else chart
-    way = way_of(found)
-    norm = norm_of(way, found)
+    scales = scales_of(found)
+    norm = norm_of(scales, found)
     figure = new_figure(4.6)
     grid = figure.add_gridspec(1, 2, width_ratios=(30.0, 1.0))
     panel, bar = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
-    picture(panel, found, norm)
-    firing_lines(panel, found)
+    picture(panel, found, norm, scales)
+    firing_lines(panel, found, scales)
     key(panel, found)
-    colour_bar(bar, found, norm, way)
+    colour_bar(bar, found, norm, scales)
     sign_map(figure, found, failures(found))
     return figure

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.figures.scales import scale
+from printhammer.figures.scales import Scale, scale
 from printhammer.figures.style import HAIR, INK, MUTED, ORANGE, SMALL, TINY
 from printhammer.map_layout import places_of
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
-    from printhammer.figures.scales import Scale
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
@@ -65,9 +65,24 @@ def edges(centres: FloatArray) -> FloatArray:
     return np.concatenate([ends[:1], middle, ends[1:]], dtype=np.float64)
 
 
-def rate_unit(rates: FloatArray) -> tuple[float, str]:
-    """Return the factor from Hz to the unit in which rates are shown, and that unit."""
-    return (1.0 / _KILO, "kHz") if rates[-1] >= _KILO else (1.0, "Hz")
+@dataclass(frozen=True)
+class Scales:
+    """How the displacements, times and rates of maps are shown."""
+
+    way: Scale
+    time: Scale
+    rate: Scale
+
+
+def scales_of(*charts: xr.Dataset) -> Scales:
+    """Return the scales that suit all of some maps."""
+    ends = [*limits_of(*charts), *(place for chart in charts for place in places_of(chart).values())]
+    fast = max(float(chart["rate"][-1]) for chart in charts)
+    return Scales(
+        scale("displacement", max(map(abs, ends))),
+        scale("time", max(float(chart["time"][-1]) for chart in charts)),
+        Scale("Rate", "Hz", "kHz" if fast >= _KILO else "Hz"),
+    )
 
 
 def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
@@ -77,25 +92,16 @@ def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
     return low, high if high > low else low + 1e-6
 
 
-def way_of(*charts: xr.Dataset) -> Scale:
-    """Return how the displacements and places of maps are shown."""
-    ends = [*limits_of(*charts), *(place for chart in charts for place in places_of(chart).values())]
-    return scale("displacement", max(map(abs, ends)))
-
-
-def picture(ax: Axes, chart: xr.Dataset, norm: Normalize) -> QuadMesh:
+def picture(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> QuadMesh:
     """Draw the displacement of a map in colours, time to the right and rate upward; cells as pixels."""
     from matplotlib import colormaps
 
-    way, time = way_of(chart), scale("time", float(chart["time"][-1]))
-    factor, unit = rate_unit(chart["rate"].values)
-    colours = colormaps[COLOURS].with_extremes(bad=UNKNOWN)
-    moments = edges(chart["time"].values)
+    time, rate = scales.time, scales.rate
     mesh = ax.pcolormesh(
-        time.shown(moments),
-        factor * edges(chart["rate"].values),
-        np.ma.masked_invalid(way.shown(chart["displacement"].values)),
-        cmap=colours,
+        time.shown(edges(chart["time"].values)),
+        rate.shown(edges(chart["rate"].values)),
+        np.ma.masked_invalid(scales.way.shown(chart["displacement"].values)),
+        cmap=colormaps[COLOURS].with_extremes(bad=UNKNOWN),
         norm=norm,
         rasterized=True,
         zorder=0.5,
@@ -104,16 +110,15 @@ def picture(ax: Axes, chart: xr.Dataset, norm: Normalize) -> QuadMesh:
     ax.set_facecolor(UNKNOWN)
     ax.set_xlim(float(time.shown(chart["time"][0])), float(time.shown(chart["time"][-1])))
     ax.set_xlabel(f"Time from the first firing  [{time.sign}]")
-    ax.set_ylabel(f"Rate  [{unit}]")
+    ax.set_ylabel(f"{rate.label}  [{rate.sign}]")
     return mesh
 
 
-def firing_lines(ax: Axes, chart: xr.Dataset) -> None:
+def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
     """Draw a thin line along each firing, and a strong one where its dot is lost."""
     if "fired_at" not in chart:
         return
-    time = scale("time", float(chart["time"][-1]))
-    factor, _unit = rate_unit(chart["rate"].values)
+    time, shown = scales.time, scales.rate
     rates = chart["rate"].values
     rows = edges(rates)
     fired, struck = chart["fired_at"].values, chart["struck"].values
@@ -121,13 +126,15 @@ def firing_lines(ax: Axes, chart: xr.Dataset) -> None:
     lost_rates: list[float] = []
     for firing in range(fired.shape[1]):
         at = time.shown(fired[:, firing])
-        ax.plot(at, factor * rates, color=LINES, lw=HAIR, alpha=0.6, zorder=2.0, gid=f"firing {firing + 1}")
+        ax.plot(
+            at, shown.shown(rates), color=LINES, lw=HAIR, alpha=0.6, zorder=2.0, gid=f"firing {firing + 1}"
+        )
         for row in np.flatnonzero(~struck[:, firing] & np.isfinite(at)):
             # The line leans as the firing times do, from one border of the cell to the other.
             slope = -at[row] / rates[row] if firing else 0.0
             low, high = rows[row], rows[row + 1]
             lost_at += [at[row] + slope * (low - rates[row]), at[row] + slope * (high - rates[row]), np.nan]
-            lost_rates += [factor * low, factor * high, np.nan]
+            lost_rates += [*shown.shown([low, high]).tolist(), np.nan]
     if lost_at:
         ax.plot(
             lost_at, lost_rates, color=ORANGE, lw=_LOST, solid_capstyle="projecting", zorder=2.5, gid=LOST
@@ -159,10 +166,11 @@ def key(ax: Axes, chart: xr.Dataset) -> None:
     )
 
 
-def colour_bar(ax: Axes, chart: xr.Dataset, norm: Normalize, way: Scale) -> None:
+def colour_bar(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> None:
     """Draw the scale of the colours from the lowest place to the highest, with marks; white: not reached."""
     from matplotlib import colormaps
 
+    way = scales.way
     low, high = float(norm.vmin or 0.0), float(norm.vmax or 1.0)
     places = {name: float(way.shown(place)) for name, place in places_of(chart).items()}
     ends = [low, high, *places.values()]
@@ -230,9 +238,9 @@ def sign_map(figure: Figure, chart: xr.Dataset, *remarks: str) -> None:
         figure.suptitle("\n".join(shown), x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
 
 
-def norm_of(way: Scale, *charts: xr.Dataset) -> Any:
+def norm_of(scales: Scales, *charts: xr.Dataset) -> Normalize:
     """Return the scale of the colours that holds the displacements of maps."""
     from matplotlib.colors import Normalize
 
     low, high = limits_of(*charts)
-    return Normalize(float(way.shown(low)), float(way.shown(high)))
+    return Normalize(float(scales.way.shown(low)), float(scales.way.shown(high)))

@@ -1,0 +1,92 @@
+"""A computed and a measured frequency-time map side by side, on the same scales, and how far they differ."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from printhammer.figures.map_marks import (
+    colour_bar,
+    edges,
+    failures,
+    firing_lines,
+    norm_of,
+    picture,
+    scales_of,
+    sign_map,
+)
+from printhammer.figures.style import BLUE, SMALL, new_figure, styled
+from printhammer.maps import rms_difference
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.figures.map_marks import Scales
+
+
+@styled
+def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
+    """Draw a computed and a measured map side by side, with the root mean square of their difference.
+
+    Parameters
+    ----------
+    computed : xarray.Dataset
+        A map from `printhammer.frequency_map`.
+    measured : xarray.Dataset
+        A map from `printhammer.measured_map.load_measured_map`, or another computed one.
+
+    Returns
+    -------
+    Figure
+        The figure. In the third panel, "difference" is the gid of the root mean square over time, for every
+        rate that both have; in grey areas the displacement is not known.
+    """
+    scales = scales_of(computed, measured)
+    norm = norm_of(scales, computed, measured)
+    figure = new_figure(4.4, 8.6)
+    grid = figure.add_gridspec(1, 4, width_ratios=(10.0, 10.0, 3.4, 0.7))
+    left = figure.add_subplot(grid[0])
+    right = figure.add_subplot(grid[1], sharex=left, sharey=left)
+    beside = figure.add_subplot(grid[2], sharey=left)
+    bar = figure.add_subplot(grid[3])
+    for ax, chart, name in ((left, computed, "computed"), (right, measured, "measured")):
+        picture(ax, chart, norm, scales)
+        firing_lines(ax, chart, scales)
+        ax.set_title(name, loc="left", fontsize=SMALL)
+    for ax in (right, beside):
+        ax.set_ylabel("")
+        ax.tick_params(axis="y", labelleft=False)
+    _limits(left, scales, computed, measured)
+    remark = _difference(beside, scales, computed, measured)
+    colour_bar(bar, computed, norm, scales)
+    sign_map(figure, computed, failures(computed), remark)
+    return figure
+
+
+def _limits(ax: Axes, scales: Scales, *charts: xr.Dataset) -> None:
+    """Have both pictures, which share their axes, show all of both maps."""
+    rows = [scales.rate.shown(edges(chart["rate"].values)) for chart in charts]
+    ax.set_ylim(min(row[0] for row in rows), max(row[-1] for row in rows))
+    ends = [scales.time.shown(chart["time"].values[[0, -1]]) for chart in charts]
+    ax.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
+
+
+def _difference(ax: Axes, scales: Scales, computed: xr.Dataset, measured: xr.Dataset) -> str:
+    """Draw the root mean square of the difference against rate; say so where there is none."""
+    way = scales.way
+    rates, difference = rms_difference(computed, measured)
+    ax.set_title("difference", loc="left", fontsize=SMALL)
+    ax.set_xlabel(f"RMS  [{way.sign}]")
+    ax.tick_params(axis="x", top=True)
+    known = np.isfinite(difference)
+    if not known.any():
+        ax.set_xticks([])
+        return "No rate is in both maps; nothing is known of their difference."
+    style: dict[str, Any] = {"color": BLUE, "lw": 0.8, "marker": "o", "ms": 2.6 if known.sum() < 80 else 0.0}
+    (line,) = ax.plot(way.shown(difference[known]), scales.rate.shown(rates[known]), **style)
+    line.set_gid("difference")
+    ax.set_xlim(0.0, 1.08 * max(float(way.shown(difference[known].max())), 1e-12))
+    return ""
