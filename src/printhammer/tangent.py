@@ -17,7 +17,7 @@ from printhammer.drive import Drive, PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer import Hammer
 from printhammer.kernel import carry
-from printhammer.kernel.modes import OK, PAUSED, RELOADING, STATUS_NAMES, UNLOADING
+from printhammer.kernel.modes import HELD_UNLOADING, OK, PAUSED, RELOADING, STATUS_NAMES, UNLOADING
 from printhammer.problem import MAX_STEPS, TOLERANCE, Problem
 from printhammer.threads import in_threads, thread_count
 
@@ -55,7 +55,7 @@ class TangentMap:
     state_at_start, state_at_end : tuple of float
         Displacement, m, velocity, m/s, and latest local maximum, m (0 where it is not part of the state).
     branch_at_start, branch_at_end : int
-        Codes of the modes, see `printhammer.kernel.modes`.
+        Codes of the modes, see `printhammer.kernel.modes`; -1 where the run did not get.
     smooth : bool
         False where the motion in between passes a touch without velocity, where the state has no derivative.
     status : str
@@ -180,19 +180,22 @@ def tangent_map(
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
         raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
     problem = _problem(hammer, drive, state, tolerance)
-    columns = np.eye(3)
-    status, smooth, found = _follow(problem, np.array([start, end]), columns, renormalise=False)
-    shape = [3 if int(row[2]) in (UNLOADING, RELOADING) and row[3] != 0.0 else 2 for row in found]
-    matrix = columns[: shape[1], : shape[0]].copy() if status == OK else np.full((2, shape[0]), np.nan)
+    followed = _follow(problem, np.array([start, end]), np.eye(3), renormalise=False)
+    found, status = followed.found, followed.status
+    branches = [int(code) if code >= 0.0 else -1 for code in found[:, 2]]
+    shape = [3 if branch in (UNLOADING, RELOADING, HELD_UNLOADING) else 2 for branch in branches]
+    matrix = (
+        followed.columns[: shape[1], : shape[0]].copy() if status == OK else np.full((2, shape[0]), np.nan)
+    )
     return TangentMap(
         matrix=matrix,
         start=start,
         end=end,
-        state_at_start=(found[0, 0], found[0, 1], found[0, 3]),
-        state_at_end=(found[1, 0], found[1, 1], found[1, 3]),
-        branch_at_start=int(found[0, 2]),
-        branch_at_end=int(found[1, 2]),
-        smooth=smooth,
+        state_at_start=(float(found[0, 0]), float(found[0, 1]), float(found[0, 3])),
+        state_at_end=(float(found[1, 0]), float(found[1, 1]), float(found[1, 3])),
+        branch_at_start=branches[0],
+        branch_at_end=branches[1],
+        smooth=followed.smooth,
         status=STATUS_NAMES[status],
     )
 
@@ -245,17 +248,16 @@ def strobe_exponent(
     problem = _problem(hammer, drive, state, tolerance)
     before = max(first - 1 - _WARM_UP, 0)
     scale, speed = problem.scales
-    columns = np.zeros((3, 2))
-    columns[0, 0], columns[1, 1] = scale, speed
-    status, smooth, found = _follow(problem, times[before:], columns, renormalise=True)
-    growth = found[first - before :, 4:]
+    initial = np.array([[scale, 0.0], [0.0, speed], [0.0, 0.0]])
+    followed = _follow(problem, times[before:], initial, renormalise=True)
+    growth = followed.found[first - before :, 4:]
     factors = growth[:, 0].copy()
-    if status == OK:
+    if followed.status == OK:
         value, second = (float(mean) for mean in growth.mean(axis=0))
         error = standard_error(factors)
     else:
         value = error = second = math.nan
-    return Exponent(value, error, second, spacing, factors, smooth, STATUS_NAMES[status])
+    return Exponent(value, error, second, spacing, factors, followed.smooth, STATUS_NAMES[followed.status])
 
 
 def strobe_exponents(
@@ -368,29 +370,35 @@ def _strobes(
     return drive, times[:last], float(spacing)
 
 
-def _follow(
-    problem: Problem, marks: FloatArray, columns: FloatArray, *, renormalise: bool
-) -> tuple[int, bool, FloatArray]:
+@dataclass(frozen=True)
+class _Followed:
+    """Status code, differentiability, the kernel's `found` at the marks (NaN beyond), columns at the last."""
+
+    status: int
+    smooth: bool
+    found: FloatArray
+    columns: FloatArray
+
+
+def _follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> _Followed:
     """Run a problem to the last mark and carry columns along from the first.
 
-    Returns status, smoothness, and what the kernel's `tangent` finds at the marks, NaN where the run did not
-    get. The record is kept in stretches: memory does not grow with the length of the run.
+    The record is kept in stretches: memory does not grow with the length of the run.
     """
     capacity = _NODES
-    original = columns.copy()
     while True:
-        columns[:] = original
-        outcome = _stretches(problem, marks, columns, renormalise, capacity)
-        if outcome is not None:
-            return outcome
+        followed = _stretches(problem, marks, initial, renormalise, capacity)
+        if followed is not None:
+            return followed
         capacity *= 4
 
 
 def _stretches(
-    problem: Problem, marks: FloatArray, columns: FloatArray, renormalise: bool, capacity: int
-) -> tuple[int, bool, FloatArray] | None:
+    problem: Problem, marks: FloatArray, initial: FloatArray, renormalise: bool, capacity: int
+) -> _Followed | None:
     """Do as `_follow` with a record of at most `capacity` nodes; None where one contact alone needs more."""
-    count = columns.shape[1]
+    count = initial.shape[1]
+    columns = np.zeros((3, count))
     found = np.full((len(marks), 4 + count), np.nan)
     track = np.zeros(2 + count)
     track[1] = 1.0
@@ -427,10 +435,11 @@ def _stretches(
             problem.bounds,
             marks,
             renormalise,
-            columns,
             status != PAUSED,
+            initial,
+            columns,
             work,
             track,
             found,
         )
-    return status, bool(track[1]), found
+    return _Followed(status, bool(track[1]), found, columns)

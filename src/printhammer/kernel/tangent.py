@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled, entry
-from printhammer.kernel.layout import BACKSTOP_PART, MAGNET
+from printhammer.kernel.layout import BACKSTOP_PART, MAGNET, POSITION
 from printhammer.kernel.modes import (
     BACKSTOP,
     BACKSTOP_RELEASED,
@@ -21,13 +21,14 @@ from printhammer.kernel.modes import (
     RELOADING,
     UNLOADING,
 )
+from printhammer.kernel.variation import START
 
 if TYPE_CHECKING:
     from printhammer.kernel.forces import Hammer, acceleration, backstop_acceleration
     from printhammer.kernel.laws import HAS_PACK, MEMORY, RIGID, backstop_rebound
     from printhammer.kernel.pulses import Drive, edges_at, pass_edges
-    from printhammer.kernel.resample import branch_of, memory_of, state_in_step
-    from printhammer.kernel.variation import vary
+    from printhammer.kernel.resample import branch_of, memory_of
+    from printhammer.kernel.variation import begin_step, vary
 
 SPEED_SPACING = 1e-3
 """Share of the speed of an impact by which it is moved to see what a rebound makes of it."""
@@ -166,18 +167,24 @@ def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
 
 
 @compiled
-def note_mark(found: Any, track: Any, x: float, v: float, node: Any, columns: Any) -> None:
-    """Enter state and growth at a mark in its row of `found`."""
+def note_mark(
+    found: Any, track: Any, node: Any, initial: Any, columns: Any, work: Any, hammer: Hammer
+) -> None:
+    """Enter state and growth at a mark in its row of `found`; at the first mark the columns begin."""
     mode = int(node[3])
     row = int(track[DUE])
     remembers = HAS_PACK and MEMORY and branch_of(mode) in (UNLOADING, RELOADING)
-    found[row, 0], found[row, 1], found[row, 2] = x, v, mode
+    place = work[START, 0]
+    found[row, 0] = hammer[POSITION] - place * place if mode == BACKSTOP else place
+    found[row, 1], found[row, 2] = work[START, 1], mode
     found[row, 3] = node[4] if remembers else 0.0
     for k in range(columns.shape[1]):
+        if row == 0:
+            columns[0, k], columns[1, k] = initial[0, k], initial[1, k]
+            columns[2, k] = initial[2, k] if remembers else 0.0
+            track[GROWN + k] = 0.0
         found[row, 4 + k] = track[GROWN + k]
         track[GROWN + k] = 0.0
-        if row == 0 and not remembers:
-            columns[2, k] = 0.0
     track[DUE] += 1.0
 
 
@@ -207,8 +214,9 @@ def tangent(
     bounds: Any,
     marks: Any,
     renormalise: bool,
-    columns: Any,
     ended: bool,
+    initial: Any,
+    columns: Any,
     work: Any,
     track: Any,
     found: Any,
@@ -227,11 +235,12 @@ def tangent(
         Ascending times [s]; at an instant of a switch: after it.
     renormalise : bool
         Whether to make the columns orthonormal at every node and to note their growth instead.
-    columns : float64 array, shape (3, n)
-        Variations of displacement, velocity and latest local maximum; the first mark's on entry, those at
-        the end of the stretch or the last mark afterwards.
     ended : bool
         Whether the run ends with the stretch; otherwise a mark at its end belongs to the next one.
+    initial : float64 array, shape (3, n)
+        Variations of displacement, velocity and latest local maximum at the first mark.
+    columns : float64 array, shape (3, n)
+        Those at the end of the stretch or at the last mark.
     work : float64 array, shape (15, 5 or more)
         Working space, see :mod:`printhammer.kernel.variation`.
     track : float64 array, shape (2 + n,)
@@ -250,21 +259,18 @@ def tangent(
         node = nodes[i]
         after = nodes[min(i + 1, count - 1)]
         final = i + 1 == count
-        t, t_end = node[0], after[0]
-        first, last, _edge = pass_edges(t, firings, pieces, replace, under_way, first, last, live)
+        t_end = after[0]
+        first, last, _edge = pass_edges(node[0], firings, pieces, replace, under_way, first, last, live)
+        begin_step(node, work)
         # A mark at the time of several nodes belongs to the last of them.
         while due < marks.size and (marks[due] < t_end or (final and ended and marks[due] == t_end)):
-            if due > 0:
-                factor = vary(t, marks[due], False, node, columns, work, scales, bounds, hammer, live)
-                scale_or_note(factor, renormalise, columns, scales, grown)
-            t = marks[due]
-            x, v, _w = state_in_step(t, node[0], node[1], node[2], int(node[3]), node[4], hammer, live)
-            note_mark(found, track, x, v, node, columns)
+            factor = vary(marks[due], node, after, columns, work, scales, bounds, hammer, live)
+            scale_or_note(factor, renormalise, columns, scales, grown)
+            note_mark(found, track, node, initial, columns, work, hammer)
             due += 1
         if due in (0, marks.size) or final:
             continue
-        leaves = int(after[3]) == FREE
-        factor = vary(t, t_end, leaves, node, columns, work, scales, bounds, hammer, live)
+        factor = vary(t_end, node, after, columns, work, scales, bounds, hammer, live)
         if not pass_node(node, after, columns, hammer, live):
             track[SMOOTH] = 0.0
         scale_or_note(factor, renormalise, columns, scales, grown)

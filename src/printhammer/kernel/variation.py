@@ -25,6 +25,7 @@ from printhammer.kernel.layout import FRONT, INVERSE_MASS, POSITION
 from printhammer.kernel.modes import (
     ANY_SCALES,
     BACKSTOP,
+    FREE,
     HELD,
     HELD_LOADING,
     HELD_UNLOADING,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.forces import Hammer, acceleration, backstop_acceleration
     from printhammer.kernel.laws import HAS_BACKSTOP, HAS_PACK, MEMORY
     from printhammer.kernel.pulses import Drive, drive_value
-    from printhammer.kernel.resample import memory_of, state_in_step
+    from printhammer.kernel.resample import memory_of
     from printhammer.kernel.slopes import (
         contact_slopes,
         field_slope,
@@ -134,24 +135,31 @@ def variation_step(
     start, y = work[START], work[STAGE]
     for stage in range(STAGES):
         for i in range(count):
-            total = 0.0
-            for j in range(stage):
-                total += A[stage, j] * work[j, i]
-            y[i] = start[i] + length * total
+            y[i] = start[i]
+        for j in range(stage):
+            share = length * A[stage, j]
+            for i in range(count):
+                y[i] += share * work[j, i]
         variation_rates(
             work[stage], y, columns, mode, memory, peak, work[MEMORIES], scales, bounds, hammer, drive
         )
-    for i in range(count):
-        total = 0.0
-        for j in range(STAGES):
-            total += B[j] * work[j, i]
-        start[i] += length * total
+    for j in range(STAGES):
+        share = length * B[j]
+        for i in range(count):
+            start[i] += share * work[j, i]
 
 
 @compiled
-def set_out(work: Any, place: float, v: float, t: float, columns: Any) -> None:
-    """Put a state, `place` being displacement or w, and the columns in row START of `work`."""
-    work[START, 0], work[START, 1], work[START, 2] = place, v, t
+def begin_step(node: Any, work: Any) -> None:
+    """Put the state at a node in row START of `work`."""
+    work[START, 0] = node[4] if int(node[3]) == BACKSTOP else node[1]
+    work[START, 1] = node[2]
+    work[START, 2] = node[0]
+
+
+@compiled
+def set_out(work: Any, columns: Any) -> None:
+    """Put the columns in row START of `work`."""
     for k in range(columns.shape[1]):
         work[START, FIRST_COLUMN + 2 * k] = columns[0, k]
         work[START, FIRST_COLUMN + 2 * k + 1] = columns[1, k]
@@ -176,8 +184,8 @@ def forget(columns: Any) -> None:
 @compiled
 def length_in_contact(
     t: float, leaves: bool, t0: float, w0: float, v0: float, hammer: Hammer, drive: Drive
-) -> tuple[float, float, float]:
-    """Return the s, from a state in the backstop at time `t0`, of the time `t` [s], and w and velocity there.
+) -> float:
+    """Return the s, from a state in the backstop at time `t0`, of the time `t` [s].
 
     As `printhammer.kernel.resample.s_at`, but content with what the variation needs. Where the armature
     `leaves` at `t`, w = 0 is solved for in the end: the time stands still there.
@@ -198,7 +206,7 @@ def length_in_contact(
             change = (w1 - math.sqrt(under_root)) / v1
         s += change
         t1, w1, v1, _kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
-    return s, w1, v1
+    return s
 
 
 @compiled
@@ -233,10 +241,9 @@ def held_in_backstop(
 
 @compiled
 def vary(
-    t_from: float,
     t_to: float,
-    leaves: bool,
     node: Any,
+    after: Any,
     columns: Any,
     work: Any,
     scales: Any,
@@ -244,48 +251,43 @@ def vary(
     hammer: Hammer,
     drive: Drive,
 ) -> float:
-    """Carry the columns from `t_from` to `t_to` [s] inside the step that begins at `node`.
-
-    `leaves` tells that a contact with the backstop ends at `t_to` by leaving.
+    """Carry state and columns from the time in row START of `work` to `t_to` [s], in the step from `node`.
 
     Returns the logarithm of a factor taken out of the columns.
     """
-    if t_to <= t_from:
+    t = work[START, 2]
+    if t_to <= t:
         return 0.0
+    work[START, 2] = t_to
     mode, kept = int(node[3]), node[4]
     if mode in (RESTING, HELD_LOADING, HELD_UNLOADING):
         forget(columns)
         return 0.0
     if HAS_BACKSTOP and mode == HELD:
-        return held_in_backstop(t_to - t_from, node[1], kept, columns, scales, bounds, hammer)
-    if HAS_BACKSTOP and mode == BACKSTOP:
-        t, v, w = node[0], node[2], kept
-        if w == 0.0 and v == 0.0:
-            # The step that only gets the regularised equations going.
-            for k in range(columns.shape[1]):
-                columns[0, k] += (t_to - t_from) * columns[1, k]
-            return 0.0
-        if t_from > t:
-            _s, w, v = length_in_contact(t_from, False, t, w, v, hammer, drive)
-            t = t_from
-        length, _w, _v = length_in_contact(t_to, leaves, t, w, v, hammer, drive)
-        set_out(work, w, v, t, columns)
-        variation_step(length, columns, work, mode, 0.0, 0.0, scales, bounds, hammer, drive)
-        bring_back(work, columns)
+        return held_in_backstop(t_to - t, node[1], kept, columns, scales, bounds, hammer)
+    if HAS_BACKSTOP and mode == BACKSTOP and work[START, 0] == 0.0 and work[START, 1] == 0.0:
+        # The step that only gets the regularised equations going.
+        for k in range(columns.shape[1]):
+            columns[0, k] += (t_to - t) * columns[1, k]
         return 0.0
-    x, v, _w = state_in_step(t_from, node[0], node[1], node[2], mode, kept, hammer, drive)
-    memory = memory_of(mode, kept, hammer)
-    set_out(work, x, v, t_from, columns)
-    if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
-        note_memories(work[MEMORIES], kept, scales, hammer)
-    while work[START, 2] < t_to:
-        left = t_to - work[START, 2]
-        length = left
-        if HAS_PACK and mode == LOADING and work[START, 1] > 0.0:
-            since = (work[START, 0] - hammer[FRONT]) / work[START, 1]
-            length = min(left, max(since, GRADING * (t_to - t_from)))
-        variation_step(length, columns, work, mode, memory, kept, scales, bounds, hammer, drive)
-        if length == left:
-            break
+    work[START, 2] = t
+    set_out(work, columns)
+    if HAS_BACKSTOP and mode == BACKSTOP:
+        leaves = t_to == after[0] and int(after[3]) == FREE
+        length = length_in_contact(t_to, leaves, t, work[START, 0], work[START, 1], hammer, drive)
+        variation_step(length, columns, work, mode, 0.0, 0.0, scales, bounds, hammer, drive)
+    else:
+        memory = memory_of(mode, kept, hammer)
+        if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
+            note_memories(work[MEMORIES], kept, scales, hammer)
+        left = t_to - t
+        while left > 0.0:
+            length = left
+            if HAS_PACK and mode == LOADING and work[START, 1] > 0.0:
+                since = (work[START, 0] - hammer[FRONT]) / work[START, 1]
+                length = min(left, max(since, GRADING * (t_to - t)))
+            variation_step(length, columns, work, mode, memory, kept, scales, bounds, hammer, drive)
+            left = 0.0 if length == left else t_to - work[START, 2]
+    work[START, 2] = t_to
     bring_back(work, columns)
     return 0.0
