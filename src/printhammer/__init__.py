@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from printhammer.chaos import strobe
     from printhammer.drive import Burst, PulseTrain, SineForce
     from printhammer.ensemble import Ensemble, EnsembleResult
     from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from printhammer.maps import frequency_map
     from printhammer.motion import Motion
     from printhammer.simulate import simulate
+    from printhammer.sweep import sweep
     from printhammer.waveforms import Waveform
 
 __version__ = "0.1.0"
@@ -43,6 +45,7 @@ __all__ = [
     "release_current",
     "rest_state",
     "simulate",
+    "sweep",
 ]
 
 _HOME = {
@@ -63,6 +66,7 @@ _HOME = {
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
     "simulate": "simulate",
+    "sweep": "sweep",
 }
 
 

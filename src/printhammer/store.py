@@ -1,0 +1,374 @@
+"""Results on disk: a Zarr v3 group that grows block by block and survives a kill at any moment.
+
+All arrays are laid out before the first result. A block of members is one chunk of every array, so nothing
+is ever read and written back. Each file is written whole beside its place, brought to the disk, and moved
+there; the chunk of the array `MARK` comes last, so a block is done if and only if that file is there. The
+lock of a store ends with the process that holds it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Self
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping, Sequence
+
+    import numpy.typing as npt
+    import xarray as xr
+
+MARK: Final = "status"
+"""The array whose chunk tells that a block is done."""
+
+_ROOT: Final = "zarr.json"
+_FLUSHES: Final = 8
+_ARRAYS: Final = "arrays"
+_DRAFT: Final = f"{MARK}/.draft"
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One array of a store.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    dims : tuple of str
+        Names of its dimensions; those of the members come first.
+    shape : tuple of int
+        Their lengths.
+    dtype : str
+        Type of the numbers, as numpy names it.
+    fill : object
+        What stands where nothing is written yet.
+    attrs : mapping
+        Unit, meaning and the like.
+    values : array or None
+        Of a coordinate, which is written with the layout; None for a result.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    dtype: str
+    fill: Any
+    attrs: Mapping[str, Any] = field(default_factory=dict)
+    values: npt.NDArray[Any] | None = None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a store holds.
+
+    Attributes
+    ----------
+    chunks : tuple of int
+        Members of a block along each of their dimensions.
+    variables : tuple of Variable
+        Results and coordinates, `MARK` among the results.
+    attrs : mapping
+        Attributes of the group.
+    identity : mapping of str to str
+        What must be the same where a sweep goes on.
+    """
+
+    chunks: tuple[int, ...]
+    variables: tuple[Variable, ...]
+    attrs: Mapping[str, Any]
+    identity: Mapping[str, str]
+
+
+class Store:
+    """A store that this process has locked and writes to; closes at the end of a `with`.
+
+    Parameters
+    ----------
+    path : path
+        Folder of the store; made if it is not there.
+    layout : Layout
+        What it holds.
+    now : str
+        Time stamp of its making.
+
+    Raises
+    ------
+    InputError
+        The folder holds something else, or results of another identity; another process is at work on it; it
+        cannot be written; zarr is not installed. What was there stays.
+    """
+
+    def __init__(self, path: str | Path, layout: Layout, now: str) -> None:
+        self.path = Path(path)
+        self._layout = layout
+        self._files, self._group = _encoder(layout)
+        self._encoded = dict(self._files)
+        self._handle = -1
+        try:
+            if self.path.exists() or self.path.is_symlink():
+                self._reopen()
+            else:
+                self._create(now)
+            (self.path / _DRAFT).unlink(missing_ok=True)
+        except OSError as error:
+            self.close()
+            raise self._refusal(error) from None
+        except BaseException:
+            self.close()
+            raise
+
+    def done(self, index: Sequence[int]) -> bool:
+        """Tell whether the block at an index of the chunk grid is done."""
+        return (self.path / _chunk(MARK, index)).exists()
+
+    def write(self, index: Sequence[int], results: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Write all results of a block, whole and for good.
+
+        Parameters
+        ----------
+        index : sequence of int
+            Its place in the chunk grid of the members.
+        results : mapping
+            Arrays by name, of the shape of the block.
+
+        Raises
+        ------
+        InputError
+            They cannot be written; the block then counts as not done.
+        """
+        where = tuple(
+            slice(i * size, i * size + count)
+            for i, size, count in zip(index, self._layout.chunks, results[MARK].shape, strict=True)
+        )
+        for name, values in results.items():
+            self._group[name][where] = values
+        files = {
+            key: self._files.pop(key).to_bytes() for key in list(self._files) if key not in self._encoded
+        }
+        mark = files.pop(_chunk(MARK, index))
+        try:
+            self._put(files)
+            self._put({_chunk(MARK, index): mark})
+        except OSError as error:
+            raise self._refusal(error) from None
+
+    def finish(self, now: str) -> None:
+        """Stamp a complete store; a stamp that is there stays.
+
+        Raises
+        ------
+        InputError
+            The stamp cannot be written.
+        """
+        root = _root(self.path)
+        if root["attributes"].get("finished"):
+            return
+        root["attributes"]["finished"] = now
+        try:
+            self._put({_ROOT: _text(root)})
+        except OSError as error:
+            raise self._refusal(error) from None
+
+    def close(self) -> None:
+        """Give the lock back."""
+        if self._handle >= 0:
+            os.close(self._handle)
+            self._handle = -1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _reopen(self) -> None:
+        root = _root(self.path)
+        there = root["attributes"]
+        for name, asked in self._layout.identity.items():
+            if there.get(name) != asked:
+                raise InputError(
+                    f"{self.path}: the store was made with {name.replace('_', ' ')} {there.get(name)},"
+                    f" expected {asked}, or another place for the results"
+                )
+        self._handle = _locked(self.path, self.path)
+
+    def _create(self, now: str) -> None:
+        """Lay the store out beside its place and move it there whole."""
+        draft = self.path.with_name(f".{self.path.name}.part")
+        draft.mkdir(exist_ok=True)
+        self._handle = _locked(draft, self.path)
+        for entry in draft.iterdir():
+            shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+        files = {key: buffer.to_bytes() for key, buffer in self._encoded.items()}
+        root = json.loads(files[_ROOT])
+        root["attributes"] |= {"created": now, "finished": ""}
+        files[_ROOT] = _text(root)
+        try:
+            for key, data in files.items():
+                (draft / key).parent.mkdir(parents=True, exist_ok=True)
+                (draft / key).write_bytes(data)
+            _flush([draft, *draft.rglob("*")])
+            draft.rename(self.path)
+        except OSError:
+            shutil.rmtree(draft, ignore_errors=True)
+            raise
+        _flush([self.path.parent])
+
+    def _put(self, files: Mapping[str, bytes]) -> None:
+        """Write files, each whole or not at all, and bring them to the disk."""
+        draft = self.path / _DRAFT
+        touched: set[Path] = set()
+        try:
+            for key, data in files.items():
+                target = self.path / key
+                touched |= {target, *_make(target.parent)}
+                draft.write_bytes(data)
+                draft.replace(target)
+        except OSError:
+            with suppress(OSError):
+                draft.unlink(missing_ok=True)
+            raise
+        _flush(touched)
+
+    def _refusal(self, error: OSError) -> InputError:
+        return InputError(
+            f"{self.path}: the store cannot be written ({error.strerror or error}), what is done is kept"
+        )
+
+
+def open_store(path: str | Path) -> xr.Dataset:
+    """Open a store, complete or not; values are read when they are used.
+
+    Raises
+    ------
+    InputError
+        There is no such store.
+    """
+    _require_zarr()
+    import xarray as xr
+
+    arrays = _root(Path(path))["attributes"][_ARRAYS]
+    whole: Any = xr.open_zarr(path, chunks=None, consolidated=False)
+    found: xr.Dataset = whole[arrays]
+    return found
+
+
+def _require_zarr() -> None:
+    try:
+        import zarr  # noqa: F401
+    except ImportError:
+        raise InputError("a store needs zarr, which the extra printhammer[sweep] installs") from None
+
+
+def _encoder(layout: Layout) -> tuple[dict[str, Any], Any]:
+    """Return a Zarr group in memory with the arrays of a layout, and the files that it consists of.
+
+    What is written to the group appears among the files as the bytes to put on disk.
+    """
+    _require_zarr()
+    import zarr
+    from zarr.codecs import ZstdCodec
+    from zarr.storage import MemoryStore
+
+    files: dict[str, Any] = {}
+    arrays = [variable.name for variable in layout.variables if variable.values is None]
+    attrs = {**layout.attrs, _ARRAYS: arrays, **layout.identity}
+    group = zarr.create_group(MemoryStore(store_dict=files), zarr_format=3, attributes=attrs)
+    members = len(layout.chunks)
+    for variable in layout.variables:
+        chunks = (
+            variable.shape if variable.values is not None else (*layout.chunks, *variable.shape[members:])
+        )
+        array = group.create_array(
+            variable.name,
+            shape=variable.shape,
+            # A chunk has at least one element, also along a dimension of length 0.
+            chunks=tuple(max(1, length) for length in chunks),
+            dtype=variable.dtype,
+            fill_value=variable.fill,
+            compressors=ZstdCodec(level=3, checksum=True),
+            attributes=dict(variable.attrs),
+            dimension_names=variable.dims,
+            # A chunk of nothing but fill values is written too: its file tells that it was.
+            config={"write_empty_chunks": True},
+        )
+        if variable.values is not None:
+            array[...] = variable.values
+    return files, group
+
+
+def _root(path: Path) -> dict[str, Any]:
+    """Return the metadata of the group of a store."""
+    other = f"{path}: the folder is no store of printhammer, expected one, or a name that is not taken"
+    try:
+        root: dict[str, Any] = json.loads((path / _ROOT).read_bytes())
+        _ = root["attributes"][_ARRAYS]
+    except (FileNotFoundError, NotADirectoryError):
+        if path.exists():
+            raise InputError(other) from None
+        raise InputError(f"{path}: there is no such store") from None
+    except OSError as error:
+        raise InputError(f"{path}: the store cannot be read ({error.strerror or error})") from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError(other) from None
+    return root
+
+
+def _text(root: Mapping[str, Any]) -> bytes:
+    return (json.dumps(root, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def _chunk(name: str, index: Sequence[int]) -> str:
+    return "/".join([name, "c", *(str(i) for i in index)])
+
+
+def _locked(folder: Path, named: Path) -> int:
+    """Lock a folder against other processes; return the handle that holds the lock."""
+    try:
+        import fcntl
+    except ImportError:
+        # A system without such locks.
+        return -1
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        raise InputError(f"{named}: another process is at work on this store") from None
+    except OSError:
+        os.close(handle)
+        raise
+    return handle
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make a folder and those above it; return the folders whose names are new or may be."""
+    if folder.is_dir():
+        return [folder]
+    above = _make(folder.parent)
+    folder.mkdir(exist_ok=True)
+    return [*above, folder]
+
+
+def _flush(paths: Collection[Path]) -> None:
+    """Bring files and the names in folders to the disk; many at once take hardly longer than one."""
+    with ThreadPoolExecutor(min(_FLUSHES, len(paths))) as pool:
+        list(pool.map(_flush_one, paths))
+
+
+def _flush_one(path: Path) -> None:
+    if path.is_dir() and os.name != "posix":
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

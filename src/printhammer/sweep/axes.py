@@ -1,0 +1,226 @@
+"""Axes: what a key changes, its unit and meaning, and its values."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from printhammer.constants import Quantity, expected, quantities, shown
+from printhammer.errors import InputError
+from printhammer.hammer_file import SELECTORS, Body, kinds_of, model_of
+from printhammer.sweep.quantities import read_quantities, read_quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from printhammer.hammer import Hammer
+    from printhammer.segments import FloatArray
+    from printhammer.sweep.tables import AxisTable
+
+Target = Literal["hammer", "waveform", "drive", "at", "state"]
+
+DRIVE: Final[dict[str, Quantity]] = {
+    "rate": Quantity("Hz", "f", "firing rate", gt=0.0),
+    "period": Quantity("s", "T", "time between firings", gt=0.0),
+    "start": Quantity("s", "t0", "time of the first firing", ge=0.0),
+    "gap": Quantity("s", "tg", "time between bursts", gt=0.0),
+    "pulses": Quantity("1", "n", "number of pulses", ge=1.0),
+    "bursts": Quantity("1", "nb", "number of bursts", ge=1.0),
+    "amplitude": Quantity("N", "F", "amplitude of the force"),
+    "frequency": Quantity("Hz", "f", "frequency of the force", gt=0.0),
+    "phase": Quantity("rad", "phi", "phase of the force"),
+}
+"""What of a drive an axis may change, beside its firing times."""
+
+COUNTS: Final = ("pulses", "bursts")
+
+_STATE: Final = {
+    "x": Quantity("m", "x", "initial displacement"),
+    "v": Quantity("m/s", "v", "initial velocity"),
+}
+_FIRING: Final = Quantity("s", "t", "time of a firing", ge=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One axis of a sweep.
+
+    Attributes
+    ----------
+    key : str
+        As the spec gives it.
+    name : str
+        Of its dimension or coordinate in the store.
+    target : str
+        Whether it changes the hammer, the waveform of the drive, its timing, a firing time or the state.
+    field : str
+        What it changes there: the key, the name of a number, or the number of a firing.
+    note : Quantity
+        Unit, meaning and bounds.
+    values : array
+        In a grid its values; else the two ends of its range; SI.
+    geometric : bool
+        Whether a range is divided geometrically.
+    """
+
+    key: str
+    name: str
+    target: Target
+    field: str
+    note: Quantity
+    values: FloatArray
+    geometric: bool = False
+
+    @property
+    def counts(self) -> bool:
+        """Whether its values are whole numbers."""
+        return self.target == "drive" and self.field in COUNTS
+
+
+def read_axis(
+    table: AxisTable, where: str, hammer: Hammer, own_waveform: Mapping[str, object] | None, grid: bool
+) -> Axis:
+    """Read an axis.
+
+    Parameters
+    ----------
+    table : AxisTable
+        As the spec gives it.
+    where : str
+        What to name in a message.
+    hammer : Hammer
+        The hammer that is swept.
+    own_waveform : mapping or None
+        The waveform table of the drive, if it has one.
+    grid : bool
+        Whether the axes form a grid; else a range is asked for.
+
+    Raises
+    ------
+    InputError
+        The key names nothing, a value is none or out of bounds, a range is empty.
+    """
+    target, field, note = _resolved(table.key, where, hammer, own_waveform)
+    told = f"{where} ({table.key})"
+    geometric = table.spacing == "geometric"
+    values = _values(table, told, note.si, grid, geometric)
+    for value in values:
+        if not _inside(value, note):
+            raise InputError(f"{told}: {value!r} {note.si} is out of bounds, expected {expected(note)}")
+    if target == "drive" and field in COUNTS:
+        if not grid:
+            raise InputError(f"{told}: a count cannot be drawn, expected an axis of a grid")
+        if not all(value.is_integer() for value in values):
+            raise InputError(f"{told}: expected whole numbers")
+    name = table.key.removeprefix("drive.").replace(".", "_")
+    return Axis(table.key, name, target, field, note, np.array(values), geometric)
+
+
+def quantity_of(key: str, hammer: Hammer) -> Quantity | None:
+    """Return what a hammer file says of a constant; None if the hammer can have none of that key."""
+    section, _, name = key.rpartition(".")
+    if not section:
+        return quantities(Body).get(name)
+    found = _sections(hammer).get(section)
+    note = quantities(model_of(section, found)).get(name) if found is not None else None
+    if note is not None and section == "waveform" and note.also and hammer.waveform is not None:
+        return _driven(note, hammer.waveform.unit)
+    return note
+
+
+def _sections(hammer: Hammer) -> dict[str, str]:
+    """Return the tables that a hammer has and their kinds."""
+    found: dict[str, str] = {role: part.law for role, part in hammer.parts.items()}
+    if hammer.waveform is not None:
+        found["waveform"] = hammer.waveform.shape
+    return {"coil": "", **{section: found[section] for section in SELECTORS if section in found}}
+
+
+def _driven(note: Quantity, unit: str) -> Quantity:
+    return Quantity(unit, note.symbol, note.meaning, (), note.gt, note.ge, note.lt, note.le, note.required)
+
+
+def _resolved(
+    key: str, where: str, hammer: Hammer, own_waveform: Mapping[str, object] | None
+) -> tuple[Target, str, Quantity]:
+    section, _, name = key.partition(".")
+    if section == "state" and name in _STATE:
+        return "state", name, _STATE[name]
+    if section == "drive":
+        if name in DRIVE:
+            return "drive", name, DRIVE[name]
+        number = name.removeprefix("at.")
+        if name.startswith("at.") and number.isascii() and number.isdigit():
+            return "at", number, _FIRING
+    if section == "waveform" and own_waveform is not None:
+        shape = own_waveform.get("shape")
+        if isinstance(shape, str) and shape in kinds_of("waveform"):
+            note = quantities(model_of("waveform", shape)).get(name)
+            if note is not None:
+                return "waveform", name, _driven(note, _own_unit(own_waveform.get(name), note))
+    elif (found := quantity_of(key, hammer)) is not None:
+        return "hammer", key, found
+    known = [*(f"drive.{name}" for name in DRIVE), "drive.at.0", *(f"state.{name}" for name in _STATE)]
+    known += [name for name in hammer.constants if own_waveform is None or not name.startswith("waveform.")]
+    close = get_close_matches(key, known, 1)
+    hint = f"{close[0]!r}" if close else "one such as 'pack.stiffness', 'drive.rate' or 'state.x'"
+    raise InputError(f"{where}.key = {shown(key)} names no constant of {hammer.name}, expected {hint}")
+
+
+def _own_unit(given: object, note: Quantity) -> str:
+    """Return the unit of a constant of the drive's own waveform: what its first value is written in."""
+    for unit in note.also:
+        try:
+            read_quantity(given, unit, "")
+        except InputError:
+            continue
+        return unit
+    return note.si
+
+
+def _values(table: AxisTable, told: str, si: str, grid: bool, geometric: bool) -> list[float]:
+    ends = (table.low, table.high)
+    if table.values is not None:
+        if not grid:
+            raise InputError(f"{told}: values are given, a Latin hypercube is expected to have low and high")
+        if any(value is not None for value in (*ends, table.count)) or geometric:
+            raise InputError(f"{told}: values are given, expected no range beside them")
+        values = read_quantities(table.values, si, f"{told}.values")
+        if len(set(values)) < len(values):
+            raise InputError(f"{told}.values: expected different values")
+        return values
+    for name, value in (("low", table.low), ("high", table.high), ("count", table.count if grid else 1)):
+        if value is None:
+            raise InputError(f"{told}.{name} is missing, expected values, or low, high and count")
+    if not grid and table.count is not None:
+        raise InputError(f"{told}.count is given, a Latin hypercube is expected to have members instead")
+    low, high = (
+        read_quantity(end, si, f"{told}.{name}") for end, name in zip(ends, ("low", "high"), strict=True)
+    )
+    if low == high or not math.isfinite(high - low):
+        raise InputError(f"{told}: the range from {low!r} to {high!r} {si} is empty, expected two ends")
+    if geometric and not (low > 0.0 and high > 0.0):
+        raise InputError(f"{told}: a geometric range is expected to lie above 0 {si}")
+    if not grid:
+        return [low, high]
+    count = table.count or 1
+    if count < 2:
+        raise InputError(f"{told}.count = {count}: expected at least 2 values of a range")
+    divide = np.geomspace if geometric else np.linspace
+    found = [float(value) for value in divide(low, high, count)]
+    if len(set(found)) < count:
+        raise InputError(f"{told}: the range is too narrow for {count} different values")
+    return found
+
+
+def _inside(value: float, note: Quantity) -> bool:
+    return (
+        (note.gt is None or value > note.gt)
+        and (note.ge is None or value >= note.ge)
+        and (note.lt is None or value < note.lt)
+        and (note.le is None or value <= note.le)
+    )

@@ -1,0 +1,225 @@
+"""Sweeps on a dask cluster: each block a task; what kills its worker is found and recorded."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from contextlib import contextmanager
+from importlib import import_module
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.errors import InputError, PrinthammerError
+from printhammer.sweep.outputs import WORKER_LOST
+from printhammer.sweep.provenance import versions
+from printhammer.sweep.work import Results, run_chunk
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from printhammer.segments import FloatArray
+    from printhammer.sweep.local import Index
+    from printhammer.sweep.members import Base
+    from printhammer.sweep.outputs import Outputs
+    from printhammer.sweep.plan import Plan
+
+ANSWER: Final = 5.0
+"""Seconds in which a scheduler must answer."""
+
+NO_WORKERS: Final = 60.0
+"""Seconds without any worker after which a sweep gives up."""
+
+_INTERVAL: Final = 0.5
+_TASKS_A_THREAD: Final = 3
+_PARTS: Final = 8
+
+
+class _GoneError(Exception):
+    """The scheduler does not know a task any more."""
+
+
+def run_dask(
+    plan: Plan,
+    todo: Sequence[Index],
+    write: Callable[[Index, Results], None],
+    told: Callable[[float], None],
+    client: Any,
+) -> None:
+    """Do blocks of work on a cluster, and write each, here, when it is done.
+
+    A task whose worker is killed is done again elsewhere by the scheduler. A task that the scheduler gives up
+    because it has cost several workers is put aside until all others are done, then done alone on the
+    cluster, in ever smaller parts; a member that still kills its worker is recorded as lost.
+
+    Parameters
+    ----------
+    plan, todo, write, told
+        As for `run_local`.
+    client : distributed.Client
+        A client of the scheduler.
+
+    Raises
+    ------
+    InputError
+        The scheduler or the last worker is gone, a worker has other versions or cannot do the work, or from
+        `write`.
+    """
+    work = _Work(client, plan)
+    try:
+        for index in work.together(todo, write, told):
+            write(index, work.alone(plan.rows(plan.blocks.members(index))))
+            told(0.0)
+    except _GoneError:
+        raise InputError("the dask scheduler is gone, what is done is kept") from None
+    finally:
+        work.cancel()
+
+
+class _Work:
+    """The tasks of one sweep on a cluster."""
+
+    def __init__(self, client: Any, plan: Plan) -> None:
+        self._client = client
+        self._plan = plan
+        self._futures: dict[Any, Index] = {}
+        self._done: SimpleQueue[Any] = SimpleQueue()
+        self._idle = 0.0
+
+    def together(
+        self, todo: Sequence[Index], write: Callable[[Index, Results], None], told: Callable[[float], None]
+    ) -> list[Index]:
+        """Do blocks side by side; return those that cost several workers."""
+        left = deque(todo)
+        suspects: list[Index] = []
+        while left or self._futures:
+            while left and len(self._futures) < max(2, _TASKS_A_THREAD * self._threads()):
+                index = left.popleft()
+                self._submit(self._plan.rows(self._plan.blocks.members(index)), index)
+            if (found := self._next()) is not None:
+                index, results = found
+                if results is None:
+                    suspects.append(index)
+                else:
+                    write(index, results)
+            told(0.0)
+        return suspects
+
+    def alone(self, rows: FloatArray) -> Results:
+        """Do some members with nothing beside them, in smaller parts where that kills the worker."""
+        import numpy as np
+
+        self._submit(rows, ())
+        while (found := self._next()) is None:
+            pass
+        if found[1] is not None:
+            return found[1]
+        if len(rows) == 1:
+            lost = self._plan.spec.outputs.empty(1)
+            lost["status"][:] = WORKER_LOST
+            return lost
+        parts = [self.alone(part) for part in np.array_split(rows, min(_PARTS, len(rows)))]
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def cancel(self) -> None:
+        """Give up all tasks that are still under way."""
+        if self._futures and self._client.status == "running":
+            self._client.cancel(list(self._futures), force=True)
+
+    def _submit(self, rows: FloatArray, index: Index) -> None:
+        spec = self._plan.spec
+        future = self._client.submit(_task, spec.base, spec.outputs, rows, versions(), pure=False)
+        self._futures[future] = index
+        future.add_done_callback(self._done.put)
+
+    def _next(self) -> tuple[Index, Results | None] | None:
+        """Wait a while for a task; return its block and its results, None for these if it cost workers."""
+        try:
+            future = self._done.get(timeout=_INTERVAL)
+        except Empty:
+            self._watch()
+            return None
+        self._idle = 0.0
+        return self._futures.pop(future), self._result(future)
+
+    def _result(self, future: Any) -> Results | None:
+        """Return the results of a task that is done; None if it cost several workers."""
+        if future.status in ("cancelled", "lost"):
+            raise _GoneError
+        if future.status == "finished":
+            found: Results = future.result()
+            return found
+        error = future.exception()
+        if isinstance(error, import_module("distributed").KilledWorker):
+            return None
+        if isinstance(error, PrinthammerError):
+            raise error
+        raise InputError(
+            f"a worker of the cluster cannot do the work ({type(error).__name__}: {error}),"
+            " what is done is kept"
+        ) from error
+
+    def _threads(self) -> int:
+        return sum(self._client.nthreads().values()) if self._client.status == "running" else 0
+
+    def _watch(self) -> None:
+        """Give up where the scheduler is gone, or no worker has come for a while."""
+        if self._client.status not in ("running", "connecting"):
+            raise _GoneError
+        self._idle = 0.0 if self._threads() else self._idle + _INTERVAL
+        if self._idle >= NO_WORKERS:
+            raise InputError(f"the cluster has had no worker for {NO_WORKERS:g} s, what is done is kept")
+
+
+def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]) -> Results:
+    """Do the work of a block on a worker of the same versions."""
+    for name, version in versions().items():
+        if version != wanted[name]:
+            raise InputError(f"a worker of the cluster has {name} {version}, expected {wanted[name]}")
+    return run_chunk(base, outputs, rows)
+
+
+@contextmanager
+def client_of(dask: Any) -> Iterator[Any]:
+    """Give a client of a cluster; one made here is closed at the end, and logs nothing.
+
+    Parameters
+    ----------
+    dask : str or distributed.Client
+        Address of the scheduler, or a client of it, which is given back as it is.
+
+    Raises
+    ------
+    InputError
+        Nobody answers at the address, or dask is not installed.
+    """
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise InputError("dask is missing, which the extra printhammer[cluster] installs") from None
+    if isinstance(dask, distributed.Client):
+        yield dask
+        return
+    logger = logging.getLogger("distributed")
+    level = logger.level
+    # What is wrong is told in one sentence of our own.
+    logger.setLevel(logging.CRITICAL)
+    try:
+        try:
+            asyncio.run(_knock(distributed, dask))
+            client = distributed.Client(dask, timeout=ANSWER, set_as_default=False)
+        except (OSError, TimeoutError, ValueError, TypeError, AttributeError) as error:
+            reason = str(error).partition("\n")[0] or type(error).__name__
+            raise InputError(f"{dask}: no dask scheduler answers there ({reason})") from None
+        try:
+            yield client
+        finally:
+            client.close(timeout=ANSWER)
+    finally:
+        logger.setLevel(level)
+
+
+async def _knock(distributed: Any, address: str) -> None:
+    """Fail early where nobody answers; a client that does not get through is slow to give up."""
+    comm = await distributed.comm.connect(address, timeout=ANSWER)
+    await comm.close()

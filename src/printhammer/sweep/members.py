@@ -1,0 +1,154 @@
+"""Members: from a row of axis values to a hammer, a drive, an initial state and an end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.drive_file import read_drive
+from printhammer.drive_text import FORMAT, document
+from printhammer.equilibrium import rest_state
+from printhammer.errors import InputError
+from printhammer.simulate import CYCLE
+from printhammer.sweep.axes import COUNTS, Axis
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from printhammer.drive import Drive
+    from printhammer.hammer import Hammer
+    from printhammer.waveforms import Waveform
+
+KINDS: Final = ("train", "times", "burst", "sine")
+"""Tables of a drive file that say when it fires."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """One run of a sweep: hammer, drive, end [s], displacement [m] and velocity [m/s] at the start."""
+
+    hammer: Hammer
+    drive: Drive
+    end: float
+    state: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Base:
+    """What all members have in common; complete, so that another machine can make them.
+
+    Attributes
+    ----------
+    hammer : Hammer
+        The hammer, before the axes change it.
+    drive : mapping
+        Tables of the drive file; its waveform only where an axis changes it.
+    waveform : Waveform or None
+        Of the drive; None where that of the hammer is fired, or an axis changes it.
+    folder : Path
+        Where what the drive names lies.
+    state : tuple
+        Displacement, m, and velocity, m/s, at the start; None for those at rest.
+    duration : float or None
+        End of the runs, s.
+    tolerance : float
+        Error allowed in one step.
+    axes : tuple of Axis
+        What a row of values means.
+    """
+
+    hammer: Hammer
+    drive: Mapping[str, Any]
+    waveform: Waveform | None
+    folder: Path
+    state: tuple[float | None, float | None]
+    duration: float | None
+    tolerance: float
+    axes: tuple[Axis, ...]
+
+    @property
+    def kind(self) -> str:
+        """The table of the drive that says when it fires."""
+        return next((name for name in KINDS if name in self.drive), "")
+
+
+@dataclass
+class Maker:
+    """Makes members of rows of axis values; equal hammers and drives are made once.
+
+    Raises
+    ------
+    InputError
+        From `member`: the values make no hammer, no drive, or a hammer that does not rest.
+    """
+
+    base: Base
+    _hammers: dict[tuple[float, ...], Hammer] = field(default_factory=dict)
+    _rests: dict[int, float] = field(default_factory=dict)
+    _drives: dict[tuple[float, ...], Drive] = field(default_factory=dict)
+
+    def member(self, row: Sequence[float]) -> Member:
+        """Return the member of a row of values, SI, one for each axis."""
+        hammer = self._hammer(row)
+        drive = self._drive(row, hammer)
+        x, v = self.base.state
+        for axis, value in zip(self.base.axes, row, strict=True):
+            if axis.target == "state":
+                x, v = (float(value), v) if axis.field == "x" else (x, float(value))
+        if x is None:
+            if id(hammer) not in self._rests:
+                self._rests[id(hammer)] = rest_state(hammer)
+            x = self._rests[id(hammer)]
+        end = self.base.duration
+        if end is None:
+            end = float(drive.times[-1]) + CYCLE
+        return Member(hammer, drive, end, (x, v or 0.0))
+
+    def _of(self, row: Sequence[float], *targets: str) -> dict[Axis, float]:
+        pairs = zip(self.base.axes, row, strict=True)
+        return {axis: float(value) for axis, value in pairs if axis.target in targets}
+
+    def _hammer(self, row: Sequence[float]) -> Hammer:
+        changes = {axis.field: value for axis, value in self._of(row, "hammer").items()}
+        if not changes:
+            return self.base.hammer
+        key = tuple(changes.values())
+        if key not in self._hammers:
+            self._hammers[key] = self.base.hammer.replace(changes, source="axis of a sweep")
+        return self._hammers[key]
+
+    def _drive(self, row: Sequence[float], hammer: Hammer) -> Drive:
+        changes = self._of(row, "waveform", "drive", "at")
+        key = (*changes.values(), *self._of(row, "hammer").values())
+        if key in self._drives:
+            return self._drives[key]
+        tables = {name: dict(table) for name, table in self.base.drive.items() if isinstance(table, Mapping)}
+        kind = self.base.kind
+        for axis, value in changes.items():
+            quantity = {"value": value, "unit": axis.note.si}
+            if axis.target == "waveform":
+                tables["waveform"][axis.field] = quantity
+            elif axis.target == "drive":
+                tables[kind][axis.field] = int(value) if axis.field in COUNTS else quantity
+            else:
+                times = list(self.base.drive[kind]["at"])
+                times[int(axis.field)] = quantity
+                tables[kind]["at"] = times
+        head = {"format": FORMAT}
+        head |= {name: value for name, value in self.base.drive.items() if not isinstance(value, Mapping)}
+        standard = self.base.waveform if self.base.waveform is not None else hammer.waveform
+        self._drives[key] = read_drive(document(head, tables), standard, folder=self.base.folder)
+        return self._drives[key]
+
+
+def check_tables(base: Base) -> None:
+    """Make sure that the tables a hammer names can still be read and are those that they were.
+
+    Raises
+    ------
+    InputError
+        They are not.
+    """
+    if base.hammer.replace({}).fingerprint != base.hammer.fingerprint:
+        raise InputError(f"{base.hammer.path}: a table that it names has changed since the sweep began")

@@ -1,0 +1,195 @@
+"""Outputs: the arrays of a store, what each says, and which of them a spec asks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.constants import shown
+from printhammer.errors import InputError
+from printhammer.sweep.quantities import read_quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from printhammer.segments import FloatArray
+    from printhammer.sweep.tables import OutputsTable
+
+STATUSES: Final = (
+    "ok",
+    "range left",
+    "runaway",
+    "step limit",
+    "step underflow",
+    "worker lost",
+    "no such hammer",
+)
+"""Statuses of members by code; "no such hammer": the axis values make no hammer that rests, or no drive."""
+
+WORKER_LOST: Final = STATUSES.index("worker lost")
+NO_HAMMER: Final = STATUSES.index("no such hammer")
+NOT_YET: Final = -1
+"""Status of a member whose block is not done."""
+
+FIRING: Final = "firing"
+TIME: Final = "time"
+
+
+@dataclass(frozen=True)
+class Output:
+    """One array: its name, the dimension behind those of the members, type, unit, meaning."""
+
+    name: str
+    dim: str
+    dtype: str
+    unit: str
+    meaning: str
+
+    @property
+    def fill(self) -> Any:
+        """What stands where there is nothing to tell."""
+        return {"f": np.nan, "b": False, "i": -1 if self.name in _CODES else 0}[np.dtype(self.dtype).kind]
+
+    @property
+    def attrs(self) -> dict[str, Any]:
+        """Unit and meaning as attributes of the array."""
+        found: dict[str, Any] = {"long_name": self.meaning}
+        if self.unit:
+            found["units"] = self.unit
+        if self.name == "status":
+            found["flag_values"] = list(range(NOT_YET, len(STATUSES)))
+            found["flag_meanings"] = " ".join(name.replace(" ", "_") for name in ("not yet", *STATUSES))
+        return found
+
+
+_CODES: Final = ("status", "strobe_branch")
+
+ALWAYS: Final = (
+    Output("status", "", "int8", "", "how the run ended"),
+    Output("reached", "", "float64", "s", "time at which the run ended"),
+    Output("steps", "", "int64", "", "steps of the integrator"),
+)
+"""What is kept of every member."""
+
+DOTS: Final = (
+    Output("fired", FIRING, "bool", "", "whether there was such a firing in the run"),
+    Output("fired_at", FIRING, "float64", "s", "time of the firing"),
+    Output("struck", FIRING, "bool", "", "whether a dot was struck"),
+    Output("flight_time", FIRING, "float64", "s", "time from firing to touch"),
+    Output("impact_speed", FIRING, "float64", "m/s", "velocity at touch"),
+    Output("peak_force", FIRING, "float64", "N", "largest pack force"),
+    Output("indentation", FIRING, "float64", "m", "largest indentation of the pack"),
+    Output("contact_time", FIRING, "float64", "s", "time from touch to leaving"),
+    Output("extra_contacts", FIRING, "int64", "", "further pack contacts before the next firing"),
+)
+STROBES: Final = (
+    Output("strobe_t", FIRING, "float64", "s", "time of the firing"),
+    Output("strobe_x", FIRING, "float64", "m", "displacement at the firing"),
+    Output("strobe_v", FIRING, "float64", "m/s", "velocity at the firing"),
+    Output("strobe_branch", FIRING, "int8", "", "code of the mode at the firing"),
+    Output("strobe_memory", FIRING, "float64", "m", "latest local maximum of the displacement in the pack"),
+)
+FINAL: Final = (
+    Output("final_x", "", "float64", "m", "displacement at the end of the run"),
+    Output("final_v", "", "float64", "m/s", "velocity at the end of the run"),
+)
+DISPLACEMENT: Final = Output("displacement", TIME, "float32", "m", "displacement")
+OF_DOTS: Final = (
+    Output("struck_dots", "", "int64", "", "dots struck"),
+    Output("lost_dots", "", "int64", "", "dots lost"),
+    Output("flight_time_mean", "", "float64", "s", "mean flight time of the dots struck"),
+    Output("flight_time_spread", "", "float64", "s", "largest minus smallest flight time"),
+    Output("peak_force_mean", "", "float64", "N", "mean of the largest pack forces of the dots struck"),
+    Output("peak_force_spread", "", "float64", "N", "largest minus smallest peak force"),
+)
+OF_MOTION: Final = (
+    Output("peak_displacement", "", "float64", "m", "largest displacement"),
+    Output("backstop_touches", "", "int64", "", "touches of the backstop"),
+    Output("coil_work", "", "float64", "J", "work of the coil"),
+    Output("drive_work", "", "float64", "J", "work of a driving force"),
+    Output("pack_loss", "", "float64", "J", "energy that the pack kept"),
+    Output("backstop_loss", "", "float64", "J", "energy that the backstop took"),
+    Output("energy_residual", "", "float64", "J", "what the energy ledger leaves over"),
+)
+"""Scalars for which the whole motion is computed once more, which takes several times as long."""
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What is kept of each member.
+
+    Attributes
+    ----------
+    arrays : tuple of Output
+        All arrays, the status first.
+    firings : int
+        Length of the dimension of the firings.
+    times : array
+        Times of the displacements, s.
+    """
+
+    arrays: tuple[Output, ...]
+    firings: int
+    times: FloatArray
+
+    def wants(self, *outputs: Output) -> bool:
+        """Tell whether one of some arrays is asked for."""
+        return any(output in self.arrays for output in outputs)
+
+    def length(self, output: Output) -> tuple[int, ...]:
+        """Return the shape of an array behind the dimensions of the members."""
+        return {"": (), FIRING: (self.firings,), TIME: (self.times.size,)}[output.dim]
+
+    def empty(self, members: int) -> dict[str, Any]:
+        """Return arrays that tell nothing yet, of shape (members, ...)."""
+        return {
+            output.name: np.full((members, *self.length(output)), output.fill, output.dtype)
+            for output in self.arrays
+        }
+
+
+def read_outputs(table: OutputsTable, firings: int) -> Outputs:
+    """Read which outputs a spec asks for.
+
+    Raises
+    ------
+    InputError
+        A name is not known or named twice, the times are out of order, or nothing is asked for.
+    """
+    arrays = [*ALWAYS]
+    arrays += _chosen(table.dots, {output.name: output for output in DOTS}, "dots")
+    strobes = {output.name.removeprefix("strobe_"): output for output in STROBES}
+    arrays += _chosen(table.strobes, strobes, "strobes")
+    arrays += FINAL if table.final else ()
+    times = np.zeros(0)
+    if table.displacement is not None:
+        where = "outputs.displacement"
+        start = read_quantity(table.displacement.start, "s", f"{where}.start")
+        end = read_quantity(table.displacement.end, "s", f"{where}.end")
+        if not 0.0 <= start < end or table.displacement.count < 2:
+            raise InputError(f"{where}: expected at least 2 times from 0 s on, the end after the start")
+        times = np.linspace(start, end, table.displacement.count)
+        arrays.append(DISPLACEMENT)
+    scalars = {output.name: output for output in (*OF_DOTS, *OF_MOTION)}
+    arrays += _chosen(table.scalars, scalars, "scalars")
+    if len(arrays) == len(ALWAYS):
+        raise InputError(
+            "outputs: nothing is asked for, expected dots, strobes, final, displacement or scalars"
+        )
+    return Outputs(tuple(arrays), firings, times)
+
+
+def _chosen(names: Sequence[str] | str, known: Mapping[str, Output], where: str) -> list[Output]:
+    if isinstance(names, str):
+        return list(known.values())
+    for name in names:
+        if name not in known:
+            close = get_close_matches(name, known, 1)
+            hint = repr(close[0]) if close else f'some of {", ".join(known)}, or "all"'
+            raise InputError(f"outputs.{where}: {shown(name)} is not known, expected {hint}")
+    if len(set(names)) < len(names):
+        raise InputError(f"outputs.{where}: expected different names")
+    return [known[name] for name in names]

@@ -1,0 +1,182 @@
+"""Plans: the members of a spec, the blocks of work, and the layout of the store."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.store import Layout, Variable
+from printhammer.sweep.design import Blocks, between, latin_hypercube
+from printhammer.sweep.members import Maker
+from printhammer.sweep.outputs import FIRING, TIME
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from printhammer.segments import FloatArray
+    from printhammer.sweep.outputs import Output
+    from printhammer.sweep.spec import Spec
+
+FORMAT: Final = "1"
+"""Version of the layout of stores."""
+
+MEMBER: Final = "member"
+
+_MOST_MEMBERS: Final = 1_000_000_000
+_BLOCKS: Final = 128
+_FEWEST_IN_BLOCK: Final = 16
+_MOST_IN_BLOCK: Final = 256
+_MOST_BYTES: Final = 2**25
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A spec and what follows from it.
+
+    Attributes
+    ----------
+    spec : Spec
+        The spec.
+    shape : tuple of int
+        Members along each dimension.
+    dims : tuple of str
+        Names of these dimensions.
+    blocks : Blocks
+        The blocks of work.
+    """
+
+    spec: Spec
+    shape: tuple[int, ...]
+    dims: tuple[str, ...]
+    blocks: Blocks
+
+    @property
+    def members(self) -> int:
+        """Number of members."""
+        return math.prod(self.shape)
+
+    @property
+    def bytes_of_member(self) -> int:
+        """Room that the results of a member take before they are compressed."""
+        outputs = self.spec.outputs
+        return sum(np.dtype(out.dtype).itemsize * math.prod(outputs.length(out)) for out in outputs.arrays)
+
+    @cached_property
+    def _drawn(self) -> FloatArray:
+        """Values of the axes, shape (members, axes), of a Latin hypercube."""
+        spec = self.spec
+        share = latin_hypercube(spec.members or 0, spec.seed or 0, len(spec.axes))
+        columns = [
+            between(share[:, i], axis.values[0], axis.values[1], axis.geometric)
+            for i, axis in enumerate(spec.axes)
+        ]
+        return np.stack(columns, axis=1)
+
+    def rows(self, members: Iterable[int]) -> FloatArray:
+        """Return the values of the axes, SI, of some members, shape (members, axes)."""
+        which = np.fromiter(members, np.int64)
+        if not self.spec.grid:
+            return self._drawn[which]
+        places = np.unravel_index(which, self.shape)
+        columns = [axis.values[place] for axis, place in zip(self.spec.axes, places, strict=True)]
+        return np.stack(columns, axis=1)
+
+    def layout(self) -> Layout:
+        """Return the layout of the store."""
+        from printhammer.sweep.provenance import attributes, identity
+
+        outputs = self.spec.outputs
+        trailing = {"": (), FIRING: (FIRING,), TIME: (TIME,)}
+        results = [
+            Variable(
+                output.name,
+                (*self.dims, *trailing[output.dim]),
+                (*self.shape, *outputs.length(output)),
+                output.dtype,
+                output.fill,
+                output.attrs,
+            )
+            for output in outputs.arrays
+        ]
+        attrs = attributes(self.spec)
+        if not self.spec.grid:
+            # Read by xarray: these arrays are coordinates.
+            attrs["coordinates"] = " ".join(axis.name for axis in self.spec.axes)
+        return Layout(self.blocks.chunks, (*results, *self._coordinates()), attrs, identity(self.spec))
+
+    def _coordinates(self) -> list[Variable]:
+        found = []
+        for i, axis in enumerate(self.spec.axes):
+            attrs = {"long_name": axis.note.meaning, "units": axis.note.si, "key": axis.key}
+            dims = (axis.name,) if self.spec.grid else self.dims
+            values = axis.values if self.spec.grid else self._drawn[:, i]
+            dtype = "int64" if axis.counts else "float64"
+            found.append(_coordinate(axis.name, dims, values.astype(dtype), attrs))
+        if not self.spec.grid:
+            attrs = {"long_name": "number of the member"}
+            found.append(_coordinate(MEMBER, (MEMBER,), np.arange(self.members), attrs))
+        outputs = self.spec.outputs
+        if any(output.dim == FIRING for output in outputs.arrays):
+            attrs = {"long_name": "number of the firing"}
+            found.append(_coordinate(FIRING, (FIRING,), np.arange(outputs.firings), attrs))
+        if outputs.times.size:
+            attrs = {"long_name": "time", "units": "s"}
+            found.append(_coordinate(TIME, (TIME,), outputs.times, attrs))
+        return found
+
+    def table(self) -> list[tuple[Output, tuple[int, ...], int]]:
+        """List the arrays with their shapes and sizes in bytes, before they are compressed."""
+        outputs = self.spec.outputs
+        shapes = [(*self.shape, *outputs.length(output)) for output in outputs.arrays]
+        return [
+            (output, shape, math.prod(shape) * np.dtype(output.dtype).itemsize)
+            for output, shape in zip(outputs.arrays, shapes, strict=True)
+        ]
+
+
+def _coordinate(name: str, dims: tuple[str, ...], values: Any, attrs: dict[str, Any]) -> Variable:
+    return Variable(name, dims, values.shape, str(values.dtype), 0, attrs, values)
+
+
+def make_plan(spec: Spec) -> Plan:
+    """Make the plan of a spec.
+
+    Raises
+    ------
+    InputError
+        There are too many members, names collide, or of three members tried none can be made.
+    """
+    if spec.grid:
+        dims, shape = tuple(axis.name for axis in spec.axes), tuple(len(axis.values) for axis in spec.axes)
+    else:
+        dims, shape = (MEMBER,), (spec.members or 0,)
+    members = math.prod(shape)
+    if members > _MOST_MEMBERS:
+        raise InputError(f"{spec.where}: {members} members are expected to be at most {_MOST_MEMBERS}")
+    whole = Plan(spec, shape, dims, Blocks.of(shape, members))
+    most = spec.chunk
+    if most is None:
+        room = max(1, _MOST_BYTES // whole.bytes_of_member)
+        most = min(max(members // _BLOCKS, _FEWEST_IN_BLOCK), _MOST_IN_BLOCK, room)
+    plan = Plan(spec, shape, dims, Blocks.of(shape, most))
+    _try(plan)
+    return plan
+
+
+def _try(plan: Plan) -> None:
+    """Refuse a sweep that cannot work: neither its first, middle nor last member can be made."""
+    maker = Maker(plan.spec.base)
+    first: InputError | None = None
+    for row in plan.rows([0, plan.members // 2, plan.members - 1]):
+        try:
+            maker.member(row)
+        except InputError as error:
+            first = first or error
+        else:
+            return
+    raise InputError(f"{plan.spec.where}: {first}")

@@ -1,0 +1,255 @@
+"""Specs: a TOML file to hammer, drive, axes and outputs; every fault is told in one sentence.
+
+A spec has ``format = 1``, ``hammer``, a table ``[drive]`` with the tables of a drive file, one table
+``[[axis]]`` for each axis, and ``[outputs]``; see `printhammer.sweep.tables` for all keys. Every quantity has
+its unit.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from printhammer.constants import shown
+from printhammer.drive_file import read_drive
+from printhammer.drive_text import FORMAT as DRIVE_FORMAT
+from printhammer.drive_text import document
+from printhammer.errors import InputError
+from printhammer.hammer import load, shipped
+from printhammer.sweep.axes import COUNTS, Axis, quantity_of, read_axis
+from printhammer.sweep.members import KINDS, Base
+from printhammer.sweep.outputs import Outputs, read_outputs
+from printhammer.sweep.quantities import read_quantity
+from printhammer.sweep.tables import read_tables
+
+if TYPE_CHECKING:
+    from printhammer.hammer import Hammer
+    from printhammer.waveforms import Waveform
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A sweep as it is meant.
+
+    Attributes
+    ----------
+    where : str
+        What to name in a message, usually the file.
+    text : str
+        TOML.
+    title : str
+        One line that says what it is.
+    base : Base
+        What all members have in common.
+    axes : tuple of Axis
+        The axes.
+    design : str
+        "grid" or "latin-hypercube".
+    members, seed : int or None
+        Of a Latin hypercube.
+    chunk : int or None
+        Members of a block of work.
+    outputs : Outputs
+        What is kept.
+    """
+
+    where: str
+    text: str
+    title: str
+    base: Base
+    axes: tuple[Axis, ...]
+    design: str
+    members: int | None
+    seed: int | None
+    chunk: int | None
+    outputs: Outputs
+
+    @property
+    def grid(self) -> bool:
+        """Whether the axes form a grid."""
+        return self.design == "grid"
+
+    @property
+    def fingerprint(self) -> str:
+        """Hexadecimal digest of what is computed and how it is divided; layout and comments do not enter."""
+        base = self.base
+        found = {
+            "hammer": base.hammer.fingerprint,
+            "drive": _plain(base.drive),
+            "waveform": None if base.waveform is None else base.waveform.segments().tobytes().hex(),
+            "state": [_plain(number) for number in base.state],
+            "duration": _plain(base.duration),
+            "tolerance": base.tolerance.hex(),
+            "axes": [[axis.key, axis.geometric, axis.values.tobytes().hex()] for axis in self.axes],
+            "design": [self.design, self.members, self.seed],
+            "chunk": self.chunk,
+            "outputs": [output.name for output in self.outputs.arrays],
+            "times": self.outputs.times.tobytes().hex(),
+        }
+        return sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
+
+
+def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
+    """Read a spec.
+
+    Parameters
+    ----------
+    source : path or mapping
+        A TOML file, or what one says.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, a key is unknown or missing, a value is of the wrong kind, unit or range.
+    """
+    if isinstance(source, Mapping):
+        import tomlkit
+
+        text, where, folder = tomlkit.dumps(source), "spec", Path()
+    else:
+        path = Path(source)
+        where, folder = str(path), path.parent
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            raise InputError(f"{path}: expected a TOML file in UTF-8") from None
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"{path}: the spec cannot be read ({reason})") from None
+    try:
+        return _spec(tomllib.loads(text), text, where, folder)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{where}: expected TOML ({' '.join(str(error).split())})") from None
+
+
+def _spec(found: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
+    table = read_tables(found)
+    grid = table.design == "grid"
+    for name, value in (("members", table.members), ("seed", table.seed)):
+        if grid != (value is None):
+            wanted = (
+                "is given, a grid is expected to have none" if grid else "is missing, expected a whole number"
+            )
+            raise InputError(f"{name} {wanted}")
+    hammer = load(table.hammer if table.hammer in shipped() else folder / table.hammer)
+    hammer = _replaced(hammer, table.constants)
+    drive, place = _drive_tables(table.drive, folder)
+    own = drive.get("waveform")
+    own = own if isinstance(own, Mapping) else None
+    axes = tuple(read_axis(entry, f"axis[{i}]", hammer, own, grid) for i, entry in enumerate(table.axis))
+    for i, axis in enumerate(axes):
+        if any(axis.name == other.name for other in axes[:i]):
+            raise InputError(f"axis[{i}].key = {axis.key!r}: expected another key, this one has an axis")
+        if axis.key in table.constants:
+            raise InputError(f"constants: {axis.key!r} is replaced by an axis, expected one or the other")
+    x, v = table.state.x, table.state.v
+    base = Base(
+        hammer=hammer,
+        drive=drive,
+        waveform=None,
+        folder=place,
+        state=(
+            None if x is None else read_quantity(x, "m", "state.x"),
+            None if v is None else read_quantity(v, "m/s", "state.v"),
+        ),
+        duration=None if table.duration is None else _positive(table.duration, "duration"),
+        tolerance=table.tolerance,
+        axes=axes,
+    )
+    base = _checked_drive(base, own)
+    outputs = read_outputs(table.outputs, _firings(base))
+    return Spec(
+        where, text, table.title, base, axes, table.design, table.members, table.seed, table.chunk, outputs
+    )
+
+
+def _replaced(hammer: Hammer, constants: Mapping[str, Any]) -> Hammer:
+    changes = {}
+    for key, value in constants.items():
+        note = quantity_of(key, hammer)
+        if note is None:
+            raise InputError(f"constants: {shown(key)} names no constant of {hammer.name}")
+        changes[key] = read_quantity(value, note.si, f"constants.{key}")
+    return hammer.replace(changes, source="constants of a sweep") if changes else hammer
+
+
+def _drive_tables(given: dict[str, Any] | str, folder: Path) -> tuple[dict[str, Any], Path]:
+    """Return the tables of a drive, and where what they name lies."""
+    if not isinstance(given, str):
+        return dict(given), folder
+    path = folder / given
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8")), path.parent
+    except OSError as error:
+        raise InputError(f"{path}: the drive file cannot be read ({error.strerror or error})") from None
+    except ValueError as error:
+        raise InputError(f"{path}: expected TOML ({' '.join(str(error).split())})") from None
+
+
+def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
+    """Check what can be told of a drive by itself; read its waveform unless an axis changes it."""
+    kinds = [name for name in KINDS if name in base.drive]
+    if len(kinds) != 1 or not isinstance(base.drive[kinds[0]], Mapping):
+        tables = ", ".join(f"[drive.{name}]" for name in KINDS)
+        raise InputError(f"drive: expected exactly one of the tables {tables}")
+    timing = base.drive[kinds[0]]
+    for axis in base.axes:
+        if axis.target == "drive" and axis.field in timing:
+            raise InputError(f"drive.{kinds[0]}.{axis.field} is given beside the axis {axis.key!r}")
+        if axis.target == "at":
+            at = timing.get("at")
+            if not isinstance(at, list) or int(axis.field) >= len(at):
+                raise InputError(
+                    f"the axis {axis.key!r} names no firing, expected drive.times.at with as many"
+                )
+    if base.duration is None and kinds == ["sine"]:
+        raise InputError("duration is missing, and the drive does not end")
+    if own is None or any(axis.target == "waveform" for axis in base.axes):
+        return base
+    rest = {name: table for name, table in base.drive.items() if name != "waveform"}
+    return replace(base, drive=rest, waveform=_waveform(own, base.folder))
+
+
+def _waveform(own: Mapping[str, Any], folder: Path) -> Waveform:
+    pulse = {"rate": "1 Hz", "pulses": 1}
+    text = document({"format": DRIVE_FORMAT}, {"train": pulse, "waveform": own})
+    return read_drive(text, folder=folder).waveform
+
+
+def _firings(base: Base) -> int:
+    """Return the most firings of any member."""
+    timing = base.drive[base.kind]
+    if "at" in timing:
+        at = timing["at"]
+        return len(at["values"] if isinstance(at, Mapping) and "values" in at else at)
+    product = 1
+    for name in COUNTS:
+        values = [axis.values.max() for axis in base.axes if axis.target == "drive" and axis.field == name]
+        count = int(values[0]) if values else timing.get(name, 1)
+        product *= count if isinstance(count, int) else 1
+    return max(product, 1)
+
+
+def _positive(given: Any, where: str) -> float:
+    value = read_quantity(given, "s", where)
+    if not value > 0.0:
+        raise InputError(f"{where} = {value!r} s: expected more than 0 s")
+    return value
+
+
+def _plain(value: Any) -> Any:
+    """Return a value with its numbers as exact text."""
+    if isinstance(value, Mapping):
+        return {name: _plain(entry) for name, entry in value.items()}
+    if isinstance(value, list):
+        return [_plain(entry) for entry in value]
+    return float(value).hex() if isinstance(value, float | np.floating) else value
