@@ -1,0 +1,226 @@
+"""Is a train periodic or strange? A verdict on strobe points, with its evidence.
+
+A train of period T has the period q if its states q firings apart agree, and q is the smallest such number.
+It is strange if there is no such q and neighbouring motions part: the largest exponent of the strobe map is
+positive by three standard errors. Everything else is undecided, with the reason.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.segments import FloatArray
+    from printhammer.tangent import Exponent
+
+LARGEST_PERIOD: Final = 64
+"""Largest period that is looked for, in firings."""
+
+AGREEMENT: Final = 1e-6
+"""Distance, in half-widths of the window, up to which states agree."""
+
+SIGNIFICANT: Final = 3.0
+"""Number of standard errors by which the exponent of a strange train is positive."""
+
+FIRST: Final = 1001
+"""First firing that is judged unless told otherwise; the very first one is number 1."""
+
+LAST: Final = 2000
+"""Last firing that is judged unless told otherwise."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What kind of motion a train leads to, and the evidence.
+
+    Attributes
+    ----------
+    name : str
+        "period-1", "period-2", ..., "strange" or "undecided".
+    period : int or None
+        Number of firings after which the states repeat.
+    distance : float
+        Largest distance of states `nearest` firings apart, in half-widths of the window; NaN where the run
+        ended before.
+    nearest : int or None
+        Number of firings after which the states come closest to repeating, at most 64; the period where
+        there is one.
+    exponent : float
+        Largest exponent of the strobe map, per firing; NaN where it was not computed.
+    standard_error : float
+        Of the exponent.
+    first, last : int
+        Firings that were judged; the very first one is number 1.
+    tolerance : float
+        Tolerance of the integration.
+    reason : str
+        Why the verdict is "undecided"; else empty.
+    """
+
+    name: str
+    period: int | None
+    distance: float
+    nearest: int | None
+    exponent: float
+    standard_error: float
+    first: int
+    last: int
+    tolerance: float
+    reason: str = ""
+
+    @property
+    def strange(self) -> bool:
+        """Whether the verdict is "strange"."""
+        return self.name == "strange"
+
+    @property
+    def evidence(self) -> str:
+        """The evidence in one phrase."""
+        told = []
+        if self.period is not None:
+            told.append(f"states {_firings(self.period)} apart agree to {self.distance:.1e} of the window")
+        elif self.nearest is not None:
+            told.append(
+                f"no period up to {LARGEST_PERIOD}: states {_firings(self.nearest)} apart come closest,"
+                f" to {self.distance:.1e} of the window"
+            )
+        if not math.isnan(self.exponent):
+            told.append(f"largest exponent {self.exponent:+.4g} ± {self.standard_error:.2g} per firing")
+        told.append(f"firings {self.first} to {self.last}, tolerance {self.tolerance:g}")
+        return "; ".join(told)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return verdict and evidence by name; None for what is not known, so that JSON can hold it."""
+        return {
+            "verdict": self.name,
+            "nearest_period": self.nearest,
+            "distance": _finite(self.distance),
+            "exponent_per_firing": _finite(self.exponent),
+            "standard_error": _finite(self.standard_error),
+            "firings": [self.first, self.last],
+            "tolerance": self.tolerance,
+            "reason": self.reason,
+        }
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def _firings(count: int) -> str:
+    return f"{count} firing{'s' if count > 1 else ''}"
+
+
+def _finite(number: float) -> float | None:
+    return number if math.isfinite(number) else None
+
+
+def repeats(
+    states: FloatArray, branches: npt.NDArray[np.int64], scales: FloatArray, longest: int = LARGEST_PERIOD
+) -> FloatArray:
+    """Return how far states q apart are from each other at most, for q from 1 on, shape (longest,).
+
+    Parameters
+    ----------
+    states : array, shape (n, 3)
+        Displacement, velocity and memory of the pack at successive firings.
+    branches : int array, shape (n,)
+        Branch of the force law inside the pack, 0 outside.
+    scales : array, shape (3,)
+        By which differences are divided.
+    longest : int, optional
+        Largest q.
+
+    Returns
+    -------
+    array
+        Largest absolute difference of a component, in units of its scale. Infinite where states q apart lie
+        on different branches, where one is not known, and where q is more than half of n, so that every
+        state is compared at least once.
+    """
+    scaled = states / scales
+    count = len(scaled)
+    found = np.full(longest, np.inf)
+    if not np.isfinite(scaled).all():
+        return found
+    for q in range(1, min(longest, count // 2) + 1):
+        if np.array_equal(branches[q:], branches[:-q]):
+            found[q - 1] = np.abs(scaled[q:] - scaled[:-q]).max()
+    return found
+
+
+def period_of(distances: FloatArray) -> int | None:
+    """Return the smallest q whose states agree, given the distances from `repeats`; None if there is none."""
+    agree = np.flatnonzero(distances <= AGREEMENT)
+    return int(agree[0]) + 1 if agree.size else None
+
+
+def verdict(
+    distances: FloatArray,
+    firings: tuple[int, int],
+    tolerance: float,
+    exponent: Exponent | None,
+    stopped: str = "",
+) -> Verdict:
+    """Judge a train.
+
+    Parameters
+    ----------
+    distances : array
+        From `repeats`.
+    firings : tuple of int
+        First and last firing that they are about.
+    tolerance : float
+        Of the integration.
+    exponent : Exponent or None
+        Largest exponent over these firings; None where it was not computed.
+    stopped : str, optional
+        How the run ended if it did not get to the last of them.
+
+    Returns
+    -------
+    Verdict
+        The verdict.
+    """
+    period = None if stopped else period_of(distances)
+    closest = period
+    if period is None and np.isfinite(distances).any():
+        closest = int(np.argmin(distances)) + 1
+    strange, reason = False, ""
+    if stopped:
+        reason = f"the run ended before firing {firings[1]}: {stopped}"
+    elif period is None:
+        strange, reason = _strange(exponent)
+    return Verdict(
+        name="strange" if strange else ("undecided" if period is None else f"period-{period}"),
+        period=period,
+        distance=math.nan if closest is None else float(distances[closest - 1]),
+        nearest=closest,
+        exponent=math.nan if exponent is None else exponent.value,
+        standard_error=math.nan if exponent is None else exponent.standard_error,
+        first=firings[0],
+        last=firings[1],
+        tolerance=tolerance,
+        reason=reason,
+    )
+
+
+def _strange(exponent: Exponent | None) -> tuple[bool, str]:
+    """Return whether neighbouring motions part, or why one cannot tell."""
+    if exponent is None:
+        return False, "no period, and the exponent was not computed"
+    if not exponent.ok:
+        return False, f"no period, and the tangent flow ended early: {exponent.status}"
+    if not exponent.smooth:
+        return False, "no period, and no exponent, since the motion passes a touch without velocity"
+    if exponent.value > SIGNIFICANT * exponent.standard_error:
+        return True, ""
+    return False, (
+        f"no period up to {LARGEST_PERIOD}, and the largest exponent is not positive by"
+        f" {SIGNIFICANT:g} standard errors"
+    )

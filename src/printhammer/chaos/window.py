@@ -1,0 +1,79 @@
+"""The window in which strobe points are drawn, and in whose half-widths their distances are measured."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.problem import scales_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.drive import Drive
+    from printhammer.hammer import Hammer
+    from printhammer.segments import FloatArray
+
+PAPER_X: Final = (38.1e-6, 88.9e-6)
+"""Displacements of the window of Fig. 11 of Hendriks (1983), m: 0.0015 to 0.0035 in."""
+
+PAPER_V: Final = (-0.635, 0.635)
+"""Velocities of the same, m/s: -25 to +25 in/s."""
+
+PAPER_BACKSTOP: Final = 50.8e-6
+PAPER_FRONT: Final = 203.2e-6
+
+_SAME: Final = 1e-3
+
+
+@dataclass(frozen=True)
+class Window:
+    """A rectangle in the plane of displacement and velocity.
+
+    Attributes
+    ----------
+    x : tuple of float
+        Least and largest displacement, m.
+    v : tuple of float
+        Least and largest velocity, m/s.
+    """
+
+    x: tuple[float, float]
+    v: tuple[float, float]
+
+    @property
+    def half_widths(self) -> FloatArray:
+        """Half-widths, m and m/s, shape (2,)."""
+        return 0.5 * np.array([self.x[1] - self.x[0], self.v[1] - self.v[0]])
+
+    def inside(self, x: FloatArray, v: FloatArray) -> npt.NDArray[np.bool_]:
+        """Whether states lie inside, shape (n,)."""
+        return (self.x[0] <= x) & (x <= self.x[1]) & (self.v[0] <= v) & (v <= self.v[1])
+
+
+PAPER_WINDOW: Final = Window(PAPER_X, PAPER_V)
+"""The window of Fig. 11."""
+
+
+def window_of(hammer: Hammer, drive: Drive) -> Window:
+    """Return the window of a hammer under a drive.
+
+    That of Fig. 11 for a hammer whose backstop and pack are where the paper has them. For others its
+    half-widths are a sixth of the way from backstop to pack, as in Fig. 11, and a sixth of the speed that
+    the largest force gives the armature over that way; where a hammer lacks one of them, a sixth of the
+    scales of its motion (`printhammer.problem.scales_of`). As in Fig. 11 the backstop, or the origin, lies a
+    quarter of its width from the left.
+    """
+    place, front = hammer.position, hammer.front
+    if (
+        place is not None
+        and front is not None
+        and math.isclose(place, PAPER_BACKSTOP, rel_tol=_SAME)
+        and math.isclose(front, PAPER_FRONT, rel_tol=_SAME)
+    ):
+        return PAPER_WINDOW
+    way, speed = (scale / 6.0 for scale in scales_of(hammer, drive, (hammer.origin, 0.0)))
+    return Window((hammer.origin - 0.5 * way, hammer.origin + 1.5 * way), (-speed, speed))
