@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from printhammer.chaos import strobe
+    from printhammer.chaos.strobe import strobe
     from printhammer.drive import Burst, PulseTrain, SineForce
     from printhammer.ensemble import Ensemble, EnsembleResult
     from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
@@ -45,6 +45,7 @@ __all__ = [
     "release_current",
     "rest_state",
     "simulate",
+    "strobe",
     "sweep",
 ]
 
@@ -66,6 +67,7 @@ _HOME = {
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
     "simulate": "simulate",
+    "strobe": "chaos.strobe",
     "sweep": "sweep",
 }
 
