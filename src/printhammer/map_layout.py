@@ -111,6 +111,19 @@ def places_of(chart: xr.Dataset) -> dict[str, float]:
     return {name: float(chart.attrs[key]) for name, key in PLACES.items() if key in chart.attrs}
 
 
+def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
+    """Return the rates of a map, Hz, at which the run did not reach its end, by the name of the status."""
+    if "status" not in chart:
+        return {}
+    codes = str(chart["status"].attrs.get("codes", ""))
+    names = dict(part.split(" ", 1) for part in codes.split(", ") if " " in part)
+    found: dict[str, list[float]] = {}
+    for code, rate in zip(chart["status"].values.tolist(), chart["rate"].values.tolist(), strict=True):
+        if code != 0:
+            found.setdefault(names.get(str(code), str(code)), []).append(rate)
+    return found
+
+
 def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
     """Return what a map says about its hammer: name, fingerprint, how its constants came about, places."""
     statuses = {constant.status for constant in hammer.constants.values()}
@@ -145,6 +158,8 @@ def save_map(chart: xr.Dataset, path: str | Path) -> None:
 
 def _save_zarr(chart: xr.Dataset, target: Path) -> None:
     need_zarr(target)
+    if target.exists() and not (target / "zarr.json").is_file():
+        raise InputError(f"{target}: expected a new store, this is no Zarr store")
     draft: Path | None = None
     try:
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))

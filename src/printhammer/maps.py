@@ -138,12 +138,12 @@ def frequency_map(
 
 
 def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArray, FloatArray]:
-    """Compare two maps, rate by rate, at the times of the second.
+    """Compare two maps, rate by rate, at the times of the one whose times lie further apart.
 
     Parameters
     ----------
     computed, measured : xarray.Dataset
-        Maps; the first is joined by straight lines between its times.
+        Maps; the one with the closer times is joined by straight lines between them.
 
     Returns
     -------
@@ -154,14 +154,18 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
         known; NaN where there is no such time.
     """
     rows, others = matching(computed, measured)
-    times = measured["time"].values
+    times = max((chart["time"].values for chart in (measured, computed)), key=_spacing)
     found = np.full(len(rows), np.nan)
-    for k, (row, other) in enumerate(zip(rows, others, strict=True)):
-        difference = on_times(computed, int(row), times) - measured["displacement"].values[other]
+    for k, (row, other) in enumerate(zip(rows.tolist(), others.tolist(), strict=True)):
+        difference = on_times(computed, row, times) - on_times(measured, other, times)
         known = np.isfinite(difference)
         if known.any():
-            found[k] = np.sqrt(np.mean(np.square(difference[known], dtype=np.float64)))
+            found[k] = np.sqrt(np.mean(np.square(difference[known])))
     return computed["rate"].values[rows], found
+
+
+def _spacing(times: FloatArray) -> float:
+    return float(np.median(np.diff(times))) if times.size > 1 else np.inf
 
 
 def _rates(rates: npt.ArrayLike | None) -> FloatArray:

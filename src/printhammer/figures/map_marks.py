@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.figures.scales import Scale, scale
 from printhammer.figures.style import HAIR, INK, MUTED, ORANGE, SMALL, TINY
-from printhammer.map_layout import places_of
+from printhammer.map_layout import failed_rates, places_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -208,19 +208,11 @@ def colour_bar(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> 
 
 def failures(chart: xr.Dataset) -> str:
     """Say how many runs of a map did not reach their end, and why; empty if all did."""
-    if "status" not in chart:
+    failed = {name: len(rates) for name, rates in failed_rates(chart).items()}
+    if not failed:
         return ""
-    status = chart["status"].values
-    codes = dict(
-        part.split(" ", 1) for part in str(chart["status"].attrs.get("codes", "")).split(", ") if part
-    )
-    failed = status[status != 0]
-    if not failed.size:
-        return ""
-    names = ", ".join(
-        f"{codes.get(str(code), str(code))} ({int((failed == code).sum())})" for code in np.unique(failed)
-    )
-    return f"{failed.size} of {status.size} runs did not reach their end: {names}; grey after it."
+    names = ", ".join(f"{name} ({count})" for name, count in failed.items())
+    return f"{sum(failed.values())} of {chart['rate'].size} runs did not reach their end: {names}."
 
 
 def sign_map(figure: Figure, chart: xr.Dataset, *remarks: str) -> None:
