@@ -116,6 +116,13 @@ FIGURES: Final[dict[int, PaperFigure]] = {
             "A single pulse: phase plane",
             "Velocity against displacement after a single current pulse; arrows point to later times.",
         ),
+        PaperFigure(
+            11,
+            "Poincaré plots",
+            "Displacement and velocity at the first 200 firings of trains, a panel for each strobe time, with"
+            " the verdict on firings 1001 to 2000. Vertical line: backstop; rings: the last points of a"
+            " periodic train.",
+        ),
     )
 }
 """The figures of the paper by number."""
