@@ -3,6 +3,7 @@ PYTHON ?= python3
 WORKERS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
+PEERS ?= $(BIN)
 LOCKED := $(VENV)/requirements.stamp
 INSTALLED := $(VENV)/installed.stamp
 CODE := src tests $(wildcard benchmarks examples docs)
@@ -56,8 +57,8 @@ paper: $(INSTALLED) ## every figure and claim of the paper, into build/paper
 docs: $(INSTALLED) ## the documentation, into build/docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs build/docs
 
-bench: $(INSTALLED) ## the benchmark table
-	$(BIN)/python benchmarks/single_run.py --markdown docs/benchmarks.md
+bench: $(INSTALLED) ## the benchmark table (PEERS=folder of another environment's programs)
+	$(PEERS)/printhammer bench --markdown docs/benchmarks.md
 
 # Resolve again; the files name versions and hashes only, never an address.
 LOCK := build/lock-venv/bin/uv pip compile --quiet --universal --fork-strategy fewest --python-version 3.11 \

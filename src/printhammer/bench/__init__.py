@@ -1,0 +1,77 @@
+"""The benchmark: printhammer against general-purpose solvers, and its ensembles by the clock."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from printhammer.bench.report import Report
+    from printhammer.bench.table import Say
+
+_COMPILING: Final = """
+import sys, time
+from printhammer.bench.ensembles import trains
+from printhammer.bench.problem import frozen
+from printhammer.ensemble import Ensemble
+drives, ends = trains(frozen(), 16, 2)
+began = time.perf_counter()
+Ensemble(frozen().hammer, drives, ends).run(times=[0.0, 1e-3], threads=1, engine=sys.argv[1])
+print(time.perf_counter() - began)
+"""
+
+
+def run(*, quick: bool = False, threads: int | None = None, say: Say | None = None) -> Report:
+    """Measure everything.
+
+    Parameters
+    ----------
+    quick : bool, optional
+        Short runs, few members, one round: to see that it works.
+    threads : int, optional
+        Largest number of threads of ensembles; by default 2, or 1 where there is one core only.
+    say : callable, optional
+        Called with a line before each step.
+
+    Returns
+    -------
+    Report
+        The figures.
+
+    Raises
+    ------
+    InputError
+        Fewer than one thread.
+    """
+    from printhammer.bench import ensembles, machine, own, table
+    from printhammer.bench.problem import MEMBERS, frozen
+    from printhammer.bench.report import Report
+    from printhammer.errors import InputError
+
+    if threads is not None and threads < 1:
+        raise InputError(f"threads = {threads}, expected at least 1")
+    told: Say = say if say is not None else lambda _line: None
+    task = frozen()
+    lines, absent = table.measure(task, quick, 16 if quick else MEMBERS, told)
+    figures = ensembles.measure(task, quick, threads or min(2, machine.cores()), told)
+    compiling = {}
+    for engine in [] if quick else own.engines():
+        told(f"compiling, {engine} engine")
+        compiling[engine] = _compiling(engine)
+    return Report(machine.machine(), quick, lines, absent, figures, compiling)
+
+
+def _compiling(engine: str) -> float:
+    """Return the time, s, to compile what an engine needs, in a process with nothing on disk."""
+    with tempfile.TemporaryDirectory(prefix="printhammer-bench-") as folder:
+        done = subprocess.run(
+            [sys.executable, "-c", _COMPILING, engine],
+            env={**os.environ, "NUMBA_CACHE_DIR": folder},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    return float(done.stdout)

@@ -1,0 +1,105 @@
+"""Printhammer in the table: single runs at several tolerances, the integrators of 1983, and ensembles."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Final, get_args
+
+from printhammer.bench.entry import Entry
+from printhammer.bench.problem import ENDS, FIRST, GRID, PERIOD, checked, ensemble_tasks
+from printhammer.problem import TOLERANCE, Problem
+
+if TYPE_CHECKING:
+    from printhammer.bench.problem import Task
+    from printhammer.ensemble import Ensemble
+    from printhammer.segments import FloatArray
+
+TOLERANCES: Final = tuple(
+    sorted({TOLERANCE, *(f * 10.0**-e for e in range(5, 13) for f in (1.0, 0.3)), 1e-13}, reverse=True)
+)
+"""Tolerances of the table, loosest first."""
+
+
+def _chosen(quick: bool) -> tuple[float, ...]:
+    return (1e-6, 1e-8, 1e-10, TOLERANCE, 1e-12) if quick else TOLERANCES
+
+
+def engines() -> list[str]:
+    """Return the engines of an ensemble that can be asked for by name."""
+    from printhammer.ensemble import Engine
+
+    return [engine for engine in get_args(Engine) if engine != "auto"]
+
+
+def singles(task: Task, quick: bool) -> list[Entry]:
+    """Return the single runs."""
+    pulses = 5 if quick else 50
+    start = (task.rest, 0.0)
+    found = []
+    for tolerance in _chosen(quick):
+        problem = Problem(task.hammer, task.drive(pulses), start, 0.0, tolerance)
+        default = " (default)" if tolerance == TOLERANCE else ""
+        found.append(_single(f"printhammer, {tolerance:.0e}{default}", problem, pulses))
+    return found
+
+
+def schemes(task: Task, quick: bool) -> list[Entry]:
+    """Return the integrators of the paper, on its schedule of steps."""
+    from printhammer.scheme_runs import SchemeProblem
+
+    pulses = 5 if quick else 50
+    found = []
+    for scheme, label in (("trapezoid", "implicit trapezoidal rule"), ("runge-kutta-4", "Runge-Kutta 4")):
+        problem = SchemeProblem(
+            task.hammer,
+            task.drive(pulses),
+            (task.rest, 0.0),
+            TOLERANCE,
+            scheme,  # type: ignore[arg-type]
+            1.0,
+        )
+        entry = _single(f"1983: {label}, 10/1/20 us", problem, pulses)
+        entry.integrate, entry.ours = partial(problem.integrate, entry.duration), False
+        found.append(entry)
+    return found
+
+
+def _single(name: str, problem: Problem, pulses: int) -> Entry:
+    def positions() -> FloatArray:
+        return problem.resample(problem.run(FIRST), GRID)[:, 0]
+
+    duration = pulses * PERIOD
+    return Entry(name, positions, partial(problem.run, duration), duration, ours=True)
+
+
+def ensembles(task: Task, quick: bool, members: int) -> list[Entry]:
+    """Return ensembles of so many members, on one thread, with each engine that there is."""
+    from printhammer.ensemble import Ensemble
+
+    tasks = ensemble_tasks(task, members)
+    pulses = 5 if quick else 10
+    some = [tasks[i] for i in checked(members)]
+
+    def strobed(runs: Ensemble, engine: str) -> FloatArray:
+        found = runs.run(strobes=[ENDS] * runs.size, threads=1, engine=engine).strobes  # type: ignore[arg-type]
+        assert found is not None
+        return found.x.T
+
+    found = []
+    for engine in engines():
+        for tolerance in _chosen(quick):
+            runs = Ensemble(
+                task.hammer, [one.drive(pulses) for one in tasks], pulses * PERIOD, tolerance=tolerance
+            )
+            few = Ensemble(task.hammer, [one.drive(3) for one in some], FIRST, tolerance=tolerance)
+            found.append(
+                Entry(
+                    f"printhammer, {engine} engine, {tolerance:.0e}",
+                    partial(strobed, few, engine),
+                    partial(runs.run, threads=1, engine=engine),  # type: ignore[arg-type]
+                    pulses * PERIOD * members,
+                    members=members,
+                    ours=True,
+                )
+            )
+    return found

@@ -1,0 +1,98 @@
+"""Solvers that are driven from Python and know events: SciPy, and CVODE through scikit-sundae.
+
+One smooth right-hand side for each mode, the solver started anew at every event and every edge of the drive.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from printhammer.bench.problem import BACKSTOP, FREE, LOADING, UNLOADING, compiled_acceleration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.bench.problem import Task
+    from printhammer.segments import FloatArray
+
+
+class Stretch(NamedTuple):
+    """What a solver did between two switches.
+
+    Attributes
+    ----------
+    t : float
+        Where it ended, s.
+    state : array, shape (2,)
+        Displacement, m, and velocity, m/s, there.
+    event : int
+        Number of the guard that ended it, or -1.
+    at : array
+        Displacements at the times asked for, m, as far as they were reached.
+    """
+
+    t: float
+    state: FloatArray
+    event: int
+    at: FloatArray
+
+
+class Solver(Protocol):
+    """Integrates one mode: rates, guards that end it by falling through zero, start, end, state, times."""
+
+    def __call__(
+        self,
+        rates: Callable[[float, FloatArray], tuple[float, float]],
+        guards: list[Callable[[float, FloatArray], float]],
+        begin: float,
+        end: float,
+        state: FloatArray,
+        times: FloatArray,
+    ) -> Stretch:
+        """Integrate to the end or to the first event."""
+
+
+def event_split(task: Task, end: float, grid: FloatArray, solver: Solver) -> FloatArray:
+    """Integrate mode by mode and piece by piece of the drive; return the displacement on the grid, m."""
+    c = task.constants
+    acceleration = compiled_acceleration()
+    front, position = c[7], c[9]
+    guards: dict[int, list[Any]] = {
+        FREE: [lambda _t, y: y[0] - position, lambda _t, y: front - y[0]],
+        LOADING: [lambda _t, y: y[1]],
+        UNLOADING: [lambda _t, y: y[0] - front, lambda _t, y: -y[1]],
+        BACKSTOP: [lambda _t, y: position - y[0]],
+    }
+    following = {
+        FREE: (BACKSTOP, LOADING),
+        LOADING: (UNLOADING,),
+        UNLOADING: (FREE, LOADING),
+        BACKSTOP: (FREE,),
+    }
+    mode, peak = BACKSTOP, 1.0
+    state = np.array([task.rest, 0.0])
+    out = np.full(grid.size, np.nan)
+    for piece in task.pieces(end):
+        t = float(piece[0])
+        while t < piece[1]:
+
+            def rates(s: float, y: FloatArray, mode: int = mode, peak: float = peak) -> tuple[float, float]:
+                return y[1], acceleration(s, y[0], y[1], mode, peak, c, piece)  # noqa: B023
+
+            wanted = np.flatnonzero((grid >= t) & (grid <= piece[1]))
+            done = solver(rates, guards[mode], t, float(piece[1]), state, grid[wanted])
+            out[wanted[: done.at.size]] = done.at
+            t, state = done.t, np.array(done.state)
+            if done.event >= 0:
+                if mode == LOADING:
+                    peak = (state[0] - front) / c[8]
+                surface = {FREE: (position, front), UNLOADING: (front, None), BACKSTOP: (position,)}
+                level = surface.get(mode, (None,))[done.event]
+                if level is None:
+                    state[1] = 0.0
+                else:
+                    state[0] = level
+                mode = following[mode][done.event]
+    return out

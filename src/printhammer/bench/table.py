@@ -1,0 +1,193 @@
+"""The table of solvers: who is there, how exact, how fast, and by how much this program is ahead."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.bench import (
+    cpp_peers,
+    diffrax_peer,
+    exact,
+    heyoka_peer,
+    numbalsoda_peer,
+    own,
+    scipy_peer,
+    sundae_peer,
+)
+from printhammer.bench.entry import Absent, Entry
+
+if TYPE_CHECKING:
+    from printhammer.bench.problem import Task
+
+Say = Callable[[str], None]
+
+SINGLE_PEERS: Final = {
+    "SciPy": scipy_peer.entries,
+    "numbalsoda": numbalsoda_peer.entries,
+    "heyoka": heyoka_peer.entries,
+    "Boost.Odeint": cpp_peers.odeint,
+    "SUNDIALS": cpp_peers.sundials,
+    "scikit-sundae": sundae_peer.entries,
+}
+"""Peers that integrate one run at a time, by name."""
+
+ENSEMBLE_PEERS: Final = {"heyoka": heyoka_peer.ensembles, "diffrax": diffrax_peer.entries}
+"""Peers with ensembles of their own, by name."""
+
+_SHORTEST: Final = 0.02
+"""Processor time of a turn, s; shorter work is repeated within it."""
+_SLOW: Final = 1.0
+"""A solver whose turn takes longer has two turns only, s."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One solver of the table.
+
+    Attributes
+    ----------
+    solver : str
+        Solver, version, method, tolerance.
+    ours : bool
+        Whether it is this program.
+    members : int
+        1 for a single run.
+    error : float
+        Largest deviation from the reference over the first 3 ms, m; NaN where the solver did not get there.
+    speed : float
+        Hammer-seconds per second of processor time.
+    first : float
+        Time of the first call, s, in which things are compiled.
+    duration : float
+        Hammer-seconds of one call timed.
+    match : str
+        For a peer: the fastest of our lines of its kind that is at least as exact.
+    ratio : float
+        How many times faster that line is; NaN where there is none.
+    """
+
+    solver: str
+    ours: bool
+    members: int
+    error: float
+    speed: float
+    first: float
+    duration: float
+    match: str = ""
+    ratio: float = math.nan
+
+
+def measure(task: Task, quick: bool, members: int, say: Say) -> tuple[list[Line], dict[str, str]]:
+    """Measure all solvers that are there.
+
+    Parameters
+    ----------
+    task : Task
+        The problem.
+    quick : bool
+        Short runs and one round, to see that it works.
+    members : int
+        Number of runs of an ensemble.
+    say : callable
+        Called with a line before each step.
+
+    Returns
+    -------
+    tuple
+        The lines of the table, and why each peer that is absent is.
+    """
+    absent: dict[str, str] = {}
+    solvers: list[Entry] = []
+    building: dict[int, float] = {}
+    makers: list[tuple[str, Callable[[], list[Entry]]]] = [
+        ("printhammer", partial(own.singles, task, quick)),
+        ("1983", partial(own.schemes, task, quick)),
+        *((name, partial(make, task, quick)) for name, make in SINGLE_PEERS.items()),
+        ("printhammer", partial(own.ensembles, task, quick, members)),
+        *((name, partial(many, task, quick, members)) for name, many in ENSEMBLE_PEERS.items()),
+    ]
+    for name, make_entries in makers:
+        began = time.perf_counter()
+        try:
+            made = make_entries()
+        except Absent as reason:
+            absent[name] = str(reason)
+            continue
+        if made:
+            building[len(solvers)] = time.perf_counter() - began
+        solvers += made
+    lines = []
+    kept = []
+    for i, solver in enumerate(solvers):
+        say(solver.name)
+        began = time.perf_counter()
+        try:
+            x = solver.positions()
+        except Exception as failure:
+            # A peer that breaks here says nothing about the others.
+            if solver.ours:
+                raise
+            absent[solver.name] = f"failed: {type(failure).__name__}: {failure}".splitlines()[0]
+            continue
+        first = time.perf_counter() - began + building.get(i, 0.0)
+        true = exact.single(task) if solver.members == 1 else exact.ensemble(task, solver.members)
+        error = _largest(x, true)
+        lines.append(Line(solver.name, solver.ours, solver.members, error, 0.0, first, solver.duration))
+        kept.append(solver)
+    seconds = _rounds(kept, 1 if quick else 7, say)
+    timed = [replace(line, speed=line.duration / best) for line, best in zip(lines, seconds, strict=True)]
+    return with_ratios(timed), absent
+
+
+def _largest(x: np.ndarray, true: np.ndarray) -> float:
+    """Return the largest deviation where there is a value to compare; NaN where a run was lost."""
+    wanted = np.ones(true.shape, bool)
+    if true.ndim == 2:
+        # An ensemble may be compared at some of the times only.
+        wanted &= ~np.isnan(x).all(axis=1, keepdims=True)
+    return float(np.abs(x - true)[wanted].max()) if wanted.any() else math.nan
+
+
+def _rounds(solvers: list[Entry], rounds: int, say: Say) -> list[float]:
+    """Return the best processor time of one call of each, s; all have their turn in each round."""
+    best = [math.inf] * len(solvers)
+    repeats = [1] * len(solvers)
+    for turn in range(rounds):
+        say(f"round {turn + 1} of {rounds}")
+        for i, solver in enumerate(solvers):
+            if turn >= 2 and best[i] > _SLOW:
+                continue
+            if turn == 0:
+                solver.integrate()
+            began = time.process_time()
+            for _ in range(repeats[i]):
+                solver.integrate()
+            best[i] = min(best[i], (time.process_time() - began) / repeats[i])
+            repeats[i] = max(1, min(1000, int(_SHORTEST / max(best[i], 1e-6))))
+    return best
+
+
+def with_ratios(lines: list[Line]) -> list[Line]:
+    """Return the lines with, for each peer, the fastest of ours of its kind that is at least as exact."""
+    found = []
+    for line in lines:
+        if line.ours or math.isnan(line.error):
+            found.append(line)
+            continue
+        rivals = [
+            own
+            for own in lines
+            if own.ours and (own.members == 1) == (line.members == 1) and own.error <= line.error
+        ]
+        if rivals:
+            rival = max(rivals, key=lambda own: own.speed)
+            line = replace(line, match=rival.solver, ratio=rival.speed / line.speed)  # noqa: PLW2901
+        found.append(line)
+    return found

@@ -1,0 +1,94 @@
+"""The verb `bench`: this machine's figures, beside those of the solvers that are installed on it."""
+
+from __future__ import annotations
+
+from pathlib import Path  # noqa: TC003
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from printhammer.cli.numbers import whole
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from printhammer.bench.report import Report, Rows
+
+EXAMPLE = "Example: printhammer bench --quick --json build/bench.json"
+
+
+def bench(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Short runs, one round: to see that everything works.")
+    ] = False,
+    threads: Annotated[
+        str | None, typer.Option(metavar="N", help="Largest number of threads of ensembles (2).")
+    ] = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the figures as JSON.")] = None,
+    markdown: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the tables as Markdown.")
+    ] = None,
+) -> None:
+    """Measure speed and error against other solvers, one run at a time and in ensembles."""
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from printhammer import bench as benchmark
+    from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.outputs import check_outputs, write_file
+
+    count = whole(threads, "threads")
+    wanted = [path for path in (json, markdown) if path is not None]
+    check_outputs(wanted)
+    announce_compiling()
+    screen = console()
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=screen, transient=True
+    ) as progress:
+        task = progress.add_task("…", total=None)
+        report = benchmark.run(
+            quick=quick, threads=count, say=lambda line: progress.update(task, description=line)
+        )
+    _show(report, screen)
+    if json is not None:
+        write_file(json, report.to_json())
+    if markdown is not None:
+        write_file(markdown, report.to_markdown())
+    for path in wanted:
+        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+
+
+def _show(report: Report, screen: Console) -> None:
+    from rich.markup import escape
+
+    from printhammer.bench.report import FRAME_HEADS, MASS_HEADS, SOLVER_HEADS
+
+    told = ", ".join(f"{name} {value}" for name, value in report.machine.items())
+    screen.print(f"[dim]{escape(told)}[/dim]\n", soft_wrap=True)
+    _table(screen, "One run at a time", SOLVER_HEADS, report.solvers(ensembles=False))
+    _table(screen, "Ensembles, one thread", SOLVER_HEADS, report.solvers(ensembles=True))
+    for name, reason in report.absent.items():
+        screen.print(f"[yellow]absent[/yellow] {escape(name)}: {escape(reason)}", soft_wrap=True)
+    figures = report.figures
+    title = (
+        f"Figure 9: {figures.rates} rates x {figures.pulses} pulses, {figures.times} times, errors in strokes"
+    )
+    _table(screen, title, FRAME_HEADS, report.frames())
+    for sentence in report.frame_sentences():
+        screen.print(escape(sentence), soft_wrap=True)
+    for engine, seconds in report.compiling.items():
+        screen.print(f"compiling, {engine} engine: {seconds:.0f} s", soft_wrap=True)
+    _table(screen, "\nLong trains", MASS_HEADS, report.masses())
+    _table(screen, "Growth with members", MASS_HEADS, report.growth())
+
+
+def _table(screen: Console, title: str, heads: tuple[str, ...], rows: Rows) -> None:
+    from rich.markup import escape
+
+    from printhammer.cli.terminal import plain_table
+
+    text = {"solver", "engine", "ours at equal or better accuracy"}
+    table = plain_table(*((escape(head), "left" if head in text else "right") for head in heads), title=title)
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    screen.print(table)
+    screen.print()

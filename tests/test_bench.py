@@ -1,0 +1,293 @@
+"""The benchmark: the same problem for all, errors are what they say, who is absent is named. No speeds."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import printhammer as ph
+from printhammer.bench import (
+    cpp_peers,
+    diffrax_peer,
+    ensembles,
+    exact,
+    heyoka_peer,
+    numbalsoda_peer,
+    own,
+    scipy_peer,
+    sundae_peer,
+    table,
+)
+from printhammer.bench.ensembles import Figures, Frame, Mass
+from printhammer.bench.entry import Absent, Entry
+from printhammer.bench.problem import ENDS, FIRST, GRID, PERIOD, Task, checked, ensemble_tasks, frozen
+from printhammer.bench.report import Report
+from printhammer.bench.table import Line, with_ratios
+from printhammer.cli.main import main
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    return frozen()
+
+
+def line(solver: str, error: float, speed: float, *, ours: bool, members: int = 1) -> Line:
+    return Line(solver, ours, members, error, speed, 0.1, 0.01)
+
+
+def test_the_frozen_hammer_is_a_hammer() -> None:
+    assert ph.load(BENCHMARKS / "frozen-hammer.toml").warnings() == []
+
+
+def test_the_package_has_the_frozen_hammer() -> None:
+    packaged = Path(importlib.import_module("printhammer.bench").__file__ or "").parent
+    assert (packaged / "frozen-hammer.toml").read_bytes() == (BENCHMARKS / "frozen-hammer.toml").read_bytes()
+
+
+def test_the_pieces_are_the_current_of_the_drive(task: Task) -> None:
+    pieces = task.pieces(5e-3)
+    np.testing.assert_array_equal(pieces[1:, 0], pieces[:-1, 1])
+    assert (pieces[0, 0], pieces[-1, 1]) == (0.0, 5e-3)
+    times = np.random.default_rng(1).uniform(0.0, 5e-3, 1000)
+    row = pieces[np.searchsorted(pieces[:, 0], times, side="right") - 1]
+    current = row[:, 2] + row[:, 3] * np.exp(-row[:, 4] * (times - row[:, 0]))
+    motion = ph.simulate(task.hammer, task.drive(4), duration=5e-3, times=np.sort(times))
+    np.testing.assert_allclose(current[np.argsort(times)], motion.current, atol=1e-11)
+
+
+def test_scipy_with_its_events_agrees_with_the_reference(task: Task) -> None:
+    entry = scipy_peer.entries(task, True)[-1]
+    assert np.abs(entry.positions() - exact.single(task)).max() < 1e-11
+
+
+def test_single_runs_agree_with_the_reference_the_better_the_tighter(task: Task) -> None:
+    found = [np.abs(entry.positions() - exact.single(task)).max() for entry in own.singles(task, True)]
+    assert found == sorted(found, reverse=True)
+    assert found[-1] < 1e-13
+
+
+def test_ensembles_agree_with_the_reference(task: Task) -> None:
+    entry = next(e for e in own.ensembles(task, True, 16) if e.name.endswith("1e-12"))
+    positions = entry.positions()
+    assert positions.shape == (ENDS.size, len(checked(16)))
+    assert np.abs(positions - exact.ensemble(task, 16)).max() < 1e-12
+
+
+def test_members_of_an_ensemble() -> None:
+    tasks = ensemble_tasks(frozen(), 5)
+    assert [one.period / PERIOD for one in tasks] == pytest.approx([0.9, 0.95, 1.0, 1.05, 1.1])
+    assert checked(3) == [0, 1, 2]
+    assert len(set(checked(512))) == 8
+
+
+def test_the_ratio_is_to_the_fastest_of_ours_at_least_as_exact() -> None:
+    lines = [
+        line("loose", 1e-6, 100.0, ours=True),
+        line("middle", 1e-9, 50.0, ours=True),
+        line("tight", 1e-12, 20.0, ours=True),
+        line("many", 1e-12, 80.0, ours=True, members=8),
+        line("peer", 2e-9, 10.0, ours=False),
+        line("peers", 1e-9, 10.0, ours=False, members=8),
+        line("exact", 1e-15, 1.0, ours=False),
+        line("lost", math.nan, 1.0, ours=False),
+    ]
+    found = {one.solver: one for one in with_ratios(lines)}
+    assert (found["peer"].match, found["peer"].ratio) == ("middle", 5.0)
+    assert (found["peers"].match, found["peers"].ratio) == ("many", 8.0)
+    assert found["exact"].match == found["lost"].match == ""
+    assert math.isnan(found["exact"].ratio)
+    assert math.isnan(found["lost"].ratio)
+
+
+@pytest.mark.parametrize(
+    ("module", "make"),
+    [
+        ("numbalsoda", lambda task: numbalsoda_peer.entries(task, True)),
+        ("heyoka", lambda task: heyoka_peer.entries(task, True)),
+        ("heyoka", lambda task: heyoka_peer.ensembles(task, True, 8)),
+        ("diffrax", lambda task: diffrax_peer.entries(task, True, 8)),
+        ("sksundae", lambda task: sundae_peer.entries(task, True)),
+    ],
+)
+def test_what_is_not_installed_is_absent(
+    task: Task, monkeypatch: pytest.MonkeyPatch, module: str, make: Callable[[Task], list[Entry]]
+) -> None:
+    # An entry of None makes the import fail as if the module were not there.
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(Absent, match="not installed"):
+        make(task)
+
+
+def test_without_a_compiler_or_headers_the_cpp_peers_are_absent(
+    task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.setattr(cpp_peers.shutil, "which", lambda _name: None)
+    cpp_peers._library.cache_clear()
+    for make in (cpp_peers.odeint, cpp_peers.sundials):
+        with pytest.raises(Absent, match=r"no C\+\+ compiler"):
+            make(task, True)
+    monkeypatch.setattr(cpp_peers.shutil, "which", lambda _name: "false")
+    with pytest.raises(Absent, match=r"boost/version.hpp"):
+        cpp_peers.odeint(task, True)
+    cpp_peers._library.cache_clear()
+
+
+def test_a_peer_that_breaks_is_named_and_the_others_go_on(
+    task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken() -> np.ndarray:
+        raise RuntimeError("no memory\nat all")
+
+    good = np.zeros_like(GRID)
+    monkeypatch.setattr(
+        own, "singles", lambda *_: [Entry("ours", lambda: good, lambda: None, FIRST, ours=True)]
+    )
+    monkeypatch.setattr(own, "schemes", lambda *_: [])
+    monkeypatch.setattr(own, "ensembles", lambda *_: [])
+    monkeypatch.setattr(table, "ENSEMBLE_PEERS", {})
+    monkeypatch.setattr(
+        table,
+        "SINGLE_PEERS",
+        {
+            "bad": lambda *_: [Entry("bad 1.0", broken, lambda: None, FIRST)],
+            "lost": lambda *_: [Entry("lost 1.0", lambda: good * np.nan, lambda: None, FIRST)],
+        },
+    )
+    said: list[str] = []
+    lines, absent = table.measure(task, True, 8, said.append)
+    assert absent == {"bad 1.0": "failed: RuntimeError: no memory"}
+    assert [one.solver for one in lines] == ["ours", "lost 1.0"]
+    # From rest at zero the deviation is the largest displacement itself.
+    assert lines[0].error == pytest.approx(np.abs(exact.single(task)).max())
+    assert math.isnan(lines[1].error)
+    assert said[0] == "ours"
+
+
+def test_errors_are_counted_up_to_the_horizon(task: Task) -> None:
+    times = np.linspace(0.0, 1e-3, 50)
+    true = exact.trusted(task.hammer, task.drive(1), 1e-3, times, 1.5e-4)
+    assert np.isfinite(true).all()
+    # A stroke so short that rounding parts the references at once.
+    assert np.isnan(exact.trusted(task.hammer, task.drive(1), 1e-3, times, 1e-12)).any()
+
+
+@pytest.fixture
+def report() -> Report:
+    frames = [
+        Frame("plain", 1e-7, 1, 0.2, 0.19, 1e-5, 3e-5),
+        Frame("plain", 1e-10, 1, 0.3, 0.29, 1e-9, 3e-9),
+        Frame("plain", 1e-7, 2, 0.1, 0.09, 1e-5, math.inf),
+    ]
+    mass = Mass("plain", 1e-10, 2, 100, 9, 10.0, 0.5)
+    figures = Figures(512, 9, 512, 4.77, 0.5, 64, frames, [mass], [mass])
+    lines = with_ratios([line("ours", 1e-12, 50.0, ours=True), line("lost", math.nan, 1.0, ours=False)])
+    return Report({"cores": "2"}, False, lines, {"peer": "not installed"}, figures, {"plain": 30.0})
+
+
+def test_speed_of_many_members(report: Report) -> None:
+    assert report.figures.masses[0].speed == 10.0
+
+
+def test_the_fastest_frame_is_exact_enough(report: Report) -> None:
+    assert report.frame_sentences() == [
+        "display, median error below 1e-04 of the stroke, 1 thread: 200 ms (plain engine, tolerance 1e-07)",
+        "display, median error below 1e-04 of the stroke, 2 threads: 100 ms (plain engine, tolerance 1e-07)",
+        "exact, median error below 1e-08 of the stroke, 1 thread: 300 ms (plain engine, tolerance 1e-10)",
+        "exact, median error below 1e-08 of the stroke, 2 threads: no setting",
+    ]
+
+
+def test_json_has_null_where_there_is_no_number(report: Report) -> None:
+    def refuse(name: str) -> Any:
+        raise AssertionError(name)
+
+    data = json.loads(report.to_json(), parse_constant=refuse)
+    assert data["solvers"][1]["error"] is None
+    assert data["ensembles"]["frames"][2]["error_95"] is None
+    assert data["ensembles"]["growth"][0]["speed"] == 10.0
+    assert data["absent"] == {"peer": "not installed"}
+
+
+def test_markdown_has_all_rows(report: Report) -> None:
+    text = report.to_markdown()
+    assert "| lost | lost |" in text
+    assert "- peer: not installed" in text
+    tables = [part for part in text.strip().split("\n\n") if part.startswith("|")]
+    assert [part.count("\n") - 1 for part in tables] == [2, 0, 3, 1, 1]
+    for part in tables:
+        assert len({row.count("|") for row in part.splitlines()}) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--threads", "0"], "threads = 0"),
+        (["--threads", "many"], "whole number"),
+        (["--json", "nowhere/at/all.json"], "folder that exists"),
+        (["--json", "x.json", "--markdown", "x.json"], "written twice"),
+    ],
+)
+def test_bad_input_is_refused_before_any_work(
+    arguments: list[str], word: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table, "measure", lambda *_: pytest.fail("work was done"))
+    with pytest.raises(SystemExit) as end:
+        main(["bench", *arguments])
+    err = capsys.readouterr().err
+    assert end.value.code == 2
+    assert word in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_the_benchmark_runs(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [
+            *(sys.executable, str(BENCHMARKS / "peers.py"), "--quick"),
+            *("--json", str(tmp_path / "figures.json"), "--markdown", str(tmp_path / "page.md")),
+        ],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    data = json.loads((tmp_path / "figures.json").read_text("utf-8"))
+    single = {row["solver"]: row for row in data["solvers"] if row["members"] == 1}
+    ours = [row["error"] for row in single.values() if row["ours"]]
+    assert next(row["error"] for name, row in single.items() if "default" in name) < 1e-12
+    assert ours == sorted(ours, reverse=True)
+    assert single["1983: Runge-Kutta 4, 10/1/20 us"]["error"] > 1e-8
+    named = " ".join([*single, *data["absent"], *(row["solver"] for row in data["solvers"])])
+    for peer in [*table.SINGLE_PEERS, *table.ENSEMBLE_PEERS]:
+        assert peer in named
+    # Whatever is stopped at switches and started anew is exact, and so are ensembles.
+    for row in data["solvers"]:
+        if any(word in row["solver"] for word in ("its events", "its roots", "located")):
+            assert row["error"] < 1e-8
+    for name in data["absent"]:
+        assert name in done.stdout
+    frames = data["ensembles"]["frames"]
+    assert {frame["engine"] for frame in frames} == set(own.engines())
+    assert all(0.0 < frame["error_median"] <= frame["error_95"] < 1e-3 for frame in frames)
+    rows = (tmp_path / "page.md").read_text("utf-8").count("\n| ")
+    many = len(frames) + len(data["ensembles"]["masses"]) + len(data["ensembles"]["growth"])
+    assert rows == len(data["solvers"]) + many + 5
+
+
+def test_trains_of_figure_9(task: Task) -> None:
+    drives, ends = ensembles.trains(task, 4, 9)
+    np.testing.assert_allclose([drive.period for drive in drives], [1 / 500, 1 / 1000, 1 / 1500, 1 / 2000])
+    np.testing.assert_allclose(ends, [9 / 500 + 1e-3, 9e-3 + 1e-3, 6e-3 + 1e-3, 4.5e-3 + 1e-3])
