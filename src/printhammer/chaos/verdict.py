@@ -80,8 +80,8 @@ class Verdict:
         return self.name == "strange"
 
     @property
-    def evidence(self) -> str:
-        """The evidence in one phrase."""
+    def phrases(self) -> list[str]:
+        """The evidence, a phrase each."""
         told = []
         if self.period is not None:
             told.append(f"states {_firings(self.period)} apart agree to {self.distance:.1e} of the window")
@@ -93,7 +93,12 @@ class Verdict:
         if not math.isnan(self.exponent):
             told.append(f"largest exponent {self.exponent:+.4g} ± {self.standard_error:.2g} per firing")
         told.append(f"firings {self.first} to {self.last}, tolerance {self.tolerance:g}")
-        return "; ".join(told)
+        return told
+
+    @property
+    def evidence(self) -> str:
+        """The evidence in one line."""
+        return "; ".join(self.phrases)
 
     def as_dict(self) -> dict[str, Any]:
         """Return verdict and evidence by name; None for what is not known, so that JSON can hold it."""
