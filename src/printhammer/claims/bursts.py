@@ -16,10 +16,13 @@ from printhammer.drive import PulseTrain
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
+    from printhammer.drive import Drive
     from printhammer.motion import Motion
 
 _WHOLE = ("backstop", "pack", "waveform")
 _CLOSER: Final = 8
+_TOGETHER: Final = 64
+_SAMPLES: Final = 2001
 
 
 def spreads(motion: Motion) -> tuple[int, float | None, float | None]:
@@ -51,20 +54,35 @@ def _rates(settings: Any) -> list[float]:
     return [float(first + step * k) for k in range(round((last - first) / step) + 1)]
 
 
-@measures("order_of_onset", *_WHOLE)
-def order_of_onset(context: Context, claim: Claim) -> Measured:
-    """Rates at which flight times vary, forces vary, and a dot is lost, for the first time."""
-    settings = claim.settings
+def onsets(context: Context) -> dict[str, float]:
+    """Return the lowest rates, Hz, at which flight times vary, forces vary, and a dot is lost.
+
+    By the names "flight_time", "force" and "lost"; what does not happen up to the first lost dot is missing.
+    """
+    settings = claims()["order_of_onset"].settings
+    rates, pulses = _rates(settings), settings["pulses"]
     first: dict[str, float] = {}
-    for rate in _rates(settings):
-        struck, force, flight = spreads(context.train(rate, settings["pulses"]))
-        if flight is not None and flight > settings["flight_time_spread_s"]:
-            first.setdefault("flight_time", rate)
-        if force is not None and force > settings["force_spread"]:
-            first.setdefault("force", rate)
-        if struck < settings["pulses"]:
-            first["lost"] = rate
-            break
+    for start in range(0, len(rates), _TOGETHER):
+        some = rates[start : start + _TOGETHER]
+        dots = context.dots([PulseTrain(context.waveform, rate=rate, pulses=pulses) for rate in some])
+        for k, rate in enumerate(some):
+            forces, flights = (
+                column[k][dots.struck[k]].tolist() for column in (dots.peak_force, dots.flight_time)
+            )
+            if len(forces) > 1 and spread(flights) > settings["flight_time_spread_s"]:
+                first.setdefault("flight_time", rate)
+            if len(forces) > 1 and spread(forces) / float(np.mean(forces)) > settings["force_spread"]:
+                first.setdefault("force", rate)
+            if len(forces) < pulses:
+                first["lost"] = rate
+                return first
+    return first
+
+
+@measures("order_of_onset", *_WHOLE)
+def order_of_onset(context: Context, _claim: Claim) -> Measured:
+    """Rates at which flight times vary, forces vary, and a dot is lost, for the first time."""
+    first = context.once("onsets", lambda: onsets(context))
     lost = first.get("lost")
     value: dict[str, Any] = {"first_lost_dot_at_Hz": lost}
     for name in ("flight_time", "force"):
@@ -131,14 +149,21 @@ def _first_leaving(motion: Motion) -> float | None:
     return float(times[first + int(np.argmax(outside))]) if outside.any() else motion.end
 
 
-def _hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
+def _exceeds(drive: Drive, limit: float) -> bool:
+    """Whether the largest absolute value of a drive exceeds a limit."""
+    # No sample is above the peak, which takes long to find.
+    samples = np.abs(drive.value(np.linspace(0.0, drive.end, _SAMPLES)))
+    return bool(samples.max() > limit) or drive.peak > limit
+
+
+def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
     """Return the rate from which on all hang up, the motions, and the highest rate allowed, Hz."""
     settings = claims()["hang_up_at_high_rate"].settings
     step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))
     waveform = context.waveform
     rate, lowest, found = settings["last_rate_Hz"], None, []
     if waveform.quantity == "current":
-        while rate > 0.0 and PulseTrain(waveform, rate=rate, pulses=pulses).peak > limit:
+        while rate > 0.0 and _exceeds(PulseTrain(waveform, rate=rate, pulses=pulses), limit):
             rate -= step
     highest = rate
     while rate > 0.0:
@@ -154,7 +179,7 @@ def _hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]
 @measures("hang_up_at_high_rate", *_WHOLE)
 def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
     """Lowest rate from which on the armature hangs up."""
-    lowest, _, highest = context.once("hang-up", lambda: _hang_up_range(context))
+    lowest, _, highest = context.once("hang-up", lambda: hang_up_range(context))
     value = {"hang_up_rate_Hz": lowest, "highest_rate_Hz": highest}
     if lowest is None:
         return Measured(value, f"At {highest:.0f} Hz the armature still touches the backstop.")
@@ -164,7 +189,7 @@ def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
 @measures("weak_prints_when_hung_up", *_WHOLE)
 def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
     """Largest pack force after the first dot where the armature hangs up."""
-    lowest, motions, highest = context.once("hang-up", lambda: _hang_up_range(context))
+    lowest, motions, highest = context.once("hang-up", lambda: hang_up_range(context))
     if lowest is None:
         raise NotMeasurableError("The armature does not hang up")
     # Largest forces at the ends of steps tell which motions are worth a closer look.

@@ -11,10 +11,11 @@ from printhammer.problem import TOLERANCE
 from printhammer.simulate import simulate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from printhammer.contacts import Contact, Dot
     from printhammer.drive import Drive
+    from printhammer.ensemble import DotTable, EnsembleResult
     from printhammer.hammer import Hammer
     from printhammer.motion import Motion
     from printhammer.waveforms import Waveform
@@ -118,6 +119,34 @@ class Context:
         if not motion.ok:
             raise NotMeasurableError(f"A run under {drive!r} did not end: {motion.message}")
         return motion
+
+    def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> DotTable:
+        """Return what the firings of many drives do, each until `tail`, s, after its last firing.
+
+        Raises
+        ------
+        NotMeasurableError
+            A run ended early.
+        """
+        from printhammer.ensemble import Ensemble
+
+        ends = [float(drive.times[-1]) + tail for drive in drives]
+        result = Ensemble(self.hammer, list(drives), ends, tolerance=self.tolerance).run(dots=True)
+        self.demand(result, drives)
+        assert result.dots is not None
+        return result.dots
+
+    def demand(self, result: EnsembleResult, drives: Sequence[Drive]) -> None:
+        """Make sure that all runs of an ensemble reached their ends.
+
+        Raises
+        ------
+        NotMeasurableError
+            One did not.
+        """
+        for drive, status in zip(drives, result.status_names, strict=True):
+            if status != "ok":
+                raise NotMeasurableError(f"A run under {drive!r} did not end: {status}")
 
     def pulses(self, times: Iterable[float], duration: float) -> Motion:
         """Run pulses fired at given times, s."""

@@ -107,7 +107,6 @@ def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
 
 
 PENDING: Final = {
-    "map_sensitivity": "the frequency-time map",
     "poincare": "the largest exponent of the strobe map",
     "no_period_doubling_cascade": "the largest exponent of the strobe map",
 }
