@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled, entry
-from printhammer.kernel.layout import BACKSTOP_PART, MAGNET, POSITION
+from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, POSITION
 from printhammer.kernel.modes import (
     BACKSTOP,
     BACKSTOP_RELEASED,
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 SPEED_SPACING = 1e-3
 """Share of the speed of an impact by which it is moved to see what a rebound makes of it."""
+NEAR = 1e-9
+"""Share of an indentation by which a reversal must miss the old maximum to be told from one at it."""
 
 # Places in `track`.
 DUE = 0
@@ -80,7 +82,8 @@ def pass_reversal(
     """Carry the columns through a reversal inside the pack; tell whether that is differentiable."""
     before = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
     behind = acceleration_at(after, following, after[4], 0.0, hammer, drive)
-    if before == 0.0:
+    # Along the unloading curve: the old maximum is met without velocity.
+    if before == 0.0 or (mode == RELOADING and node[4] - after[1] <= NEAR * (node[4] - hammer[FRONT])):
         return False
     new_peak = following == UNLOADING and (mode == LOADING or after[4] != node[4])
     for k in range(columns.shape[1]):

@@ -65,10 +65,42 @@ FIRST_COLUMN = 3
 GRADING = 1.0 / 64.0
 """Shortest share of a step after a touch of the pack, whose slope is not smooth there."""
 
+LONGEST_PHASE = 0.75
+"""Largest phase in one step of the oscillation that a change of the state makes."""
+
 
 def work_width(columns: int) -> int:
     """Return the length of the rows of the working space."""
     return max(FIRST_COLUMN + 2 * columns, 5)
+
+
+@compiled
+def variation_slopes(
+    y: Any,
+    mode: int,
+    memory: float,
+    peak: float,
+    memories: Any,
+    scales: Any,
+    bounds: Any,
+    hammer: Hammer,
+    drive: Drive,
+) -> tuple[float, float, float]:
+    """Return the factors of dx, dv and dp in the rate of dv at `y`."""
+    value = drive_value(y[2], drive)
+    if HAS_BACKSTOP and mode == BACKSTOP:
+        w = y[0]
+        with_w, with_v = contact_slopes(w, y[1], scales, hammer)
+        field = field_slope(hammer[POSITION] - w * w, value, scales, bounds, hammer)
+        return (2.0 * w * field - with_w) * hammer[INVERSE_MASS], 2.0 * w * with_v * hammer[INVERSE_MASS], 0.0
+    by_x = field_slope(y[0], value, scales, bounds, hammer)
+    by_v, by_peak = 0.0, 0.0
+    if HAS_PACK and mode in (LOADING, UNLOADING, RELOADING):
+        pack_x, by_v = pack_slopes(y[0], y[1], mode, memory, scales, hammer)
+        by_x += pack_x
+        if MEMORY and mode != LOADING:
+            by_peak = memory_slope(y[0], y[1], peak, memories, scales, hammer)
+    return by_x * hammer[INVERSE_MASS], by_v * hammer[INVERSE_MASS], by_peak * hammer[INVERSE_MASS]
 
 
 @compiled
@@ -86,35 +118,44 @@ def variation_rates(
     drive: Drive,
 ) -> None:
     """Fill `rates` with the rates of displacement or w, velocity, time and columns at `y`."""
-    v, t = y[1], y[2]
+    v = y[1]
     if HAS_BACKSTOP and mode == BACKSTOP:
-        w = y[0]
+        pace = 2.0 * y[0]
         rates[0] = -v
-        rates[1] = 2.0 * w * backstop_acceleration(t, w, v, hammer, drive)
-        rates[2] = 2.0 * w
-        with_w, with_v = contact_slopes(w, v, scales, hammer)
-        field = field_slope(hammer[POSITION] - w * w, drive_value(t, drive), scales, bounds, hammer)
-        by_x = (2.0 * w * field - with_w) * hammer[INVERSE_MASS]
-        by_v = 2.0 * w * with_v * hammer[INVERSE_MASS]
-        for j in range(FIRST_COLUMN, FIRST_COLUMN + 2 * columns.shape[1], 2):
-            rates[j] = 2.0 * w * y[j + 1]
-            rates[j + 1] = by_x * y[j] + by_v * y[j + 1]
-        return
-    x = y[0]
-    rates[0] = v
-    rates[1] = acceleration(t, x, v, mode, memory, hammer, drive)
-    rates[2] = 1.0
-    by_x = field_slope(x, drive_value(t, drive), scales, bounds, hammer)
-    by_v, by_peak = 0.0, 0.0
-    if HAS_PACK and mode in (LOADING, UNLOADING, RELOADING):
-        pack_x, by_v = pack_slopes(x, v, mode, memory, scales, hammer)
-        by_x += pack_x
-        if MEMORY and mode != LOADING:
-            by_peak = memory_slope(x, v, peak, memories, scales, hammer)
+        rates[1] = pace * backstop_acceleration(y[2], y[0], v, hammer, drive)
+    else:
+        pace = 1.0
+        rates[0] = v
+        rates[1] = acceleration(y[2], y[0], v, mode, memory, hammer, drive)
+    rates[2] = pace
+    by_x, by_v, by_peak = variation_slopes(y, mode, memory, peak, memories, scales, bounds, hammer, drive)
     for k in range(columns.shape[1]):
         j = FIRST_COLUMN + 2 * k
-        rates[j] = y[j + 1]
-        rates[j + 1] = (by_x * y[j] + by_v * y[j + 1] + by_peak * columns[2, k]) * hammer[INVERSE_MASS]
+        rates[j] = pace * y[j + 1]
+        rates[j + 1] = by_x * y[j] + by_v * y[j + 1] + by_peak * columns[2, k]
+
+
+@compiled
+def longest_variation_step(
+    mode: int,
+    memory: float,
+    peak: float,
+    work: Any,
+    scales: Any,
+    bounds: Any,
+    hammer: Hammer,
+    drive: Drive,
+) -> float:
+    """Return the longest step from row START of `work` that follows a change of the state closely.
+
+    The run's own steps follow the state: near rest, where that hardly moves, they are longer.
+    """
+    by_x, by_v, _by_peak = variation_slopes(
+        work[START], mode, memory, peak, work[MEMORIES], scales, bounds, hammer, drive
+    )
+    pace = 2.0 * work[START, 0] if mode == BACKSTOP else 1.0
+    rate = max(math.sqrt(abs(pace * by_x)), abs(by_v))
+    return LONGEST_PHASE / rate if rate > 0.0 else math.inf
 
 
 @compiled
@@ -275,17 +316,21 @@ def vary(
     if HAS_BACKSTOP and mode == BACKSTOP:
         leaves = t_to == after[0] and int(after[3]) == FREE
         length = length_in_contact(t_to, leaves, t, work[START, 0], work[START, 1], hammer, drive)
-        variation_step(length, columns, work, mode, 0.0, 0.0, scales, bounds, hammer, drive)
+        longest = longest_variation_step(mode, 0.0, 0.0, work, scales, bounds, hammer, drive)
+        count = 1 + int(length / longest)
+        for _ in range(count):
+            variation_step(length / count, columns, work, mode, 0.0, 0.0, scales, bounds, hammer, drive)
     else:
         memory = memory_of(mode, kept, hammer)
         if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
             note_memories(work[MEMORIES], kept, scales, hammer)
+        longest = longest_variation_step(mode, memory, kept, work, scales, bounds, hammer, drive)
         left = t_to - t
         while left > 0.0:
-            length = left
+            length = min(left, longest)
             if HAS_PACK and mode == LOADING and work[START, 1] > 0.0:
                 since = (work[START, 0] - hammer[FRONT]) / work[START, 1]
-                length = min(left, max(since, GRADING * (t_to - t)))
+                length = min(length, max(since, GRADING * (t_to - t)))
             variation_step(length, columns, work, mode, memory, kept, scales, bounds, hammer, drive)
             left = 0.0 if length == left else t_to - work[START, 2]
     work[START, 2] = t_to
