@@ -9,6 +9,7 @@ ORDER = (
     "single_pulse",
     "two_pulses",
     "fast_train",
+    "frequency_map",
     "backstops",
     "energy_ledger",
     "inch_pound_file",

@@ -1,0 +1,57 @@
+"""
+Frequency-time map
+==================
+
+Nine pulses at many firing rates, laid side by side: time to the right, rate upward,
+displacement as colour. Hendriks (1983), figure 9, shows in one picture how the
+performance of an actuator degrades when it is forced hard.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import printhammer as ph
+
+hammer = ph.load("hendriks-1983")
+chart = ph.frequency_map(hammer, np.linspace(500.0, 2500.0, 401), times=600)
+
+figure, axes = plt.subplots()
+picture = axes.pcolormesh(
+    1e3 * chart.time, chart.rate, 1e6 * chart.displacement, rasterized=True
+)
+bar = figure.colorbar(picture, label="displacement (µm)")
+for place in (hammer.position, hammer.front):
+    bar.ax.axhline(1e6 * place, color="white")
+axes.set(
+    xlabel="time from the first firing (ms)",
+    ylabel="rate (Hz)",
+    title="Nine pulses; white on the scale: backstop and pack",
+)
+
+# %%
+# Each bright band is one excursion into the pack. At low rates there are nine equal
+# ones. Further up they waver in time, and some are missing: lost dots. From about
+# 2.2 kHz on the armature no longer comes back to the backstop.
+#
+# The map is an xarray data set, so that one can ask it.
+
+lost = ~chart.struck
+first = chart.rate[lost.any("firing")].values[0]
+print(f"lost dots: {int(lost.sum())} of {lost.size}, first at {first:.0f} Hz")
+for name in ("flight_time", "peak_force"):
+    slow = chart[name].sel(rate=500.0)
+    print(f"{name} at 500 Hz: {float(slow.min()):.4g} to {float(slow.max()):.4g}")
+
+# %%
+# Flight times and forces against rate, a dot for each firing. The abstract of the
+# paper says how it begins: with variations of flight time and print force.
+
+figure, (above, below) = plt.subplots(2, 1, sharex=True)
+later = chart.isel(firing=slice(1, None))
+above.plot(chart.rate, 1e6 * later.flight_time, ".", color="C0", markersize=1.5)
+above.set(ylabel="flight time (µs)", title="Second to ninth dot")
+below.plot(chart.rate, later.peak_force, ".", color="C1", markersize=1.5)
+below.axhline(chart.peak_force[0, 0], color="0.6", linewidth=0.8)
+below.set(xlabel="rate (Hz)", ylabel="peak force (N)")
+
+plt.show()
