@@ -15,7 +15,7 @@ import numpy as np
 from printhammer.ensemble_group import Group, Job
 from printhammer.errors import InputError
 from printhammer.hammer import Hammer
-from printhammer.kernel.modes import OK, STATUS_NAMES
+from printhammer.kernel.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.problem import TOLERANCE, laws_of
 from printhammer.threads import in_threads, thread_count
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from printhammer.motion import Motion
     from printhammer.segments import FloatArray
     from printhammer.threads import Progress
+
+__all__ = ["MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
 
 Engine = Literal["auto", "plain"]
 ENGINES: Final = get_args(Engine)

@@ -28,6 +28,21 @@ HELD_LOADING = 9
 HELD_UNLOADING = 10
 """At rest inside the pack on the unloading branch, likewise."""
 
+MODE_NAMES = (
+    "free",
+    "loading",
+    "unloading",
+    "reloading",
+    "pack released",
+    "backstop",
+    "backstop released",
+    "resting on the backstop",
+    "held in the backstop",
+    "held on the loading branch",
+    "held on the unloading branch",
+)
+"""Public names of the modes, by code."""
+
 # Switches that end a step.
 NO_SWITCH = 0
 EDGE = 1
