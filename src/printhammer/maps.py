@@ -47,7 +47,7 @@ PULSES: Final = 9
 TAIL: Final = 1e-3
 """Time after the last firing, s, that a map shows at its lowest rate."""
 
-MOST_CELLS: Final = 500_000_000
+MOST_CELLS: Final = 200_000_000
 """Number of displacements above which a map is refused."""
 
 

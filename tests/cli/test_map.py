@@ -154,6 +154,14 @@ def test_a_measured_map_is_not_written_over(cli: "Callable[..., object]", tmp_pa
     assert path.read_bytes() == b"records"
 
 
+def test_a_measured_map_before_the_firing_is_refused(cli: "Callable[..., object]", tmp_path: Path) -> None:
+    path = tmp_path / "early.csv"
+    path.write_text("time [us],500 Hz [um]\n-20,46\n-10,46\n0,46\n")
+    outcome = cli("map", "--measured", path)
+    assert outcome.status == 2
+    assert "early.csv: 1 times from the first firing on, expected at least 2" in told(outcome.err)
+
+
 def test_the_example_runs(cli: "Callable[..., object]") -> None:
     command, *arguments = shlex.split(verb.EXAMPLE.partition("printhammer ")[2])
     assert cli(command, *arguments).status == 0

@@ -163,6 +163,24 @@ def test_maps_without_a_common_rate_are_still_drawn(chart: xr.Dataset) -> None:
     assert "No rate is in both maps" in drawn.get_suptitle()
 
 
+def test_a_map_of_which_nothing_is_known_is_grey(hammer: "ph.Hammer", chart: xr.Dataset) -> None:
+    unknown = chart.assign(displacement=chart["displacement"] * np.nan)
+    for number in (8, 9):
+        FIGURES[number].draw(hammer, chart=unknown).draw_without_rendering()
+    compare_maps(chart, unknown).draw_without_rendering()
+
+
+def test_a_map_of_one_time_is_not_drawn(hammer: "ph.Hammer", chart: xr.Dataset) -> None:
+    short = chart.isel(time=[3])
+    for draw in (
+        lambda: FIGURES[8].draw(hammer, chart=short),
+        lambda: FIGURES[9].draw(hammer, chart=short),
+        lambda: compare_maps(chart, short),
+    ):
+        with pytest.raises(ph.InputError, match="the map has 1 times, expected at least 2 to draw it"):
+            draw()
+
+
 @pytest.mark.parametrize("number", [8, 9])
 def test_files_stay_small_and_the_same(
     hammer: "ph.Hammer", chart: xr.Dataset, tmp_path: Path, number: int

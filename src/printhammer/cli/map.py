@@ -156,6 +156,11 @@ def _axes(
     if beside is not None and times is None:
         known = beside["time"].values
         moments = known[known >= 0.0]
+        if len(moments) < 2:
+            raise InputError(
+                f"--measured {beside.attrs['source']}: {len(moments)} times from the first firing on,"
+                " expected at least 2"
+            )
     if beside is not None and lowest is None and highest is None and rates is None:
         return beside["rate"].values, moments
     low = LOWEST if lowest is None else read_positive(lowest, "Hz", "--from")

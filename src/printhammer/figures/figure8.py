@@ -12,6 +12,7 @@ from printhammer.figures.map_marks import (
     HIGHEST,
     LOWEST,
     chart_of,
+    drawable,
     failures,
     limits_of,
     scales_of,
@@ -101,10 +102,11 @@ def figure8(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
     Raises
     ------
     InputError
-        The hammer has no waveform or no rest state.
+        The hammer has no waveform or no rest state, or the map fewer than two times.
     """
     if chart is None:
         chart = chart_of(hammer, np.linspace(LOWEST, HIGHEST, CURVES) if rates is None else rates, _TIMES)
+    drawable(chart)
     scales = scales_of(chart)
     places = places_of(chart)
     low, high = limits_of(chart)

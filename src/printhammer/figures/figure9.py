@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from printhammer.figures.map_marks import (
     chart_of,
     colour_bar,
+    drawable,
     failures,
     firing_lines,
     key,
@@ -47,9 +48,9 @@ def figure9(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
     Raises
     ------
     InputError
-        The hammer has no waveform or no rest state.
+        The hammer has no waveform or no rest state, or the map fewer than two times.
     """
-    found = chart_of(hammer, rates) if chart is None else chart
+    found = drawable(chart_of(hammer, rates) if chart is None else chart)
     scales = scales_of(found)
     norm = norm_of(scales, found)
     figure = new_figure(4.6)

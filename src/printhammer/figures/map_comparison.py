@@ -8,6 +8,7 @@ import numpy as np
 
 from printhammer.figures.map_marks import (
     colour_bar,
+    drawable,
     edges,
     failures,
     firing_lines,
@@ -43,7 +44,14 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     Figure
         The figure. In the third panel, "difference" is the gid of the root mean square over time, for every
         rate that both have; in grey areas the displacement is not known.
+
+    Raises
+    ------
+    InputError
+        A map has fewer than two times.
     """
+    for chart in (computed, measured):
+        drawable(chart)
     scales = scales_of(computed, measured)
     norm = norm_of(scales, computed, measured)
     figure = new_figure(4.4, 8.6)

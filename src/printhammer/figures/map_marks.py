@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.errors import InputError
 from printhammer.figures.scales import Scale, scale
 from printhammer.figures.style import HAIR, INK, MUTED, ORANGE, SMALL, TINY
 from printhammer.map_layout import failed_rates, places_of
@@ -56,6 +57,19 @@ def chart_of(
     return frequency_map(hammer, np.linspace(LOWEST, HIGHEST, RATES) if rates is None else rates, times=times)
 
 
+def drawable(chart: xr.Dataset) -> xr.Dataset:
+    """Return a map that has an axis of time.
+
+    Raises
+    ------
+    InputError
+        It has fewer than two times.
+    """
+    if chart["time"].size < 2:
+        raise InputError(f"the map has {chart['time'].size} times, expected at least 2 to draw it")
+    return chart
+
+
 def edges(centres: FloatArray) -> FloatArray:
     """Return the borders of cells about ascending centres, one more than there are."""
     if len(centres) == 1:
@@ -87,8 +101,9 @@ def scales_of(*charts: xr.Dataset) -> Scales:
 
 def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
     """Return the smallest and the largest displacement of maps, m."""
-    low = min(float(np.nanmin(chart["displacement"])) for chart in charts)
-    high = max(float(np.nanmax(chart["displacement"])) for chart in charts)
+    every = np.concatenate([chart["displacement"].values.ravel() for chart in charts])
+    known = every[np.isfinite(every)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
     return low, high if high > low else low + 1e-6
 
 
