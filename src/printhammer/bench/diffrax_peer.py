@@ -44,7 +44,7 @@ def entries(task: Task, quick: bool, members: int) -> list[Entry]:
         raise Absent("not installed") from error
     tasks = ensemble_tasks(task, members)
     some = checked(members)
-    name = f"diffrax {diffrax.__version__}, JAX {jax.__version__}"
+    name = f"diffrax {diffrax.__version__} on JAX {jax.__version__}"
 
     def positions(tolerance: float) -> FloatArray:
         # The whole ensemble, so that it is compiled once.
@@ -52,7 +52,7 @@ def entries(task: Task, quick: bool, members: int) -> list[Entry]:
 
     def entry(tolerance: float) -> Entry:
         return Entry(
-            f"{name}: Dopri8, its events, vmap, {tolerance:.0e}",
+            f"{name} Dopri8, its events, {tolerance:.0e}",
             partial(positions, tolerance),
             partial(_run, task, tolerance, tasks, FIRST),
             FIRST * members,

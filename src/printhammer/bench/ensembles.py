@@ -34,7 +34,7 @@ DISPLAY: Final = 1e-4
 EXACT: Final = 1e-8
 """Error that counts as exact, in strokes."""
 
-_TOLERANCES: Final = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, TOLERANCE)
+_TOLERANCES: Final = (1e-6, 3e-7, 1e-7, 1e-8, 1e-9, 3e-10, 1e-10, TOLERANCE)
 _STROBES: Final = 200
 
 
@@ -202,10 +202,10 @@ def measure(task: Task, quick: bool, threads: int, say: Say) -> Figures:
         many, long = (64, 5) if quick else (4096, 50)
         for count in counts:
             say(f"{many} members x {long} pulses, {engine} engine, {count} threads")
-            figures.masses.append(_mass(task, engine, tolerance, count, many, long, 1 if quick else 2))
+            figures.masses.append(_mass(task, engine, tolerance, count, many, long, 2))
         for many in (32, 64) if quick else (512, 1024, 2048, 4096):
             say(f"growth: {many} members, {engine} engine")
-            figures.growth.append(_mass(task, engine, tolerance, 1, many, pulses, 1 if quick else 3))
+            figures.growth.append(_mass(task, engine, tolerance, 1, many, pulses, 2 if quick else 3))
     return figures
 
 
@@ -249,7 +249,6 @@ def _rounds(works: list[Callable[[], object]], rounds: int, say: Say) -> list[li
 
 
 def _seconds(work: Callable[[], object], repeats: int) -> list[float]:
-    work()
     samples = []
     for _ in range(repeats):
         began = time.perf_counter()

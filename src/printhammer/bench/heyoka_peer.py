@@ -140,8 +140,8 @@ class _Switch:
     def __deepcopy__(self, memo: Any) -> _Switch:
         return self
 
-    def __call__(self, integrator: Any, _sign: int, lane: int = -1) -> bool:
-        return bool(self.owner.switch(integrator, self.which, lane))
+    def __call__(self, _integrator: Any, _sign: int, lane: int = -1) -> bool:
+        return bool(self.owner.switch(self.which, lane))
 
 
 def _system(hy: Any, task: Task) -> tuple[list[Any], list[Any]]:
@@ -190,14 +190,17 @@ class Single:
             rates, [0.0] * 4, pars=[0.0] * len(_NAMES), t_events=switches, tol=tolerance
         )
 
-    def switch(self, integrator: Any, which: int, _lane: int) -> bool:
+        # Views of the integrator's memory, made once: making them costs as much as a switch.
+        self.state, self.parameters = self.integrator.state, self.integrator.pars
+
+    def switch(self, which: int, _lane: int) -> bool:
         """Answer a callback."""
-        return self.lane.switch(which, integrator.state, integrator.pars)
+        return self.lane.switch(which, self.state, self.parameters)
 
     def _begin(self, end: float) -> None:
         self.lane = Lane(self.task, end)
         self.integrator.time = 0.0
-        self.integrator.state[:], self.integrator.pars[:] = self.lane.begin()
+        self.state[:], self.parameters[:] = self.lane.begin()
         self.integrator.reset_cooldowns()
 
     def run(self, end: float) -> None:
@@ -252,13 +255,15 @@ class Batch:
             t_events=switches,
             tol=tolerance,
         )
+        state, parameters = self.integrator.state, self.integrator.pars
+        self.views = [(state[:, lane], parameters[:, lane]) for lane in range(self.width)]
         self.at = list(range(self.width))
         self.next = self.running = self.width
         self.ends = np.full((len(tasks), 2), np.nan)
 
-    def switch(self, integrator: Any, which: int, lane: int) -> bool:
+    def switch(self, which: int, lane: int) -> bool:
         """Answer a callback."""
-        state, parameters = integrator.state[:, lane], integrator.pars[:, lane]
+        state, parameters = self.views[lane]
         member = self.members[self.at[lane]]
         if member.switch(which, state, parameters):
             return True
@@ -284,8 +289,8 @@ class Batch:
         self.next = self.running = self.width
         integrator = self.integrator
         integrator.set_time(0.0)
-        for lane in range(self.width):
-            integrator.state[:, lane], integrator.pars[:, lane] = self.members[lane].begin()
+        for (state, parameters), member in zip(self.views, self.members, strict=False):
+            state[:], parameters[:] = member.begin()
         integrator.reset_cooldowns()
         integrator.propagate_until(1e9, max_delta_t=_LONGEST)
         return self.ends
@@ -350,7 +355,7 @@ def ensembles(task: Task, quick: bool, members: int) -> list[Entry]:
             return positions(tolerance)
 
         lanes = hy.recommended_simd_size()
-        name = f"heyoka {hy.__version__}, its events, batches of {lanes} lanes, {tolerance:.0e}"
+        name = f"heyoka {hy.__version__}, its events, {lanes} lanes, {tolerance:.0e}"
         return Entry(name, first, run, end * members, members=members)
 
     return [entry(tolerance) for tolerance in ((1e-8,) if quick else (1e-6, 1e-8))]

@@ -71,7 +71,7 @@ def entries(task: Task, quick: bool) -> list[Entry]:
         )
 
     return [
-        entry("LSODA, one right-hand side, split at pulse edges", False, 1e-9),
+        entry("LSODA, one right-hand side", False, 1e-9),
         entry("DOP853, its events", True, 1e-8),
         entry("DOP853, its events", True, 1e-11),
     ]

@@ -20,7 +20,7 @@ SOLVER_HEADS: Final = (
     "error [m]",
     "hammer-s/s",
     "first call [s]",
-    "ours at equal or better accuracy",
+    "ours as exact",
     "ours / theirs",
 )
 FRAME_HEADS: Final = (
@@ -257,13 +257,14 @@ Trains with periods from 0.9 to 1.1 times 1.35 ms, on one thread; processor time
 deviation of eight members at ten times up to 3 ms."""
 
 _HOW = """\
-How the peers are used (`src/printhammer/bench`): a compiled solver has a compiled right-hand side, one
-for each mode, is stopped at every switch and edge of the drive, and starts anew there; "one right-hand
-side" is the same problem as one would first write it. heyoka gets the equations in variables in which
-they are analytic, since a Taylor method needs that; all its switches happen in event callbacks, which
-are Python, and lanes of a batch that are done take the next member. Boost.Odeint locates a switch by
-repeating the step with a length found by Newton's method. SUNDIALS and numbalsoda use their own root
-finding."""
+How the peers are used (`src/printhammer/bench`): everyone has a compiled right-hand side, one for each
+mode, is stopped at every switch and edge of the drive, and starts anew there; "one right-hand side" is
+the same problem as one would first write it. heyoka gets the equations in variables in which they are
+analytic, since a Taylor method needs that; all its switches happen in event callbacks, which are Python,
+and a lane that is done takes the next member. diffrax is one compiled loop under `jax.vmap`.
+Boost.Odeint and SUNDIALS are C++, compiled with `-O3 -march=native`; Odeint has no events, so a switch
+is located by repeating the step with a length found by Newton's method. The error of a single run of
+printhammer and of a member of an ensemble may differ, since other members are compared."""
 
 _GROWTH = """\
 The runs of Figure 9 with more and more members, on one thread; cost is linear where the time of a member

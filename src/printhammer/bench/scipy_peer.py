@@ -33,7 +33,7 @@ def entries(task: Task, quick: bool) -> list[Entry]:  # noqa: ARG001
         found.append(Entry(name, run, run, FIRST))
     for rtol in (1e-8, 1e-11):
         run = partial(event_split, task, FIRST, GRID, partial(_dop853, rtol))
-        name = f"SciPy {scipy.__version__} DOP853, its events, compiled right-hand side, {rtol:.0e}"
+        name = f"SciPy {scipy.__version__} DOP853, its events, {rtol:.0e}"
         found.append(Entry(name, run, run, FIRST))
     return found
 

@@ -36,9 +36,7 @@ def entries(task: Task, quick: bool) -> list[Entry]:  # noqa: ARG001
         raise Absent("not installed") from error
     rtol = 1e-11
     run = partial(event_split, task, FIRST, GRID, partial(_adams, cvode, rtol))
-    name = (
-        f"scikit-sundae {sundae.__version__}: CVODE Adams, its events, compiled right-hand side, {rtol:.0e}"
-    )
+    name = f"scikit-sundae {sundae.__version__} CVODE Adams, its events, {rtol:.0e}"
     return [Entry(name, run, run, FIRST)]
 
 

@@ -86,7 +86,7 @@ def _table(screen: Console, title: str, heads: tuple[str, ...], rows: Rows) -> N
 
     from printhammer.cli.terminal import plain_table
 
-    text = {"solver", "engine", "ours at equal or better accuracy"}
+    text = {"solver", "engine", "ours as exact"}
     table = plain_table(*((escape(head), "left" if head in text else "right") for head in heads), title=title)
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
