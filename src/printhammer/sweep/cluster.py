@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from asyncio import CancelledError as TaskCancelled
 from collections import deque
+from concurrent.futures import CancelledError as FutureCancelled
 from contextlib import contextmanager
 from importlib import import_module
 from queue import Empty, SimpleQueue
@@ -129,6 +131,9 @@ class _Work:
     def _submit(self, rows: FloatArray, index: Index) -> None:
         spec = self._plan.spec
         future = self._client.submit(_task, spec.base, spec.outputs, rows, versions(), pure=False)
+        self._await(future, index)
+
+    def _await(self, future: Any, index: Index) -> None:
         self._futures[future] = index
         future.add_done_callback(self._done.put)
 
@@ -140,24 +145,32 @@ class _Work:
             self._watch()
             return None
         self._idle = 0.0
-        return self._futures.pop(future), self._result(future)
+        index = self._futures.pop(future)
+        if future.status == "lost":
+            # Its worker was killed before it handed the results over: the scheduler has it done again.
+            self._await(future, index)
+            return None
+        return index, self._result(future)
 
     def _result(self, future: Any) -> Results | None:
         """Return the results of a task that is done; None if it cost several workers."""
-        if future.status in ("cancelled", "lost"):
-            raise _GoneError
-        if future.status == "finished":
-            found: Results = future.result()
-            return found
-        error = future.exception()
+        if future.status == "error":
+            error = future.exception()
+        else:
+            try:
+                found: Results | str = future.result()
+            except (FutureCancelled, TaskCancelled):
+                raise _GoneError from None
+            except Exception as late:  # noqa: BLE001 - told as a sentence
+                # The worker was killed before it handed its results over, and what came after it as well.
+                error = late
+            else:
+                if isinstance(found, str):
+                    raise InputError(found)
+                return found
         if isinstance(error, import_module("distributed").KilledWorker):
             return None
-        if isinstance(error, PrinthammerError):
-            raise error
-        raise InputError(
-            f"a worker of the cluster cannot do the work ({type(error).__name__}: {error}),"
-            " what is done is kept"
-        ) from error
+        raise InputError(_unable(error)) from error
 
     def _threads(self) -> int:
         return sum(self._client.nthreads().values()) if self._client.status == "running" else 0
@@ -171,12 +184,23 @@ class _Work:
             raise InputError(f"the cluster has had no worker for {NO_WORKERS:g} s, what is done is kept")
 
 
-def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]) -> Results:
-    """Do the work of a block on a worker of the same versions."""
+def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]) -> Results | str:
+    """Do the work of a block on a worker of the same versions; return what is wrong as a sentence."""
     for name, version in versions().items():
         if version != wanted[name]:
-            raise InputError(f"a worker of the cluster has {name} {version}, expected {wanted[name]}")
-    return run_chunk(base, outputs, rows)
+            return f"a worker of the cluster has {name} {version}, expected {wanted[name]}"
+    try:
+        return run_chunk(base, outputs, rows)
+    except PrinthammerError as error:
+        return f"a worker of the cluster cannot do the work: {error}"
+    except Exception as error:  # noqa: BLE001 - a client may wait for ever for an error it cannot unpickle
+        return _unable(error)
+
+
+def _unable(error: BaseException) -> str:
+    return (
+        f"a worker of the cluster cannot do the work ({type(error).__name__}: {error}), what is done is kept"
+    )
 
 
 @contextmanager
@@ -200,11 +224,7 @@ def client_of(dask: Any) -> Iterator[Any]:
     if isinstance(dask, distributed.Client):
         yield dask
         return
-    logger = logging.getLogger("distributed")
-    level = logger.level
-    # What is wrong is told in one sentence of our own.
-    logger.setLevel(logging.CRITICAL)
-    try:
+    with _quiet():
         try:
             asyncio.run(_knock(distributed, dask))
             client = distributed.Client(dask, timeout=ANSWER, set_as_default=False)
@@ -215,8 +235,22 @@ def client_of(dask: Any) -> Iterator[Any]:
             yield client
         finally:
             client.close(timeout=ANSWER)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the loggers of dask still: what is wrong is told in one sentence of our own."""
+    found = [
+        logging.getLogger(name) for name in logging.root.manager.loggerDict if name.startswith("distributed")
+    ]
+    levels = [logger.level for logger in found]
+    for logger in found:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
     finally:
-        logger.setLevel(level)
+        for logger, level in zip(found, levels, strict=True):
+            logger.setLevel(level)
 
 
 async def _knock(distributed: Any, address: str) -> None:
