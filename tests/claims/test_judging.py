@@ -11,8 +11,15 @@ from printhammer.report.build import claims_json
 if TYPE_CHECKING:
     import printhammer as ph
 
-MANY_RUNS = {"order_of_onset", "second_dot_lost", "hang_up_at_high_rate", "weak_prints_when_hung_up"}
-QUICK = ("geometry", "release_margin", "single_pulse_stroke", "print_force", "poincare")
+MANY_RUNS = {
+    "order_of_onset",
+    "second_dot_lost",
+    "hang_up_at_high_rate",
+    "weak_prints_when_hung_up",
+    "poincare",
+    "no_period_doubling_cascade",
+}
+QUICK = ("geometry", "release_margin", "single_pulse_stroke", "print_force")
 
 
 def test_results_come_in_the_order_of_the_paper(hammer: "ph.Hammer", context: Context) -> None:
@@ -21,15 +28,15 @@ def test_results_come_in_the_order_of_the_paper(hammer: "ph.Hammer", context: Co
     assert [result.claim.name for result in results] == list(QUICK) == told
 
 
-@pytest.mark.parametrize("name", PENDING)
-def test_what_cannot_be_judged_yet(context: Context, name: str) -> None:
-    result = judge(context, claims()[name])
+def test_what_cannot_be_judged_yet(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(PENDING, "geometry", "a ruler")
+    result = judge(context, claims()["geometry"])
     assert (result.verdict, result.value, result.missed) == ("not yet", None, [])
-    assert PENDING[name] in result.detail
+    assert "a ruler" in result.detail
 
 
 def test_the_verdict_is_that_of_the_band(context: Context) -> None:
-    for name in QUICK[:-1]:
+    for name in QUICK:
         result = judge(context, claims()[name])
         assert (result.verdict == "holds") == (not result.missed)
         assert set(claims()[name].band) <= set(result.value)

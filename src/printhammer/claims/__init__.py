@@ -13,6 +13,7 @@ from printhammer.claims import (
     statics,
     strobes,
     two_pulses,
+    verdicts,
 )
 from printhammer.claims.buzz import buzz_search
 from printhammer.claims.context import Context, NotMeasurableError
@@ -41,4 +42,5 @@ __all__ = [
     "statics",
     "strobes",
     "two_pulses",
+    "verdicts",
 ]

@@ -106,10 +106,7 @@ def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
     return register
 
 
-PENDING: Final = {
-    "poincare": "the largest exponent of the strobe map",
-    "no_period_doubling_cascade": "the largest exponent of the strobe map",
-}
+PENDING: Final[dict[str, str]] = {}
 """Claims that nothing can judge yet, and what it takes."""
 
 

@@ -1,0 +1,216 @@
+"""Claims about what kind of motion a train leads to: Fig. 11 and its caption, and the way into chaos."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.chaos import strobes
+from printhammer.chaos.scan import scan
+from printhammer.chaos.verdict import LAST
+from printhammer.claims.definition import claims
+from printhammer.claims.judging import Measured, measures
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from printhammer.chaos import Verdict
+    from printhammer.claims.context import Context
+    from printhammer.claims.definition import Claim
+    from printhammer.hammer import Hammer
+
+_WHOLE = ("backstop", "pack", "waveform")
+_CHANGE: Final = 1e-5
+_TIGHTER: Final = 0.1
+_PLAIN: Final = "as it is"
+_FINE: Final = "ten times tighter tolerance"
+_CHANGED: Final[dict[str, Callable[[int], int]]] = {
+    "constants up": lambda _: 1,
+    "constants down": lambda _: -1,
+    "constants up and down by turns": lambda number: 1 - 2 * (number % 2),
+    "constants down and up by turns": lambda number: 2 * (number % 2) - 1,
+}
+"""How all constants of a hammer are changed at once: sign of the change by the number of the constant."""
+
+_APERIODIC: Final = "no period"
+
+
+def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -> Hammer:
+    """Return a hammer with every constant changed by a part of it, up or down."""
+    factors = {key: 1.0 + part * sign(number) for number, key in enumerate(hammer.constants)}
+    return hammer.replace({key: hammer.constants[key].si * factor for key, factor in factors.items()})
+
+
+def panel_name(period: float) -> str:
+    """Return how a panel is called in a report."""
+    return f"{period * 1e3:.2f} ms"
+
+
+def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]:
+    """Return the verdicts on trains by how they were computed, each in the order of the periods, s."""
+    hammers = [context.hammer, *(changed(context.hammer, sign) for sign in _CHANGED.values())]
+    every = strobes(
+        [hammer for hammer in hammers for _ in periods], periods * len(hammers), tolerance=context.tolerance
+    )
+    fine = strobes(context.hammer, periods, tolerance=_TIGHTER * context.tolerance)
+    found = {}
+    for number, name in enumerate((_PLAIN, *_CHANGED)):
+        found[name] = _verdicts(every[number * len(periods) : (number + 1) * len(periods)])
+    found[_FINE] = _verdicts(fine)
+    return found
+
+
+def _verdicts(found: Any) -> list[Verdict]:
+    return [strobe.verdict for strobe in found if strobe.verdict is not None]
+
+
+@measures("poincare", *_WHOLE)
+def poincare(context: Context, claim: Claim) -> Measured:
+    """Verdicts on the panels of Fig. 11, and whether they stay if tolerance and constants are changed."""
+    periods = list(claim.settings["strobe_times_s"])
+    printed = list(claim.band["verdicts"])
+    by_variant = variants(context, periods)
+    count = claims()["poincare_window"].settings["points"]
+    first = _verdicts(
+        strobes(context.hammer, periods, points=1, firings=(1, count), tolerance=context.tolerance)
+    )
+    names = [panel_name(period) for period in periods]
+    shown = []
+    for verdicts in zip(*by_variant.values(), strict=True):
+        kinds = list(dict.fromkeys(verdict.name for verdict in verdicts))
+        # A verdict that does not stay is none: it never equals what is printed.
+        shown.append(" or ".join(kinds))
+    right = [name for name, kind, band in zip(names, shown, printed, strict=True) if kind == band]
+    wrong = [
+        f"{name} {kind} instead of {band}"
+        for name, kind, band in zip(names, shown, printed, strict=True)
+        if kind != band
+    ]
+    value = {
+        "verdicts": shown,
+        "panels_as_printed": len(right),
+        "panels_that_change": [name for name, kind in zip(names, shown, strict=True) if " or " in kind],
+        "panels": {
+            name: {variant: verdicts[number].as_dict() for variant, verdicts in by_variant.items()}
+            for number, name in enumerate(names)
+        },
+        f"first_{count}_firings": {
+            name: verdict.as_dict() for name, verdict in zip(names, first, strict=True)
+        },
+    }
+    early = sum(verdict.name == band for verdict, band in zip(first, printed, strict=True))
+    told = f"; {', '.join(wrong)}" if wrong else ""
+    return Measured(
+        value,
+        f"{len(right)} of {len(names)} panels are as printed{told}. Judged on the first {count} firings, with"
+        f" the transient, {early} are.",
+    )
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Successive strobe times with the same verdict.
+
+    Attributes
+    ----------
+    name : str
+        The verdict.
+    longest, shortest : float
+        First and last strobe time, s, the scan going down.
+    count : int
+        Number of strobe times.
+    """
+
+    name: str
+    longest: float
+    shortest: float
+    count: int
+
+
+def stretches(periods: Sequence[float], names: Sequence[str]) -> list[Stretch]:
+    """Return the stretches of a scan from the longest strobe time, s, to the shortest."""
+    found = []
+    for name, group in itertools.groupby(zip(periods, names, strict=True), key=lambda item: item[1]):
+        times = [period for period, _ in group]
+        found.append(Stretch(name, times[0], times[-1], len(times)))
+    return found
+
+
+def cascades(found: Sequence[Stretch]) -> list[Stretch]:
+    """Return the first of each three stretches in a row whose periods are 2, 4 and 8."""
+    return [
+        three[0]
+        for three in zip(found, found[1:], found[2:], strict=False)
+        if [stretch.name for stretch in three] == ["period-2", "period-4", "period-8"]
+    ]
+
+
+@measures("no_period_doubling_cascade", *_WHOLE)
+def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
+    """Doublings of the period before chaos as the strobe time falls, and periodic windows inside it."""
+    settings = claim.settings
+    first, last, step = (
+        settings[name] for name in ("first_strobe_time_s", "last_strobe_time_s", "strobe_time_step_s")
+    )
+    # Rounded, so that strobe times are the numbers that one would write.
+    periods = [round(first - step * k, 12) for k in range(round((first - last) / step) + 1)]
+    judged = scan(context.hammer, periods, tolerance=context.tolerance, exponents=False)
+    names = [_APERIODIC if verdict.period is None else verdict.name for verdict in judged]
+    ends = [_first_strange(context, periods, names, way) for way in (1, -1)]
+    early = sum(verdict.last < LAST for verdict in judged)
+    short = f"{early} of {len(names)} trains had settled long before firing {LAST}"
+    start, stop = (len(names), 0) if None in ends else (ends[0] or 0, (ends[1] or 0) + 1)
+    before = stretches(periods[:start], names[:start])
+    inside = stretches(periods[start:stop], names[start:stop])
+    windows = {q: [stretch for stretch in inside if stretch.name == f"period-{q}"] for q in (2, 3)}
+    every = stretches(periods, names)
+    falling, rising = cascades(every), cascades(every[::-1])
+    value: dict[str, Any] = {
+        "cascade_before_strange": bool(cascades(before)),
+        "first_strange_s": None if ends[0] is None else periods[ends[0]],
+        "last_strange_s": None if ends[1] is None else periods[ends[1]],
+        "windows_before_strange": [_window(stretch, step) for stretch in before],
+        **{f"period_{q}_windows": len(found) for q, found in windows.items()},
+        **{f"period_{q}": [_window(stretch, step) for stretch in found] for q, found in windows.items()},
+        "doublings_with_falling_time_s": [stretch.longest for stretch in falling],
+        "doublings_with_rising_time_s": [stretch.shortest for stretch in rising],
+        "strobe_times": {name: names.count(name) for name in sorted(set(names))},
+        "trains_settled_early": early,
+    }
+    if None in ends:
+        return Measured(value, f"No strobe time is strange; {short}.")
+    way = ", ".join(stretch.name for stretch in before) or "nothing"
+    wide = " and ".join(
+        f"{len(found)} windows of period {q}, {step * sum(s.count for s in found) * 1e6:.0f} us in all"
+        for q, found in windows.items()
+    )
+    return Measured(
+        value,
+        f"Before the first strange train, at {periods[start] * 1e3:.3f} ms: {way}; between it and the last,"
+        f" at {periods[stop - 1] * 1e3:.3f} ms, {wide}; periods 2, 4, 8 one after the other in {len(falling)}"
+        f" places with falling and {len(rising)} with rising strobe time; {short}.",
+    )
+
+
+def _first_strange(context: Context, periods: Sequence[float], names: Sequence[str], way: int) -> int | None:
+    """Return the place of the first strange train from one end of a scan; None if there is none.
+
+    Exponents take much longer than all else, and only those at the ends of the strange range decide.
+    """
+    for place in range(len(names))[::way]:
+        if names[place] == _APERIODIC:
+            (strobe,) = strobes(context.hammer, [periods[place]], points=1, tolerance=context.tolerance)
+            if strobe.verdict is not None and strobe.verdict.strange:
+                return place
+    return None
+
+
+def _window(stretch: Stretch, step: float) -> dict[str, Any]:
+    """Return a stretch as the report shows it; its width to the step of the scan, s."""
+    return {
+        "verdict": stretch.name,
+        "from_s": stretch.longest,
+        "to_s": stretch.shortest,
+        "width_s": step * stretch.count,
+    }
