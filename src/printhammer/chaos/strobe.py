@@ -61,7 +61,8 @@ class Strobe:
     x, v : array, shape (n,)
         Displacement, m, and velocity, m/s; NaN where the run did not get.
     branch : int array, shape (n,)
-        Code of the mode of motion, see `printhammer.kernel.modes`; -1 where the run did not get.
+        Code of the mode of motion, a place in `printhammer.ensemble.MODE_NAMES`; -1 where the run did not
+        get.
     memory : array, shape (n,)
         Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0.
     status : str

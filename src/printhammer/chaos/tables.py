@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.ensemble import MODE_NAMES
 from printhammer.errors import InputError
 from printhammer.outputs import write_file
 
@@ -53,6 +54,7 @@ def strobe_dataset(strobe: Strobe) -> xr.Dataset:
         # The classic NetCDF format has no longer integers.
         kept = values.astype(np.int32) if name == "branch" else values
         data[name] = ("firing", kept, {"units": unit, "long_name": meaning})
+    data["branch"][2]["codes"] = ", ".join(f"{code} {name}" for code, name in enumerate(MODE_NAMES))
     number = ("firing", strobe.firing.astype(np.int32), {"units": "1", "long_name": "number of the firing"})
     title = f"strobe points of {strobe.hammer.name}, every {strobe.period:.9g} s"
     known = {key: value for key, value in strobe.provenance.items() if value is not None}
@@ -60,12 +62,13 @@ def strobe_dataset(strobe: Strobe) -> xr.Dataset:
 
 
 def strobe_table(strobe: Strobe) -> pd.DataFrame:
-    """Return strobe points as a table, columns such as "x [m]"; provenance and verdict in `attrs`."""
+    """Return strobe points as a table, columns such as "x [m]", branches by name; provenance in `attrs`."""
     import pandas as pd
 
     columns: dict[str, Any] = {"firing": strobe.firing}
     for name, (unit, _meaning) in COLUMNS.items():
         columns[name if unit == "1" else f"{name} [{unit}]"] = getattr(strobe, name)
+    columns["branch"] = [MODE_NAMES[code] if code >= 0 else "" for code in strobe.branch]
     table = pd.DataFrame(columns)
     table.attrs.update(strobe.provenance)
     return table

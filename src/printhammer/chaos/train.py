@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 
 from printhammer.chaos.verdict import period_of, repeats, verdict
 from printhammer.chaos.window import window_of
 from printhammer.drive import PulseTrain
-from printhammer.ensemble import Ensemble
+from printhammer.ensemble import MODE_NAMES, Ensemble
 from printhammer.errors import InputError
 from printhammer.threads import in_threads, thread_count
 
@@ -28,6 +28,12 @@ if TYPE_CHECKING:
     from printhammer.tangent import Exponent
     from printhammer.threads import Progress
     from printhammer.waveforms import Waveform
+
+_HELD: Final = {
+    MODE_NAMES.index(f"held on the {branch} branch"): MODE_NAMES.index(branch)
+    for branch in ("loading", "unloading")
+}
+"""Branches of the pack on which the armature rests, and those that they are part of."""
 
 
 @dataclass(frozen=True)
@@ -104,9 +110,12 @@ class States:
         """Return how far the states are from repeating, see `printhammer.chaos.verdict.repeats`."""
         width, speed = window_of(train.hammer, train.drive).half_widths
         front = math.inf if train.hammer.front is None else train.hammer.front
+        branch = np.where(self.x > front, self.branch, 0)
+        for held, part_of in _HELD.items():
+            branch[branch == held] = part_of
         return repeats(
             np.column_stack([self.x, self.v, self.memory]),
-            np.where(self.x > front, self.branch, 0),
+            branch,
             np.array([width, speed, width]),
         )
 
