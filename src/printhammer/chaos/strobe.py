@@ -276,7 +276,8 @@ def strobes(
     wanted: list[float | None] = [None] * len(drives) if drives is not None else [*_periods(periods)]
     many = [hammers] if isinstance(hammers, Hammer) else list(hammers)
     rows = None if states is None else np.asarray(states, dtype=np.float64).reshape(-1, 2)
-    size = max(len(many), len(wanted)) if many and wanted else 0
+    counts = [len(many), len(wanted), *([] if rows is None else [len(rows)])]
+    size = max(counts) if min(counts) else 0
     for name, given in (("hammers", many), ("periods", wanted), ("states", rows)):
         if given is not None and len(given) not in (1, size):
             raise InputError(f"{name}: {len(given)} are given, expected 1 or {size}")

@@ -34,6 +34,8 @@ FIRST: Final = 1001
 LAST: Final = 2000
 """Last firing that is judged unless told otherwise."""
 
+_STOPPED: Final = "the run ended before firing"
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -75,6 +77,11 @@ class Verdict:
     reason: str = ""
 
     @property
+    def stopped(self) -> bool:
+        """Whether the run ended before the last firing that was to be judged."""
+        return self.reason.startswith(_STOPPED)
+
+    @property
     def strange(self) -> bool:
         """Whether the verdict is "strange"."""
         return self.name == "strange"
@@ -89,6 +96,10 @@ class Verdict:
             told.append(
                 f"no period up to {LARGEST_PERIOD}: states {_firings(self.nearest)} apart come closest,"
                 f" to {self.distance:.1e} of the window"
+            )
+        elif not self.stopped:
+            told.append(
+                f"no period up to {LARGEST_PERIOD}: states that far apart lie on other branches of the pack"
             )
         if not math.isnan(self.exponent):
             told.append(f"largest exponent {self.exponent:+.4g} ± {self.standard_error:.2g} per firing")
@@ -198,7 +209,7 @@ def verdict(
         closest = int(np.argmin(distances)) + 1
     strange, reason = False, ""
     if stopped:
-        reason = f"the run ended before firing {firings[1]}: {stopped}"
+        reason = f"{_STOPPED} {firings[1]}: {stopped}"
     elif period is None:
         strange, reason = _strange(exponent)
     return Verdict(
