@@ -109,7 +109,7 @@ class Store:
     def __init__(self, path: str | Path, layout: Layout, now: str) -> None:
         self.path = Path(path)
         self._layout = layout
-        self._files, self._group = _encoder(layout)
+        self._files, self._arrays = _encoder(layout)
         self._encoded = dict(self._files)
         self._handle = -1
         try:
@@ -149,7 +149,7 @@ class Store:
             for i, size, count in zip(index, self._layout.chunks, results[MARK].shape, strict=True)
         )
         for name, values in results.items():
-            self._group[name][where] = values
+            self._arrays[name][where] = values
         files = {
             key: self._files.pop(key).to_bytes() for key in list(self._files) if key not in self._encoded
         }
@@ -268,10 +268,10 @@ def _require_zarr() -> None:
         raise InputError("a store needs zarr, which the extra printhammer[sweep] installs") from None
 
 
-def _encoder(layout: Layout) -> tuple[dict[str, Any], Any]:
-    """Return a Zarr group in memory with the arrays of a layout, and the files that it consists of.
+def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the files of a Zarr group in memory, and its arrays by name, as a layout has them.
 
-    What is written to the group appears among the files as the bytes to put on disk.
+    What is written to an array appears among the files as the bytes to put on disk.
     """
     _require_zarr()
     import zarr
@@ -282,12 +282,13 @@ def _encoder(layout: Layout) -> tuple[dict[str, Any], Any]:
     arrays = [variable.name for variable in layout.variables if variable.values is None]
     attrs = {**layout.attrs, _ARRAYS: arrays, **layout.identity}
     group = zarr.create_group(MemoryStore(store_dict=files), zarr_format=3, attributes=attrs)
+    found: dict[str, Any] = {}
     members = len(layout.chunks)
     for variable in layout.variables:
         chunks = (
             variable.shape if variable.values is not None else (*layout.chunks, *variable.shape[members:])
         )
-        array = group.create_array(
+        found[variable.name] = array = group.create_array(
             variable.name,
             shape=variable.shape,
             # A chunk has at least one element, also along a dimension of length 0.
@@ -302,7 +303,7 @@ def _encoder(layout: Layout) -> tuple[dict[str, Any], Any]:
         )
         if variable.values is not None:
             array[...] = variable.values
-    return files, group
+    return files, found
 
 
 def _root(path: Path) -> dict[str, Any]:

@@ -1,0 +1,218 @@
+"""Sweeps: each member is what `simulate` makes of it, whatever the engine; failures are rows."""
+
+import math
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import printhammer as ph
+from printhammer.store import open_store
+from printhammer.sweep.outputs import DOTS, STATUSES
+from printhammer.waveforms import HalfSine
+
+ALL = {
+    "dots": "all",
+    "strobes": "all",
+    "final": True,
+    "scalars": "all",
+    "displacement": {"start": "0.1 ms", "end": "5 ms", "count": 40},
+}
+
+
+def run(tmp_path: Path, **spec: Any) -> xr.Dataset:
+    whole = {"format": 1, "hammer": "hendriks-1983", "outputs": ALL, **spec}
+    return ph.sweep(whole, tmp_path / "out.zarr")
+
+
+def close(found: Any, wanted: Any) -> bool:
+    """Compare numbers that the same steps give in machine code compiled on its own."""
+    return np.allclose(found, wanted, rtol=1e-10, atol=0.0, equal_nan=True)
+
+
+def check_member(row: xr.Dataset, motion: ph.Motion) -> None:
+    """Compare a member with the motion of the same hammer under the same drive."""
+    assert STATUSES[int(row.status)] == motion.status
+    assert close(row.reached, motion.end)
+    for dot in motion.dots:
+        found = row.isel(firing=dot.index)
+        assert bool(found.fired)
+        for output in DOTS[1:]:
+            wanted = getattr(dot, output.name)
+            assert close(found[output.name], math.nan if wanted is None else wanted), output.name
+    times, x, v = motion.strobe
+    count = len(times)
+    assert not row.fired[count:].any()
+    assert row.strobe_t[:count].values.tolist() == times.tolist()
+    assert close(row.strobe_x[:count], x)
+    assert close(row.strobe_v[:count], v)
+    assert row.strobe_x[count:].isnull().all()
+    grid = row.time.values[row.time.values <= motion.end]
+    # Stored as float32.
+    assert np.allclose(row.displacement[: len(grid)], motion.at(grid)[0], rtol=1e-7, atol=0.0)
+    assert row.displacement[len(grid) :].isnull().all()
+    struck = [dot for dot in motion.dots if dot.struck]
+    flights = [dot.flight_time for dot in struck]
+    assert int(row.struck_dots) == len(struck)
+    assert int(row.lost_dots) == len(motion.dots) - len(struck)
+    assert close(row.flight_time_mean, np.mean(flights))
+    assert close(row.flight_time_spread, max(flights) - min(flights))
+    assert close(row.peak_displacement, motion.maxima[1].max())
+    assert close(row.coil_work, motion.energy.coil_work)
+    assert close(row.pack_loss, motion.energy.pack_loss)
+    assert int(row.backstop_touches) == sum(
+        contact.surface == "backstop" and not contact.initial for contact in motion.contacts
+    )
+
+
+def test_a_grid_over_hammer_and_drive(tmp_path: Path, hammer: ph.Hammer) -> None:
+    axes = [
+        {"key": "pack.stiffness", "values": ["55 lbf", "60 lbf"]},
+        {"key": "drive.period", "values": ["0.7 ms", "1 ms"]},
+        {"key": "drive.pulses", "values": [1, 3]},
+    ]
+    found = run(tmp_path, drive={"train": {}}, axis=axes)
+    assert found.status.dims == ("pack_stiffness", "period", "pulses")
+    assert found.flight_time.shape == (2, 2, 2, 3)
+    for stiffness in found.pack_stiffness.values:
+        for period in found.period.values:
+            for pulses in found.pulses.values:
+                row = found.sel(pack_stiffness=stiffness, period=period, pulses=pulses)
+                member = hammer.replace("pack.stiffness", float(stiffness))
+                drive = ph.PulseTrain(member.waveform, period=float(period), pulses=int(pulses))
+                motion = ph.simulate(member, drive)
+                check_member(row, motion)
+                x, v = motion.at(motion.end)
+                assert close(row.final_x, x)
+                assert close(row.final_v, v)
+
+
+def test_a_hypercube_over_hammer_drive_and_state(tmp_path: Path, hammer: ph.Hammer) -> None:
+    axes = [
+        {"key": "waveform.amplitude", "low": "1.1 A", "high": "1.3 A"},
+        {"key": "drive.at.1", "low": "0.6 ms", "high": "0.9 ms"},
+        {"key": "state.v", "low": "0 m/s", "high": "0.1 m/s"},
+    ]
+    found = run(
+        tmp_path,
+        design="latin-hypercube",
+        members=6,
+        seed=3,
+        duration="2 ms",
+        drive={"overlap": "replace", "times": {"at": ["0 s", "700 us"]}},
+        axis=axes,
+        tolerance=1e-10,
+    )
+    assert found.status.dims == ("member",)
+    assert {"waveform_amplitude", "at_1", "state_v", "member"} <= set(found.coords)
+    for member in range(6):
+        row = found.isel(member=member)
+        other = hammer.replace("waveform.amplitude", float(row.waveform_amplitude))
+        drive = ph.PulseTrain(other.waveform, at=[0.0, float(row.at_1)], overlap="replace")
+        state = (ph.rest_state(other), float(row.state_v))
+        motion = ph.simulate(other, drive, duration=2e-3, state=state, tolerance=1e-10)
+        check_member(row, motion)
+
+
+def test_the_waveform_of_the_drive_takes_the_place_of_the_hammers(tmp_path: Path, hammer: ph.Hammer) -> None:
+    own = {"shape": "half-sine", "amplitude": "1.2 A"}
+    widths = {"key": "waveform.width", "values": ["350 us", "400 us"]}
+    found = run(tmp_path, drive={"train": {"pulses": 1, "rate": "1 kHz"}, "waveform": own}, axis=[widths])
+    for width in found.waveform_width.values:
+        drive = ph.PulseTrain(HalfSine(amplitude=1.2, width=float(width)), rate=1000.0, pulses=1)
+        check_member(found.sel(waveform_width=width), ph.simulate(hammer, drive))
+
+
+def test_members_that_fail_are_rows(tmp_path: Path, hammer: ph.Hammer) -> None:
+    axes = [
+        {"key": "pack.front", "values": ["8 mil", "20 mil"]},
+        {"key": "magnet.range_max", "values": ["9 mil", "20 mil"]},
+    ]
+    found = run(tmp_path, drive={"train": {"rate": "1 kHz", "pulses": 2}}, axis=axes)
+    names = [[STATUSES[code] for code in row] for row in found.status.values]
+    # A pack behind the platen is none; the armature leaves the short range on its way.
+    assert names == [["range left", "ok"], ["no such hammer", "no such hammer"]]
+    short = found.isel(pack_front=0, magnet_range_max=0)
+    motion = ph.simulate(
+        hammer.replace("magnet.range_max", "9 mil"), ph.PulseTrain(hammer.waveform, rate=1e3, pulses=2)
+    )
+    assert close(short.reached, motion.end)
+    assert short.final_x.isnull()
+    assert found.flight_time[1].isnull().all()
+    assert not found.fired[1].any()
+
+
+def test_provenance_and_units(tmp_path: Path, hammer: ph.Hammer) -> None:
+    found = run(
+        tmp_path,
+        title="a try",
+        drive={"train": {"rate": "1 kHz", "pulses": 1}},
+        axis=[{"key": "mass", "values": ["3 g"]}],
+    )
+    assert found.attrs["hammer_fingerprint"] == hammer.fingerprint
+    assert found.attrs["hammer_file"] == hammer.to_toml()
+    assert found.attrs["printhammer"] == ph.__version__
+    assert found.attrs["title"] == "a try"
+    assert found.attrs["finished"] >= found.attrs["created"] > "2020"
+    assert found.flight_time.attrs == {"long_name": "time from firing to touch", "units": "s"}
+    assert found.mass.attrs["units"] == "kg"
+    assert found.status.attrs["flag_meanings"].split()[1 + 5] == "worker_lost"
+    again = xr.open_zarr(tmp_path / "out.zarr", consolidated=False, chunks=None)
+    xr.testing.assert_identical(found.load(), again.load()[list(found)])
+    found.to_netcdf(tmp_path / "out.nc")
+    xr.testing.assert_equal(found, xr.load_dataset(tmp_path / "out.nc"))
+
+
+def test_the_same_bits_for_any_threads_and_order(
+    spec_file: Callable[..., Path], tmp_path: Path, bytes_of: Callable[[Path], dict[str, bytes]]
+) -> None:
+    path = spec_file()
+    for threads in (1, 2, 5):
+        ph.sweep(path, tmp_path / f"{threads}.zarr", threads=threads)
+    assert bytes_of(tmp_path / "1.zarr") == bytes_of(tmp_path / "2.zarr") == bytes_of(tmp_path / "5.zarr")
+
+
+def test_the_same_numbers_for_any_chunks(spec_file: Callable[..., Path], tmp_path: Path) -> None:
+    found = [
+        ph.sweep(spec_file(f"{chunk}.toml", chunk=chunk), tmp_path / f"{chunk}.zarr").load()
+        for chunk in (1, 5, 12)
+    ]
+    for other in found[1:]:
+        xr.testing.assert_equal(found[0], other)
+
+
+def test_progress_counts_members(spec_file: Callable[..., Path], tmp_path: Path) -> None:
+    told: list[tuple[float, int, int]] = []
+
+    def progress(*numbers: float) -> None:
+        told.append(numbers)
+        assert threading.current_thread() is threading.main_thread()
+
+    ph.sweep(spec_file(), tmp_path / "out.zarr", progress=progress)
+    assert told[0] == (0, 0, 12)
+    assert told[-1] == (12, 0, 12)
+    assert all(0 <= done <= 12 for done, _, _ in told)
+    ph.sweep(spec_file(), tmp_path / "out.zarr", progress=progress)
+    assert told[-1] == (12, 12, 12)
+
+
+def test_an_interrupt_keeps_the_blocks_that_are_done(
+    spec_file: Callable[..., Path], tmp_path: Path, bytes_of: Callable[[Path], dict[str, bytes]]
+) -> None:
+    def interrupt(done: float, before: int, members: int) -> None:
+        if done >= 4:
+            raise KeyboardInterrupt
+
+    out = tmp_path / "out.zarr"
+    with pytest.raises(KeyboardInterrupt):
+        ph.sweep(spec_file(), out, threads=1, progress=interrupt)
+    codes = open_store(out).status.values
+    assert 4 <= (codes == 0).sum() < 12
+    assert ((codes == 0) | (codes == -1)).all()
+    ph.sweep(spec_file(), out)
+    ph.sweep(spec_file(), tmp_path / "whole.zarr")
+    assert bytes_of(out) == bytes_of(tmp_path / "whole.zarr")
