@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Final, NoReturn
 import typer
 
 from printhammer import __version__
-from printhammer.cli import bench, figure, hammer, paper, run, sweep
+from printhammer.cli import bench, figure, hammer, paper, run, strobe, sweep
 from printhammer.cli import map as frequency_map
 from printhammer.cli.terminal import complain
 from printhammer.errors import PrinthammerError
@@ -39,6 +39,7 @@ app.command("run", epilog=run.EXAMPLE)(run.run)
 app.command("figure", epilog=figure.EXAMPLE)(figure.figure)
 app.command("paper", epilog=paper.EXAMPLE)(paper.paper)
 app.command("map", epilog=frequency_map.EXAMPLE)(frequency_map.map_)
+app.command("strobe", epilog=strobe.EXAMPLE)(strobe.strobe)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)
 app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)
 app.add_typer(hammer.app, name="hammer")
