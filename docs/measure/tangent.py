@@ -1,0 +1,104 @@
+"""Measure the figures of the page on the tangent flow and print them as a table.
+
+Run it with ``.venv/bin/python docs/measure/tangent.py``; it takes a few minutes. The differences of runs and
+the hammers are those of the tests.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from tests.hammers import Draw, interpreted, shipped
+from tests.tangents import SHARP, before_slow_touches, deviation, scaled
+from tests.truth.test_tangent_finite_differences import CASES, MOVING, drive_of, hammer_of
+
+import printhammer as ph
+from printhammer.equilibrium import rest_state
+from printhammer.problem import TOLERANCE, Problem
+from printhammer.tangent import strobe_exponent, tangent_map
+
+SIZES = (1e-4, 1e-5, 1e-3, 1e-6)
+"""First spacings of the differences; the best counts, since each has its own rounding and curvature."""
+
+
+def best(*what: object, **how: object) -> float:
+    """Return the smallest deviation over the spacings."""
+    found = np.inf
+    for size in SIZES:
+        found = min(found, deviation(*what, size=size, **how))
+        if found < 1e-9:
+            break
+    return found
+
+
+def row(name: str, errors: list[float]) -> None:
+    """Print a line of the table."""
+    print(f"| {name} | {max(errors):.1e} |", flush=True)
+
+
+def shipped_hammer() -> None:
+    """A single pulse, trains, from contact to contact; and what the default tolerance does."""
+    hammer = shipped()
+    single = ph.PulseTrain(hammer.waveform)
+    ends = np.linspace(0.1e-3, 0.85e-3, 16)
+    row("single pulse, 16 ends", [best(hammer, single, 0.0, end) for end in ends])
+    starts = [0.3e-3, 0.36e-3, 0.5e-3, 0.56e-3]
+    pairs = [(start, end) for start in starts for end in ends if end > start + 10e-6]
+    row("from contact to contact", [best(hammer, single, *pair) for pair in pairs])
+    errors, changes = [], []
+    for period in np.linspace(0.8e-3, 1.35e-3, 12):
+        train = ph.PulseTrain(hammer.waveform, period=period, pulses=3)
+        end = before_slow_touches(hammer, train, 2.0 * period)
+        errors.append(best(hammer, train, 0.0, end))
+        exact, usual = (tangent_map(hammer, train, 0.0, end, tolerance=t) for t in (SHARP, TOLERANCE))
+        scales = Problem(hammer, train, exact.state_at_start[:2], 0.0, SHARP).scales
+        change = scaled(usual.matrix - exact.matrix, scales)
+        changes.append(float(np.linalg.norm(change) / np.linalg.norm(scaled(exact.matrix, scales))))
+    row("trains of three pulses, 12 rates", errors)
+    print(f"\nDefault tolerance against 1e-13, trains: {max(changes):.1e}\n")
+
+
+def other_hammers() -> None:
+    """Parts, drives, and hammers drawn about the shipped one."""
+    errors: dict[bool, list[float]] = {False: [], True: []}
+    for magnet, spring, pack, backstop, name, start, end in CASES:
+        with tempfile.TemporaryDirectory() as folder, interpreted():
+            hammer = hammer_of(magnet, spring, pack, backstop, Path(folder))
+            drive = drive_of(magnet, name)
+            errors[magnet == "table"].append(best(hammer, drive, start, end, MOVING, levels=4))
+    row(f"other parts and drives, {len(errors[False])} hammers", errors[False])
+    row(f"with a force table, {len(errors[True])} hammers", errors[True])
+    draw, found = Draw(np.random.default_rng(4), spread=0.1), []
+    while len(found) < 200:
+        hammer = draw()
+        drive = ph.PulseTrain(hammer.waveform, period=draw.rng.uniform(0.8e-3, 1.6e-3), pulses=3)
+        end = before_slow_touches(hammer, drive, draw.rng.uniform(0.5e-3, 2.5e-3))
+        found.append(best(hammer, drive, 0.0, end))
+    row(f"random hammers, {len(found)}, trains of three pulses", found)
+    print(f"\nMedian of the random hammers: {np.median(found):.1e}")
+
+
+def cost() -> None:
+    """Time of exponents over time of the runs alone."""
+    hammer = shipped()
+    ratios = []
+    for _ in range(5):
+        begin = time.process_time()
+        strobe_exponent(hammer, hammer.waveform, 1.05e-3, first=1, last=1000)
+        middle = time.process_time()
+        drive = ph.PulseTrain(hammer.waveform, period=1.05e-3, pulses=1000)
+        Problem(hammer, drive, (rest_state(hammer), 0.0), 0.0, TOLERANCE).run(float(drive.times[-1]))
+        ratios.append((middle - begin) / (time.process_time() - middle) - 1.0)
+    print(f"\nSecond pass over run, 1000 firings: {np.median(ratios[1:]):.1f}")
+
+
+if __name__ == "__main__":
+    print("| | largest difference |\n|---|---|")
+    shipped_hammer()
+    other_hammers()
+    cost()
