@@ -19,6 +19,7 @@ from printhammer.hammer import Hammer
 from printhammer.kernel import carry
 from printhammer.kernel.modes import HELD_UNLOADING, OK, PAUSED, RELOADING, STATUS_NAMES, UNLOADING
 from printhammer.problem import MAX_STEPS, TOLERANCE, Problem
+from printhammer.simulate import _state
 from printhammer.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
@@ -336,16 +337,7 @@ def standard_error(series: npt.ArrayLike) -> float:
 def _problem(hammer: Hammer, drive: Drive, state: tuple[float, float] | None, tolerance: float) -> Problem:
     if not 1e-15 <= tolerance <= 1e-2:
         raise InputError(f"tolerance = {tolerance!r}, expected a number from 1e-15 to 1e-2")
-    if state is None:
-        from printhammer.equilibrium import rest_state
-
-        state = rest_state(hammer), 0.0
-    x, v = (float(number) for number in state)
-    if not (math.isfinite(x) and math.isfinite(v)):
-        raise InputError(
-            f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
-        )
-    return Problem(hammer, drive, (x, v), 0.0, tolerance)
+    return Problem(hammer, drive, _state(hammer, state), 0.0, tolerance)
 
 
 def _strobes(
