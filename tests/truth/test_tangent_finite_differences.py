@@ -21,7 +21,7 @@ from tests.hammers import (
     made_of,
     shipped,
 )
-from tests.tangents import SHARP, before_slow_touches, deviation
+from tests.tangents import SHARP, before_slow_touches, deviation, richardson, scaled
 
 import printhammer as ph
 from printhammer.equilibrium import rest_state
@@ -34,6 +34,7 @@ from printhammer.kernel.modes import (
     RELOADING,
     UNLOADING,
 )
+from printhammer.kernel.reference import reference
 from printhammer.problem import Problem
 from printhammer.tangent import TangentMap, tangent_map
 
@@ -82,6 +83,33 @@ def test_starts_inside_contacts() -> None:
     front = hammers.FRONT
     for state in ((rest, 0.2), (rest + 1e-6, -0.1), (front + 20e-6, 1.0), (front + 60e-6, -0.3)):
         assert deviation(hammer, drive, 0.0, 0.5e-3, state) < WANTED
+
+
+@pytest.mark.parametrize("end", [0.4e-3, 0.8e-3, 1.9e-3])
+def test_differences_of_the_reference(end: float) -> None:
+    """Nothing of the kernel on the other side: two pulses, the second of them into the settling out."""
+    hammer = shipped()
+    drive = ph.PulseTrain(hammer.waveform, at=[0.0, 1.1e-3])
+    rest = rest_state(hammer)
+    units = np.array([hammers.STROKE, 2.0])
+
+    def at_end(move: np.ndarray) -> np.ndarray:
+        run = reference(
+            hammer, drive, end, state=(rest + move[0], move[1]), times=np.array([0.0, end]), tolerance=1e-14
+        )
+        return np.array([run.x[-1], run.v[-1]])
+
+    columns = []
+    for j in range(2):
+
+        def difference(step: float, j: int = j) -> np.ndarray:
+            move = step * units * np.eye(2)[j]
+            return (at_end(move) - at_end(-move)) / (2.0 * step * units[j])
+
+        columns.append(richardson(difference, 1e-4, 4, units))
+    truth = scaled(np.array(columns).T, (units[0], units[1]))
+    found = scaled(tangent_map(hammer, drive, 0.0, end, tolerance=SHARP).matrix[:2], (units[0], units[1]))
+    assert np.linalg.norm(found - truth) < WANTED * np.linalg.norm(truth)
 
 
 CASES = [
