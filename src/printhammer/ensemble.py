@@ -17,7 +17,7 @@ from printhammer.errors import InputError
 from printhammer.hammer import Hammer
 from printhammer.kernel.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.problem import TOLERANCE, laws_of
-from printhammer.threads import in_threads, thread_count
+from printhammer.threads import PIECES_A_THREAD, in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
 
-Engine = Literal["auto", "plain"]
+Engine = Literal["auto", "plain", "lanes"]
 ENGINES: Final = get_args(Engine)
 
 
@@ -284,7 +284,9 @@ class Ensemble:
         progress : callable, optional
             Called now and then with the number of members done and of all.
         engine : str, optional
-            "plain": one member at a time; "auto": the fastest there is for the laws of the members.
+            "plain": one member at a time; "lanes": side by side, see `printhammer.kernel.lanes`; "auto": in
+            lanes where the laws of the members allow it. Results of the two differ by what the tolerance
+            allows.
 
         Returns
         -------
@@ -309,7 +311,7 @@ class Ensemble:
             )
         moments = self._moments(strobes)
         jobs = [Job(group, dots, moments, grid, x) for group in self.groups]
-        in_threads([job.piece for job in jobs], [len(job.group.members) for job in jobs], workers, progress)
+        _integrate(jobs, engine, workers, progress)
         for job in jobs:
             job.finish(x)
         return EnsembleResult(
@@ -383,6 +385,21 @@ class Ensemble:
         if len(strobes) != self.size:
             raise InputError(f"strobes: {len(strobes)} arrays, expected {self.size}")
         return [_ascending(moment, "strobes") for moment in strobes]
+
+
+def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Progress | None) -> None:
+    works, lengths = [], []
+    sizes = [len(job.group.members) for job in jobs]
+    for job, size in zip(jobs, sizes, strict=True):
+        if engine != "plain" and job.group.fits_lanes():
+            works.append(job.lane_piece)
+            lengths.append(job.share_out(threads))
+        elif engine == "lanes":
+            raise InputError('engine = "lanes", expected "plain" or "auto": the parts do not allow lanes')
+        else:
+            works.append(job.piece)
+            lengths.append(max(1, size // (PIECES_A_THREAD * threads)))
+    in_threads(works, sizes, threads, progress, lengths)
 
 
 def _ascending(times: npt.ArrayLike, name: str) -> FloatArray:

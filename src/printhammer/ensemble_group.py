@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.kernel import carry
+from printhammer.kernel import carry, lane_layout
+from printhammer.kernel.layout import MAGNET, PLACES
 from printhammer.problem import MAX_STEPS, Problem
 
 if TYPE_CHECKING:
@@ -23,6 +24,9 @@ _NODES: Final = 2048
 _CONTACTS: Final = 256
 _DOT_WIDTH: Final = 6
 _STROBE_WIDTH: Final = 4
+_PIECE: Final = 4 * lane_layout.LANES
+"""Members in one piece of work for lanes."""
+_CUBIC, _EXPONENTIAL, _SINE = 0.0, 1.0, 2.0
 
 
 def starts_of(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.int64]:
@@ -83,6 +87,7 @@ class Group:
         firings = [np.asarray(drive.times, dtype=np.float64) for drive in drives]
         self.replace = bool(drives[0].kernel_arrays()[2])
         self.kernel: Kernel = problems[0].kernel
+        self.laws = problems[0].laws
         width = max(problem.constants.size for problem in problems)
         self.hammers = np.zeros((len(problems), width))
         for row, problem in enumerate(problems):
@@ -94,6 +99,51 @@ class Group:
         self.firing_starts = starts_of(firings)
         self.firings = np.concatenate(firings)
         self.most_firings = max(len(times) for times in firings)
+        self.uniform = len(problems) == 1 and len(tables) == 1
+        self.rates, self.lane_kinds = _closed_form(tables)
+
+    def fits_lanes(self) -> bool:
+        """Tell whether there is a kernel for lanes for these members."""
+        from printhammer.kernel.specialise_lanes import suits
+
+        if self.lane_kinds is None or not suits(self.laws):
+            return False
+        used = {role: self.hammers[:, place : place + 16] for role, place in PLACES.items()}
+        used["magnet"] = self.hammers[:, MAGNET:]
+        return all(
+            not used[role][:, count:].any() for role, (_place, count) in lane_layout.PLACES.items()
+        ) and bool((self.states[:, 3] < 0.0).all())
+
+    @property
+    def lane_kernel(self) -> Kernel:
+        """The compiled kernel for lanes."""
+        from printhammer.kernel.specialise_lanes import specialise_lanes
+
+        if self.lane_kinds is None:
+            raise ValueError("no closed form of the drive")
+        return specialise_lanes(self.laws, self.lane_kinds)
+
+
+def _closed_form(tables: Sequence[FloatArray]) -> tuple[FloatArray, tuple[int, bool, bool] | None]:
+    """Return the rates of the pieces of each waveform, and what kinds of pieces there are, for lanes.
+
+    None instead of the kinds where a waveform has more rates than lanes provide for.
+    """
+    rates = np.zeros((len(tables), lane_layout.RATES_WIDTH))
+    exponentials, cubic, sine = 0, False, False
+    for row, table in enumerate(tables):
+        pieces = table[:-1]
+        kind = pieces[:, 1]
+        decays = np.unique(pieces[kind == _EXPONENTIAL, 4])
+        frequencies = np.unique(pieces[kind == _SINE, 4])
+        if len(decays) > 2 or len(frequencies) > 1:
+            return rates, None
+        rates[row, : len(decays)] = decays
+        rates[row, 2 : 2 + len(frequencies)] = frequencies
+        exponentials = max(exponentials, len(decays))
+        cubic = cubic or bool(pieces[kind == _CUBIC, 3:].any())
+        sine = sine or len(frequencies) > 0
+    return rates, (exponentials, cubic, sine)
 
 
 class Job:
@@ -122,6 +172,7 @@ class Job:
         x: npt.NDArray[np.float32],
     ) -> None:
         self.group = group
+        self.order = np.arange(len(group.members))
         self.want_dots = want_dots
         self.grid = grid
         count = len(group.members)
@@ -141,11 +192,65 @@ class Job:
         if self.x is not x:
             x[self.group.members] = self.x
 
+    def share_out(self, threads: int) -> int:
+        """Spread the members over pieces so that neighbours do not come together; return their length.
+
+        Neighbours take about the same time, and a piece is done when its longest member is.
+        """
+        count = self.order.size
+        pieces = threads * max(1, round(count / (_PIECE * threads)))
+        self.order = np.concatenate([np.arange(piece, count, pieces) for piece in range(pieces)])
+        return -(-count // pieces)
+
     def piece(self, first: int, last: int) -> None:
-        """Integrate the members `first` to `last` - 1 of the group, in this thread."""
+        """Integrate some members of the group one by one, in this thread."""
+        self._one_by_one(self.order[first:last])
+
+    def lane_piece(self, first: int, last: int) -> None:
+        """Integrate some members of the group side by side, in this thread."""
+        group = self.group
+        which = self.order[first:last]
+        left_over = np.empty(which.size, np.int64)
+        left = group.lane_kernel.lanes(
+            which,
+            group.hammer_of,
+            group.hammers,
+            group.controls,
+            group.bounds,
+            group.waveform_of,
+            group.piece_starts,
+            group.pieces,
+            group.rates,
+            group.firing_starts,
+            group.firings,
+            group.replace,
+            group.states,
+            group.ends,
+            self.strobes_starts,
+            self.strobe_times,
+            self.grid,
+            self.want_dots,
+            np.zeros(group.most_firings, np.int64),
+            np.zeros(1 + 7 * group.most_firings),
+            group.uniform,
+            np.zeros((lane_layout.POOLS + 1, lane_layout.POOL_SIZE)),
+            np.zeros(lane_layout.POOLS, np.int64),
+            np.zeros((lane_layout.POOLS, lane_layout.LANES), np.int64),
+            np.zeros((lane_layout.LANES, lane_layout.SLOT_WIDTH)),
+            np.zeros(lane_layout.LANES, np.int64),
+            left_over,
+            self.status,
+            self.reached,
+            self.steps,
+            self.dots,
+            self.strobes,
+            self.x,
+        )
+        self._one_by_one(left_over[:left])
+
+    def _one_by_one(self, which: npt.NDArray[np.int64]) -> None:
         group = self.group
         nodes, contacts = _NODES, _CONTACTS
-        which = np.arange(first, last)
         under_way = np.zeros((2, group.most_firings), np.int64)
         live = np.zeros((2, 1 + 7 * group.most_firings))
         while which.size:

@@ -13,7 +13,7 @@ from printhammer.errors import InputError
 Progress = Callable[[int, int], None]
 Piece = Callable[[int, int], None]
 
-_PIECES_A_THREAD: Final = 32
+PIECES_A_THREAD: Final = 32
 _INTERVAL: Final = 0.1
 
 
@@ -35,7 +35,11 @@ def thread_count(threads: int | None) -> int:
 
 
 def in_threads(
-    works: Sequence[Piece], sizes: Sequence[int], threads: int, progress: Progress | None = None
+    works: Sequence[Piece],
+    sizes: Sequence[int],
+    threads: int,
+    progress: Progress | None = None,
+    lengths: Sequence[int] | None = None,
 ) -> None:
     """Do all of several works, each on a range of numbers from 0, in threads.
 
@@ -49,6 +53,8 @@ def in_threads(
         Number of threads; with one, the calling thread does all.
     progress : callable, optional
         Called now and then, in the calling thread, with how many numbers are done and how many there are.
+    lengths : sequence of int, optional
+        Length of the pieces of each work; by default such that a thread has a few dozen.
 
     Raises
     ------
@@ -56,10 +62,11 @@ def in_threads(
         Where it is interrupted; the pieces under way are done before.
     """
     total = sum(sizes)
-    length = max(1, total // (_PIECES_A_THREAD * threads))
+    if lengths is None:
+        lengths = [max(1, total // (PIECES_A_THREAD * threads))] * len(works)
     pieces = [
         (work, first, min(first + length, size))
-        for work, size in zip(works, sizes, strict=True)
+        for work, size, length in zip(works, sizes, lengths, strict=True)
         for first in range(0, size, length)
     ]
     if threads == 1 or len(pieces) <= 1:

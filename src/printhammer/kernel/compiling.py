@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 Function = TypeVar("Function", bound="Callable[..., Any]")
 
@@ -22,8 +23,24 @@ def inlined(function: Function) -> Function:
     return numba.njit(forceinline=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
+_inline_all = False
+
+
+@contextmanager
+def all_inlined() -> Iterator[None]:
+    """Have `compiled` do what `inlined` does: a loop that is to become vector code must not hold calls."""
+    global _inline_all  # noqa: PLW0603
+    _inline_all = True
+    try:
+        yield
+    finally:
+        _inline_all = False
+
+
 def compiled(function: Function) -> Function:
     """Compile a scalar helper lazily, as part of whatever calls it."""
+    if _inline_all:
+        return inlined(function)
     return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
 
 

@@ -57,6 +57,10 @@ FORCE_DRIVE: bool
 PACK_PULLS: bool
 BACKSTOP_PULLS: bool
 RELOAD_ALONG_UNLOADING: bool
+# In lanes only: what the drive consists of.
+EXPONENTIALS: int
+CUBIC: bool
+SINE: bool
 
 
 def magnet_force(c: Constants, x: float, current: float) -> float:

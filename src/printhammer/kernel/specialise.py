@@ -44,6 +44,9 @@ TEMPLATES = (
 )
 """Template modules in the order in which they use one another."""
 
+ENTRIES = ("run", "resample", "quadratures", "peaks", "members", "tangent", "lanes")
+"""Names of the entry points."""
+
 _PLAIN = ("modes", "layout", "carry", "hermite", "compiling", "dop853_tableau", "nystrom8_tableau")
 
 _LAW_FUNCTIONS = {
@@ -70,18 +73,26 @@ class Kernel:
     ----------
     run, resample, quadratures, peaks, members, tangent
         Entry points; see the template modules of the same names.
+    label : str
+        What the kernel is for.
+    digest : str
+        Of all its sources.
+    namespace : dict
+        All that its modules define, for what builds on them.
     """
 
-    def __init__(self, modules: dict[str, ModuleType], label: str) -> None:
-        self._label = label
+    def __init__(
+        self, modules: dict[str, ModuleType], label: str, namespace: dict[str, Any], digest: str
+    ) -> None:
+        self.namespace = namespace
+        self.digest = digest
+        self.label = label
         self._announced = False
         self._entries = {
-            "run": modules["run"].run,
-            "resample": modules["resample"].resample,
-            "peaks": modules["resample"].peaks,
-            "quadratures": modules["quadrature"].quadratures,
-            "members": modules["members"].members,
-            "tangent": modules["tangent"].tangent,
+            name: getattr(module, name)
+            for module in modules.values()
+            for name in ENTRIES
+            if hasattr(module, name) and getattr(module, name).__module__ == module.__name__
         }
 
     def __getattr__(self, name: str) -> Any:
@@ -92,7 +103,7 @@ class Kernel:
             raise AttributeError(name) from None
         if announce is not None and not self._announced and not _is_ready(function):
             self._announced = True
-            announce(f"compiling the kernel for {self._label} (once; kept on disk)")
+            announce(f"compiling the kernel for {self.label} (once; kept on disk)")
         return function
 
 
@@ -110,7 +121,7 @@ def _source(module: ModuleType) -> bytes:
     return inspect.getsource(module).encode()
 
 
-def _law_bindings(laws: Laws) -> tuple[dict[str, Any], bytes]:
+def law_bindings(laws: Laws) -> tuple[dict[str, Any], bytes]:
     """Return the plain law functions and flags by name, and the text of all sources they come from."""
     absent = importlib.import_module(laws.absent)
     bindings: dict[str, Any] = {}
@@ -154,7 +165,7 @@ def specialise(laws: Laws) -> Kernel:
     """
     import numba
 
-    bindings, text = _law_bindings(laws)
+    bindings, text = law_bindings(laws)
     here = Path(__file__).parent
     for name in _PLAIN:
         text += (here / f"{name}.py").read_bytes()
@@ -169,7 +180,7 @@ def specialise(laws: Laws) -> Kernel:
         # A template uses only those before it: a change of a later one leaves its machine code valid.
         sources.update((here / f"{name}.py").read_bytes())
         namespace["DIGEST"] = digest = sources.hexdigest()[:16]
-        module = _execute(here / f"{name}.py", f"printhammer.kernel.{name}_{digest}", namespace)
+        module = execute(here / f"{name}.py", f"printhammer.kernel.{name}_{digest}", namespace)
         modules[name] = module
         namespace.update(
             {
@@ -180,7 +191,7 @@ def specialise(laws: Laws) -> Kernel:
             }
         )
     parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
-    return Kernel(modules, ", ".join(parts) or "a free mass")
+    return Kernel(modules, ", ".join(parts) or "a free mass", namespace, digest)
 
 
 def _compile_law(function: FunctionType, compiled: Callable[..., Any]) -> Any:
@@ -197,7 +208,7 @@ def _compile_law(function: FunctionType, compiled: Callable[..., Any]) -> Any:
     return compiled(function)
 
 
-def _execute(path: Path, name: str, namespace: dict[str, Any]) -> ModuleType:
+def execute(path: Path, name: str, namespace: dict[str, Any]) -> ModuleType:
     """Execute a template file as a module called `name` in which `namespace` is already defined."""
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

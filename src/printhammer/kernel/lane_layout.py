@@ -1,0 +1,116 @@
+"""Where things lie in a pool of lanes: one flat array of blocks, each of rows of `BLOCK` lanes.
+
+All members in a pool are in the same mode. A row holds one quantity of all lanes of its block, so that a loop
+over lanes reads and writes side by side; the rows of a block lie together.
+"""
+
+LANES = 128
+"""Members that a thread has under way; capacity of every pool."""
+
+BLOCK = 16
+"""Lanes in one pass of the compiled loops."""
+
+MOST_STEPS = 5e7
+"""Steps after which a member leaves the lanes."""
+
+# The constants of a hammer, in the places that `layout` gives them otherwise.
+INVERSE_MASS = 0
+POSITION = 1
+FRONT = 2
+SPRING = 3
+PACK = 7
+BACKSTOP_PART = 13
+MAGNET = 19
+CONSTANTS = 25
+PLACES = {"spring": (SPRING, 4), "pack": (PACK, 6), "backstop": (BACKSTOP_PART, 6), "magnet": (MAGNET, 6)}
+"""First place and number of places of the constants of each part."""
+
+# The drive between two of its edges, in the order: time of reference, constant, amplitudes of two
+# exponentials, higher coefficients of the cubic, amplitude and phase of the sine; then what the waveform
+# alone determines, the rates of the exponentials and the angular frequency of the sine.
+DRIVE_WIDTH = 9
+RATES_WIDTH = 3
+
+# Pools.
+FREE_POOL = 0
+LOADING_POOL = 1
+UNLOADING_POOL = 2
+CONTACT_POOL = 3
+POOLS = 4
+
+# Rows.
+T = 0
+X = 1
+"""Displacement; in the contact pool w = sqrt(b - x)."""
+V = 2
+A = 3
+"""Acceleration; in the contact pool dv/ds."""
+H = 4
+"""Next step, in time; in the contact pool in s."""
+NEXT = 5
+"""Time of the next edge of the drive, or of the end."""
+SAMPLE = 6
+"""Time of the next sample or strobe."""
+MEMORY = 7
+PEAK = 8
+FIRST = 9
+"""Step that followed the first one in this mode, 0 before that."""
+STEPS = 10
+LANDING = 11
+"""The switch on which the step under way is to end; 0 for none."""
+DRIVE = 12
+EXPONENTIAL_DRIVE = DRIVE + 4
+"""Rows that a member takes along from pool to pool, with a drive of nothing but exponentials, come before."""
+ANY_DRIVE = DRIVE + DRIVE_WIDTH
+"""Rows that a member takes along with any drive come before this one."""
+RATES = ANY_DRIVE
+CONTROL = RATES + RATES_WIDTH
+LOWEST = CONTROL + 4
+HIGHEST = CONTROL + 5
+HAMMER = CONTROL + 6
+OWN = HAMMER + CONSTANTS
+"""Rows that belong to the member's waveform and hammer come before this one."""
+
+OLD_T = OWN
+OLD_X = OWN + 1
+OLD_V = OWN + 2
+OLD_A = OWN + 3
+NEW_T = OWN + 4
+NEW_X = OWN + 5
+NEW_V = OWN + 6
+NEW_A = OWN + 7
+LENGTH = OWN + 8
+"""Length of the step that was taken."""
+FOLLOWING = OWN + 9
+"""Length of the step after it."""
+EVENT = OWN + 10
+ROWS = OWN + 11
+
+BLOCK_SIZE = ROWS * BLOCK
+POOL_SIZE = BLOCK_SIZE * (LANES // BLOCK)
+
+# Columns of a slot: what a member has beside its lane.
+MEMBER = 0
+NEXT_SAMPLE = 1
+NEXT_STROBE = 2
+FREE_STEP = 3
+PACK_STEP = 4
+CONTACT_STEP = 5
+UNIT = 6
+"""Unit of s of the backstop contact under way; 0 for one under way since the start."""
+DOT = 7
+"""Number of the firing whose dot the open pack contact makes, -1 for none."""
+END = 8
+CAREFUL = 9
+"""Whether the next switch is located with steps of the plain kernel."""
+ATTEMPTS = 10
+SAVED_STEP = 11
+SLOT_WIDTH = 12
+
+# Events, to be added up.
+SWITCH = 1.0
+"""The step may hold a switch and has not been made valid."""
+SAMPLED = 2.0
+AT_EDGE = 4.0
+STUCK = 8.0
+"""The step is too short, or not finite."""
