@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
+import time
 from asyncio import CancelledError as TaskCancelled
 from collections import deque
 from concurrent.futures import CancelledError as FutureCancelled
@@ -33,6 +35,8 @@ NO_WORKERS: Final = 60.0
 """Seconds without any worker after which a sweep gives up."""
 
 _INTERVAL: Final = 0.5
+_COUNT_EVERY: Final = 2.0
+_ALIVE: Final = ("running", "connecting")
 _TASKS_A_THREAD: Final = 3
 _PARTS: Final = 8
 
@@ -87,6 +91,7 @@ class _Work:
         self._futures: dict[Any, Index] = {}
         self._done: SimpleQueue[Any] = SimpleQueue()
         self._idle = 0.0
+        self._counted, self._count = -math.inf, 0
 
     def together(
         self, todo: Sequence[Index], write: Callable[[Index, Results], None], told: Callable[[float], None]
@@ -129,6 +134,8 @@ class _Work:
             self._client.cancel(list(self._futures), force=True)
 
     def _submit(self, rows: FloatArray, index: Index) -> None:
+        if self._client.status not in _ALIVE:
+            raise _GoneError
         spec = self._plan.spec
         future = self._client.submit(_task, spec.base, spec.outputs, rows, versions(), pure=False)
         self._await(future, index)
@@ -159,7 +166,8 @@ class _Work:
         else:
             try:
                 found: Results | str = future.result()
-            except (FutureCancelled, TaskCancelled):
+            except (FutureCancelled, TaskCancelled, OSError):
+                # What goes wrong in the work itself comes as text.
                 raise _GoneError from None
             except Exception as late:  # noqa: BLE001 - told as a sentence
                 # The worker was killed before it handed its results over, and what came after it as well.
@@ -173,11 +181,20 @@ class _Work:
         raise InputError(_unable(error)) from error
 
     def _threads(self) -> int:
-        return sum(self._client.nthreads().values()) if self._client.status == "running" else 0
+        """Count the threads of the workers; asked for every few seconds only."""
+        now = time.monotonic()
+        if now - self._counted >= _COUNT_EVERY:
+            self._counted = now
+            try:
+                self._count = sum(self._client.nthreads().values())
+            except OSError:
+                # The scheduler is going; what that means for the tasks comes with their futures.
+                self._count = 0
+        return self._count
 
     def _watch(self) -> None:
         """Give up where the scheduler is gone, or no worker has come for a while."""
-        if self._client.status not in ("running", "connecting"):
+        if self._client.status not in _ALIVE:
             raise _GoneError
         self._idle = 0.0 if self._threads() else self._idle + _INTERVAL
         if self._idle >= NO_WORKERS:
@@ -226,7 +243,7 @@ def client_of(dask: Any) -> Iterator[Any]:
         return
     with _quiet():
         try:
-            asyncio.run(_knock(distributed, dask))
+            asyncio.run(asyncio.wait_for(_knock(distributed, dask), ANSWER))
             client = distributed.Client(dask, timeout=ANSWER, set_as_default=False)
         except (OSError, TimeoutError, ValueError, TypeError, AttributeError) as error:
             reason = str(error).partition("\n")[0] or type(error).__name__
