@@ -121,9 +121,10 @@ def show_plan(plan: Plan, screen: Console) -> None:
         arrays.add_row(output.name, told, size_text(size), escape(output.meaning + unit))
     screen.print()
     screen.print(arrays)
+    blocks = "1 block" if plan.blocks.number == 1 else f"{plan.blocks.number} blocks"
     screen.print(
-        f"\n{plan.members} members in {plan.blocks.number} blocks of up to"
-        f" {math.prod(plan.blocks.chunks)}; {size_text(total)} before compression"
+        f"\n{plan.members} members in {blocks} of up to {math.prod(plan.blocks.chunks)};"
+        f" {size_text(total)} before compression"
     )
 
 

@@ -11,6 +11,7 @@ from printhammer.store import Store, open_store
 from printhammer.sweep.local import run_local
 from printhammer.sweep.plan import make_plan
 from printhammer.sweep.spec import read_spec
+from printhammer.threads import thread_count
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -63,6 +64,7 @@ def sweep(
         The spec is not one; the store holds other results, is being written to by another process or cannot
         be written; nobody answers at the address.
     """
+    thread_count(threads)
     plan = make_plan(read_spec(spec))
     with ExitStack() as stack:
         client = None
