@@ -51,10 +51,12 @@ def test_a_transient_is_left_out(hammer: "ph.Hammer") -> None:
     np.testing.assert_array_equal(late.v, whole.v[7:])
 
 
-def test_a_verdict_does_not_change_the_points(hammer: "ph.Hammer") -> None:
-    plain = ph.strobe(hammer, period="1.3 ms", points=20, phase=0.3, verdict=False)
-    judged = ph.strobe(hammer, period="1.3 ms", points=20, phase=0.3)
+@pytest.mark.parametrize("phase", [0.0, 0.3])
+def test_a_verdict_does_not_change_the_points(hammer: "ph.Hammer", phase: float) -> None:
+    plain = ph.strobe(hammer, period="1.3 ms", points=20, phase=phase, verdict=False)
+    judged = ph.strobe(hammer, period="1.3 ms", points=20, phase=phase)
     np.testing.assert_array_equal(judged.x, plain.x)
+    np.testing.assert_array_equal(judged.v, plain.v)
     assert judged.verdict.period == 1
     assert judged.verdict.exponent < 0.0
     assert (judged.verdict.first, judged.verdict.last) == (1001, 2000)
@@ -225,8 +227,9 @@ def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, 
 def test_what_does_not_fit_together_is_refused(hammer: "ph.Hammer") -> None:
     with pytest.raises(ph.InputError, match="has no waveform"):
         ph.strobe(hammer.replace("waveform", None), period=1e-3)
-    with pytest.raises(ph.InputError, match="expected an endless force"):
-        ph.strobe(hammer, drive=ph.PulseTrain(hammer.waveform, period=1e-3, pulses=3))
+    for pulses in (1, 3):
+        with pytest.raises(ph.InputError, match="expected an endless force"):
+            ph.strobe(hammer, drive=ph.PulseTrain(hammer.waveform, period=1e-3, pulses=pulses))
     with pytest.raises(ph.InputError, match=r"^hammers: 2 are given, expected 1 or 3"):
         strobes([hammer, hammer], [1e-3, 1.1e-3, 1.2e-3])
     with pytest.raises(ph.InputError, match=r"^periods"):

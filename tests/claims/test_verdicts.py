@@ -74,6 +74,13 @@ def test_every_constant_is_changed(hammer: "ph.Hammer") -> None:
     assert len(signs) == 4
 
 
+def test_a_force_stays_a_force(hammer: "ph.Hammer") -> None:
+    pulse = {"shape": "half-sine", "amplitude": "20 N", "width": "300 us"}
+    moved = verdicts.changed(hammer.replace("waveform", pulse), lambda _: 1)
+    assert moved.waveform.quantity == "force"
+    assert moved.waveform.peak == pytest.approx(20.0002, rel=1e-9)
+
+
 def test_panels_as_the_paper_has_them(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     given = give(monkeypatch, printed())
     result = judge(context, claims()["poincare"])

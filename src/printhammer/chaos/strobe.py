@@ -272,7 +272,7 @@ def strobes(
         raise InputError(f"phase = {phase!r}, expected a part of the period from 0 up to but not including 1")
     if not 1 <= firings[0] < firings[1]:
         raise InputError(f"firings = {firings!r}, expected the first and the last firing to judge, ascending")
-    pulses = max(count + skipped, firings[1] if verdict else 1)
+    fired = max(count + skipped, firings[1] if verdict else 1)
     wanted: list[float | None] = [None] * len(drives) if drives is not None else [*_periods(periods)]
     many = [hammers] if isinstance(hammers, Hammer) else list(hammers)
     rows = None if states is None else np.asarray(states, dtype=np.float64).reshape(-1, 2)
@@ -285,7 +285,7 @@ def strobes(
         Train.of(
             many[i % len(many)],
             wanted[i % len(wanted)],
-            pulses,
+            fired,
             waveform=waveform,
             drive=None if drives is None else drives[i % len(drives)],
             overlap=overlap,

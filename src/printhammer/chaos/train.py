@@ -62,14 +62,16 @@ class Train:
         cls,
         hammer: Hammer,
         period: float | None,
-        pulses: int,
+        firings: int,
         *,
         waveform: Waveform | None = None,
         drive: Drive | None = None,
         overlap: Overlap = "add",
         state: tuple[float, float] | None = None,
     ) -> Self:
-        """Make a train of pulses, or of the periods of an endless force.
+        """Make a train of pulses, or of the periods of an endless force, for states up to a firing.
+
+        One more is fired: runs end there, so that no state depends on where that is.
 
         Raises
         ------
@@ -77,7 +79,7 @@ class Train:
             There is nothing to fire, or the drive is no endless force with a period.
         """
         if drive is not None:
-            if drive.period is None or len(drive.times) > 1:
+            if drive.period is None or math.isfinite(drive.waveform.support):
                 raise InputError(f"drive = {drive!r}, expected an endless force with a period")
             return cls(hammer, drive, drive.period, state)
         fired = hammer.waveform if waveform is None else waveform
@@ -85,7 +87,7 @@ class Train:
             raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
         if period is None:
             raise InputError("period is missing, expected the time between firings, s")
-        train = PulseTrain(fired, period=period, pulses=pulses, overlap=overlap)
+        train = PulseTrain(fired, period=period, pulses=firings + 1, overlap=overlap)
         return cls(hammer, train, period, state)
 
     def times(self, firings: npt.NDArray[np.int64]) -> FloatArray:
@@ -169,7 +171,8 @@ def run_trains(
     own = [train.times(chosen) + phase * train.period for train in trains]
     theirs = [train.times(firings) for train in trains]
     every = [np.union1d(mine, other) for mine, other in zip(own, theirs, strict=True)]
-    ends = [max(float(times[-1]), train.period) for times, train in zip(every, trains, strict=True)]
+    after = np.array([max(int(chosen.max(initial=1)), int(firings.max(initial=1))) + 1])
+    ends = [float(train.times(after)[0]) for train in trains]
     given = [train.state for train in trains]
     ensemble = Ensemble(
         [train.hammer for train in trains],

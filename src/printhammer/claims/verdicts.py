@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.chaos import strobes
@@ -38,8 +38,13 @@ _APERIODIC: Final = "no period"
 
 def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -> Hammer:
     """Return a hammer with every constant changed by a part of it, up or down."""
-    factors = {key: 1.0 + part * sign(number) for number, key in enumerate(hammer.constants)}
-    return hammer.replace({key: hammer.constants[key].si * factor for key, factor in factors.items()})
+    # In the unit of the file, which tells a current from a force.
+    return hammer.replace(
+        {
+            key: replace(constant, value=constant.value * (1.0 + part * sign(number)))
+            for number, (key, constant) in enumerate(hammer.constants.items())
+        }
+    )
 
 
 def panel_name(period: float) -> str:

@@ -95,7 +95,8 @@ def strobe(
     )
     screen = console()
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
-    screen.print(f"[dim]{escape(repr(found.drive)[1:-1])}[/dim]\n")
+    train = f"{found.drive.waveform.shape} {found.drive.quantity} every {found.period:.9g} s"
+    screen.print(f"[dim]{escape(train)}, overlap {found.drive.overlap}[/dim]\n")
     screen.print(summary(found, units))
     for path in wanted:
         if path.suffix.lower() in _PICTURES:
