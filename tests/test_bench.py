@@ -7,6 +7,7 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -209,6 +210,14 @@ def test_the_fastest_frame_is_exact_enough(report: Report) -> None:
         "exact, median error below 1e-08 of the stroke, 1 thread: 300 ms (plain engine, tolerance 1e-10)",
         "exact, median error below 1e-08 of the stroke, 2 threads: no setting",
     ]
+
+
+def test_the_nearest_peer_is_named(report: Report) -> None:
+    assert report.least_lead(ensembles=False) == "There is no peer to compare with."
+    peers = [line("far", 1e-6, 1.0, ours=False), line("near", 1e-6, 40.0, ours=False)]
+    ahead = replace(report, lines=with_ratios([*report.lines, *peers]))
+    assert ahead.least_lead(ensembles=False) == "The nearest: near, ours / theirs = 1.25."
+    assert ahead.least_lead(ensembles=True) == "There is no peer to compare with."
 
 
 def test_json_has_null_where_there_is_no_number(report: Report) -> None:

@@ -55,13 +55,14 @@ def run(*, quick: bool = False, threads: int | None = None, say: Say | None = No
         raise InputError(f"threads = {threads}, expected at least 1")
     told: Say = say if say is not None else lambda _line: None
     task = frozen()
+    here = machine.machine()
     lines, absent = table.measure(task, quick, 16 if quick else MEMBERS, told)
     figures = ensembles.measure(task, quick, threads or min(2, machine.cores()), told)
     compiling = {}
     for engine in [] if quick else own.engines():
         told(f"compiling, {engine} engine")
         compiling[engine] = _compiling(engine)
-    return Report(machine.machine(), quick, lines, absent, figures, compiling)
+    return Report(here, quick, lines, absent, figures, compiling)
 
 
 def _compiling(engine: str) -> float:

@@ -34,7 +34,7 @@ DISPLAY: Final = 1e-4
 EXACT: Final = 1e-8
 """Error that counts as exact, in strokes."""
 
-_TOLERANCES: Final = (1e-6, 3e-7, 1e-7, 1e-8, 1e-9, 3e-10, 1e-10, TOLERANCE)
+_TOLERANCES: Final = (1e-6, 3e-7, 1e-7, 1e-8, 1e-9, 3e-10, 1e-10, 5e-11, TOLERANCE)
 _STROBES: Final = 200
 
 

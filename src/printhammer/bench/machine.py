@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def machine() -> dict[str, str]:
-    """Return processor, cores, system and versions, in words."""
+    """Return processor, cores, how busy they are now, system and versions, in words."""
     import numba
     import numpy
 
@@ -28,9 +28,13 @@ def machine() -> dict[str, str]:
         wide = next(
             (f", {name}" for flag, name in (("avx512f", "AVX-512"), ("avx2", "AVX2")) if flag in flags), ""
         )
+    busy = "unknown"
+    with suppress(OSError, AttributeError):
+        busy = f"{os.getloadavg()[0]:.1f}"
     return {
         "processor": f"{processor} ({platform.machine()}{wide})",
         "cores": str(cores()),
+        "other load before the run": busy,
         "system": platform.system(),
         "Python": platform.python_version(),
         "printhammer": printhammer.__version__,

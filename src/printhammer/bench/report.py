@@ -115,6 +115,18 @@ class Report:
             )
         return rows
 
+    def least_lead(self, *, ensembles: bool) -> str:
+        """Say over which peer this program is ahead by least, or which it is behind."""
+        ratios = {
+            line.solver: line.ratio
+            for line in self.lines
+            if (line.members > 1) == ensembles and not math.isnan(line.ratio)
+        }
+        if not ratios:
+            return "There is no peer to compare with."
+        nearest = min(ratios, key=ratios.__getitem__)
+        return f"The nearest: {nearest}, ours / theirs = {ratios[nearest]:.3g}."
+
     def frames(self) -> Rows:
         """Return the rows of Figure 9."""
         return [
@@ -166,9 +178,11 @@ class Report:
             "## One run at a time",
             _SINGLE,
             _table(SOLVER_HEADS, self.solvers(ensembles=False)),
+            self.least_lead(ensembles=False),
             "## Ensembles",
             _ENSEMBLE,
             _table(SOLVER_HEADS, self.solvers(ensembles=True)),
+            self.least_lead(ensembles=True),
             _HOW,
         ]
         if self.absent:

@@ -65,7 +65,9 @@ def _show(report: Report, screen: Console) -> None:
     told = ", ".join(f"{name} {value}" for name, value in report.machine.items())
     screen.print(f"[dim]{escape(told)}[/dim]\n", soft_wrap=True)
     _table(screen, "One run at a time", SOLVER_HEADS, report.solvers(ensembles=False))
+    screen.print(escape(report.least_lead(ensembles=False)) + "\n", soft_wrap=True)
     _table(screen, "Ensembles, one thread", SOLVER_HEADS, report.solvers(ensembles=True))
+    screen.print(escape(report.least_lead(ensembles=True)) + "\n", soft_wrap=True)
     for name, reason in report.absent.items():
         screen.print(f"[yellow]absent[/yellow] {escape(name)}: {escape(reason)}", soft_wrap=True)
     figures = report.figures
