@@ -145,17 +145,35 @@ def part_at(pool: Any, i: int, time: float) -> float:
 
 @compiled
 def note_samples(
+    pool: Any, i: int, which: int, until: float, last: bool, fine: bool, slot: Any, grid: Any, x: Any, b: float
+) -> None:
+    """Take the samples of a lane's latest step before the time `until`, and with `last` at it.
+
+    With `fine`, samples take one more force to be exact to an order more.
+    """
+    m = int(slot[R.MEMBER])
+    sample = int(slot[R.NEXT_SAMPLE])
+    sixth = np.nan if fine and which != R.CONTACT_POOL else 0.0
+    while sample < grid.size and (grid[sample] < until or (last and grid[sample] == until)):
+        if sixth != sixth:  # noqa: PLR0124
+            sixth = sixth_term(pool, i, which)
+        x[m, sample] = position_in_step(pool, i, which, grid[sample], b, sixth)
+        sample += 1
+    slot[R.NEXT_SAMPLE] = sample
+    due = grid[sample] if sample < grid.size else np.inf
+    pool[R.SAMPLE * R.BLOCK + i] = min(due, slot[R.NEXT_TIME])
+
+
+@compiled
+def note_strobes(
     pool: Any,
     i: int,
     which: int,
     until: float,
     last: bool,
-    fine: bool,
     slot: Any,
-    grid: Any,
     times: Any,
     strobes: Any,
-    picture: Any,
     firings: Any,
     pieces: Any,
     replace: bool,
@@ -163,51 +181,31 @@ def note_samples(
     live: Drive,
     hammer: Hammer,
 ) -> None:
-    """Take the samples and strobes before the time `until`, at which the lane's step or part of it ended.
+    """Take the strobes of a lane's latest step before the time `until`, and with `last` at it.
 
-    With `last` also those at that time, at the end of a run. A strobe at a node waits for the node's mode.
-    With `fine`, samples take one more force to be exact to an order more.
+    A strobe at a node waits for the node's mode, which the next step has.
     """
-    sample, strobe = int(slot[R.NEXT_SAMPLE]), int(slot[R.NEXT_STROBE])
-    known = False
-    sixth = np.nan if fine and which != R.CONTACT_POOL else 0.0
-    while True:
-        due = times[strobe] if strobe < times.size else np.inf
-        is_sample = sample < grid.size and grid[sample] < due
-        if is_sample:
-            due = grid[sample]
-        if not (due < until or (last and due == until)):
-            break
-        if is_sample:
-            if sixth != sixth:  # noqa: PLR0124
-                sixth = sixth_term(pool, i, which)
-            picture[sample] = position_in_step(pool, i, which, due, hammer[POSITION], sixth)
-            sample += 1
-            continue
-        t0 = pool[R.OLD_T * R.BLOCK + i]
-        x0 = pool[R.OLD_X * R.BLOCK + i]
-        v0 = pool[R.OLD_V * R.BLOCK + i]
-        mode = MODE_OF[which]
-        kept = 0.0
-        if which == R.CONTACT_POOL:
-            kept = x0
-            x0 = hammer[POSITION] - kept * kept
-        elif which == R.UNLOADING_POOL:
-            kept = pool[R.PEAK * R.BLOCK + i]
-        if not known:
-            edges_at(t0, firings, pieces, replace, under_way, live)
-            known = True
-        x, v, _w = state_in_step(due, t0, x0, v0, mode, kept, hammer, live)
+    strobe = int(slot[R.NEXT_STROBE])
+    t0 = pool[R.OLD_T * R.BLOCK + i]
+    x0 = pool[R.OLD_X * R.BLOCK + i]
+    v0 = pool[R.OLD_V * R.BLOCK + i]
+    mode = MODE_OF[which]
+    kept = 0.0
+    if which == R.CONTACT_POOL:
+        kept = x0
+        x0 = hammer[POSITION] - kept * kept
+    elif which == R.UNLOADING_POOL:
+        kept = pool[R.PEAK * R.BLOCK + i]
+    edges_at(t0, firings, pieces, replace, under_way, live)
+    while strobe < times.size and (times[strobe] < until or (last and times[strobe] == until)):
+        x, v, _w = state_in_step(times[strobe], t0, x0, v0, mode, kept, hammer, live)
         strobes[strobe, 0] = x
         strobes[strobe, 1] = v
         strobes[strobe, 2] = mode
         strobes[strobe, 3] = kept if mode == UNLOADING else 0.0
         strobe += 1
-    slot[R.NEXT_SAMPLE], slot[R.NEXT_STROBE] = sample, strobe
-    due = times[strobe] if strobe < times.size else np.inf
-    if sample < grid.size and grid[sample] < due:
-        due = grid[sample]
-    pool[R.SAMPLE * R.BLOCK + i] = due
+    slot[R.NEXT_STROBE] = strobe
+    slot[R.NEXT_TIME] = times[strobe] if strobe < times.size else np.inf
 
 
 @compiled

@@ -4,7 +4,7 @@ All members in a pool are in the same mode. A row holds one quantity of all lane
 over lanes reads and writes side by side; the rows of a block lie together.
 """
 
-LANES = 128
+LANES = 256
 """Members that a thread has under way; capacity of every pool."""
 
 BLOCK = 16
@@ -105,7 +105,9 @@ CAREFUL = 9
 """Whether the next switch is located with steps of the plain kernel."""
 ATTEMPTS = 10
 SAVED_STEP = 11
-SLOT_WIDTH = 12
+NEXT_TIME = 12
+"""Time of the next strobe, infinity if there is none."""
+SLOT_WIDTH = 13
 
 # Events, to be added up.
 SWITCH = 1.0

@@ -19,6 +19,7 @@ from printhammer.kernel.modes import BACKSTOP, EDGE, FREE, NEAR_TOUCH, NO_SWITCH
 if TYPE_CHECKING:
     from printhammer.kernel.contact import contact_rate
     from printhammer.kernel.forces import Hammer, acceleration
+    from printhammer.kernel.lane_direct import LOOSE, land_directly
     from printhammer.kernel.lane_drive import add_up
     from printhammer.kernel.lane_events import (
         DONE,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
         locate,
         new_edge,
         note_samples,
+        note_strobes,
         place,
     )
     from printhammer.kernel.lane_landing import GOES_ON, aim, guess, land
@@ -45,7 +47,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.stretch import blank_states, clear_dots
 
 
-FINE = 1.0
+FINE = 1e-6
 """Allowance of the order 7 estimate below which samples are taken with care."""
 
 
@@ -160,7 +162,7 @@ def look_after(
     grid: Any,
     times: Any,
     strobes: Any,
-    picture: Any,
+    x_of: Any,
     dots: Any,
     want_dots: bool,
 ) -> int:
@@ -179,11 +181,15 @@ def look_after(
                 return STAYS
         else:
             switch, part = guess(pool, i, which, hammer)
-            if switch not in (NO_SWITCH, UNRESOLVED, NEAR_TOUCH) and part < 1.0:
-                aim(pool, i, slot, switch, part)
-                return STAYS
             t, x = pool[R.NEW_T * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
             v = pool[R.NEW_V * R.BLOCK + i]
+            if switch not in (NO_SWITCH, UNRESOLVED, NEAR_TOUCH) and part < 1.0:
+                good = False
+                if control[3] >= LOOSE:
+                    good, t, x, v = land_directly(pool, i, which, switch, part, hammer, control)
+                if not good:
+                    aim(pool, i, slot, switch, part)
+                    return STAYS
         if switch == NEAR_TOUCH:
             slot[R.CAREFUL] = 0.0
             edges_at(pool[i], firings, pieces, replace, under_way, live)
@@ -198,25 +204,24 @@ def look_after(
             pool[R.A * R.BLOCK + i] = pool[R.NEW_A * R.BLOCK + i]
     done = t >= slot[R.END] and switch in (NO_SWITCH, EDGE)
     if pool[R.SAMPLE * R.BLOCK + i] <= t:
-        note_samples(
-            pool,
-            i,
-            which,
-            t,
-            done,
-            control[3] < FINE,
-            slot,
-            grid,
-            times,
-            strobes,
-            picture,
-            firings,
-            pieces,
-            replace,
-            under_way,
-            live,
-            hammer,
-        )
+        if slot[R.NEXT_TIME] <= t:
+            note_strobes(
+                pool,
+                i,
+                which,
+                t,
+                done,
+                slot,
+                times,
+                strobes,
+                firings,
+                pieces,
+                replace,
+                under_way,
+                live,
+                hammer,
+            )
+        note_samples(pool, i, which, t, done, control[3] < FINE, slot, grid, x_of, hammer[POSITION])
     if done:
         close_member(pool, i, which, slot, dots, hammer)
         return DONE
@@ -332,6 +337,8 @@ def lanes(
             slot[R.MEMBER] = m
             slot[R.NEXT_SAMPLE] = 0
             slot[R.NEXT_STROBE] = 0
+            first = strobe_starts[m]
+            slot[R.NEXT_TIME] = strobe_times[first] if first < strobe_starts[m + 1] else math.inf
             target = begin_member(
                 stage,
                 0,
@@ -372,6 +379,10 @@ def lanes(
                 slot = slots[number]
                 m = int(slot[R.MEMBER])
                 row = hammer_of[m]
+                if pool[R.EVENT * R.BLOCK + i] == R.SAMPLED and slot[R.NEXT_TIME] > pool[i]:
+                    fine = controls[row, 3] < FINE
+                    note_samples(pool, i, p, pool[i], False, fine, slot, grid, x, hammers[row, POSITION])
+                    continue
                 control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
                 wave = waveform_of[m]
                 own_times = strobe_times[strobe_starts[m] : strobe_starts[m + 1]]
@@ -392,7 +403,7 @@ def lanes(
                     grid,
                     own_times,
                     own_strobes,
-                    x[m],
+                    x,
                     dots[firing_starts[m] : firing_starts[m + 1]],
                     want_dots,
                 )

@@ -27,6 +27,7 @@ _SOURCES = (
     "lane_steps",
     "lane_events",
     "lane_landing",
+    "lane_direct",
     "lanes",
     "specialise_lanes",
 )
@@ -88,7 +89,7 @@ def specialise_lanes(laws: Laws, kinds: LaneKinds) -> Kernel:
             if hasattr(value, "py_func") and (name.startswith("lane_") or name.endswith("_block"))
         }
     )
-    for name in ("lane_events", "lane_landing"):
+    for name in ("lane_events", "lane_landing", "lane_direct"):
         events = module(name, scalar, "lanes")
         scalar.update(
             {
