@@ -1,6 +1,8 @@
 """Sweeps: each member is what `simulate` makes of it, whatever the engine; failures are rows."""
 
 import math
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -216,3 +218,38 @@ def test_an_interrupt_keeps_the_blocks_that_are_done(
     ph.sweep(spec_file(), out)
     ph.sweep(spec_file(), tmp_path / "whole.zarr")
     assert bytes_of(out) == bytes_of(tmp_path / "whole.zarr")
+
+
+def test_sweep_stays_a_function_when_its_modules_are_imported(tmp_path: Path) -> None:
+    code = "import printhammer.sweep.spec, printhammer as ph; print(type(ph.sweep).__name__)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "function"
+
+
+def test_tables_that_change_meanwhile_are_told(
+    tmp_path: Path, hammer: ph.Hammer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "pulse.csv").write_text("time [us],current [A]\n0,0\n100,1.2\n400,0\n", "utf-8")
+    hammer.replace("waveform", {"shape": "sampled", "file": str(tmp_path / "pulse.csv")}).save(
+        tmp_path / "sampled.toml"
+    )
+    spec = {
+        "format": 1,
+        "hammer": str(tmp_path / "sampled.toml"),
+        "chunk": 1,
+        "drive": {"train": {"rate": "1 kHz", "pulses": 1}},
+        "axis": [{"key": "mass", "values": ["3 g", "3.1 g", "3.2 g"]}],
+        "outputs": {"dots": ["struck"]},
+    }
+
+    def meanwhile(done: float, before: int, members: int) -> None:
+        if done >= 1:
+            (tmp_path / "pulse.csv").write_text("time [us],current [A]\n0,0\n100,1.3\n400,0\n", "utf-8")
+
+    with pytest.raises(ph.InputError, match="a table that it names has changed since the sweep began"):
+        ph.sweep(spec, tmp_path / "out.zarr", threads=1, progress=meanwhile)
+    with pytest.raises(ph.InputError, match="the store was made with hammer fingerprint"):
+        ph.sweep(spec, tmp_path / "out.zarr")
+    assert set(np.unique(open_store(tmp_path / "out.zarr").status.values)) <= {-1, 0}
