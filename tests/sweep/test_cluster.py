@@ -26,11 +26,13 @@ Content = Callable[[Path], dict[str, bytes]]
 
 # Run by each worker when it starts: one member of the grid kills whoever works on it.
 DEADLY = """
-import os, signal
+import os, signal, time
 from printhammer.sweep import cluster, work
 
 def deadly(base, outputs, rows, **options):
     if any(round(row[0]) == {rate} and round(row[1]) == {stiffness} for row in rows):
+        # A nanny whose worker dies while it is still being started gives up.
+        time.sleep(1.0)
         os.kill(os.getpid(), signal.SIGKILL)
     return work.run_chunk(base, outputs, rows, **options)
 

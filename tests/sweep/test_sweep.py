@@ -13,9 +13,16 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
-from printhammer.store import open_store
+from printhammer.store import Store, open_store
+from printhammer.sweep.members import check_tables
 from printhammer.sweep.outputs import DOTS, STATUSES
-from printhammer.waveforms import HalfSine
+from printhammer.sweep.plan import make_plan
+from printhammer.sweep.spec import read_spec
+from printhammer.sweep.work import run_chunk
+from printhammer.waveforms import Rectangle
+
+# So that two integrators agree although bounces amplify what they differ by.
+TIGHT = 1e-13
 
 ALL = {
     "dots": "all",
@@ -27,13 +34,13 @@ ALL = {
 
 
 def run(tmp_path: Path, **spec: Any) -> xr.Dataset:
-    whole = {"format": 1, "hammer": "hendriks-1983", "outputs": ALL, **spec}
+    whole = {"format": 1, "hammer": "hendriks-1983", "outputs": ALL, "tolerance": TIGHT, **spec}
     return ph.sweep(whole, tmp_path / "out.zarr")
 
 
-def close(found: Any, wanted: Any) -> bool:
-    """Compare numbers that the same steps give in machine code compiled on its own."""
-    return np.allclose(found, wanted, rtol=1e-10, atol=0.0, equal_nan=True)
+def close(found: Any, wanted: Any, scale: float = 0.0) -> bool:
+    """Compare what two integrators make of the same member, where necessary on a scale of its own."""
+    return np.allclose(found, wanted, rtol=1e-7, atol=1e-7 * scale, equal_nan=True)
 
 
 def check_member(row: xr.Dataset, motion: ph.Motion) -> None:
@@ -50,19 +57,19 @@ def check_member(row: xr.Dataset, motion: ph.Motion) -> None:
     count = len(times)
     assert not row.fired[count:].any()
     assert row.strobe_t[:count].values.tolist() == times.tolist()
-    assert close(row.strobe_x[:count], x)
-    assert close(row.strobe_v[:count], v)
+    assert close(row.strobe_x[:count], x, 1e-4)
+    assert close(row.strobe_v[:count], v, 1.0)
     assert row.strobe_x[count:].isnull().all()
     grid = row.time.values[row.time.values <= motion.end]
     # Stored as float32.
-    assert np.allclose(row.displacement[: len(grid)], motion.at(grid)[0], rtol=1e-7, atol=0.0)
+    assert np.allclose(row.displacement[: len(grid)], motion.at(grid)[0], rtol=2e-7, atol=0.0)
     assert row.displacement[len(grid) :].isnull().all()
     struck = [dot for dot in motion.dots if dot.struck]
     flights = [dot.flight_time for dot in struck]
     assert int(row.struck_dots) == len(struck)
     assert int(row.lost_dots) == len(motion.dots) - len(struck)
     assert close(row.flight_time_mean, np.mean(flights))
-    assert close(row.flight_time_spread, max(flights) - min(flights))
+    assert close(row.flight_time_spread, max(flights) - min(flights), 1e-4)
     assert close(row.peak_displacement, motion.maxima[1].max())
     assert close(row.coil_work, motion.energy.coil_work)
     assert close(row.pack_loss, motion.energy.pack_loss)
@@ -86,11 +93,11 @@ def test_a_grid_over_hammer_and_drive(tmp_path: Path, hammer: ph.Hammer) -> None
                 row = found.sel(pack_stiffness=stiffness, period=period, pulses=pulses)
                 member = hammer.replace("pack.stiffness", float(stiffness))
                 drive = ph.PulseTrain(member.waveform, period=float(period), pulses=int(pulses))
-                motion = ph.simulate(member, drive)
+                motion = ph.simulate(member, drive, tolerance=TIGHT)
                 check_member(row, motion)
                 x, v = motion.at(motion.end)
-                assert close(row.final_x, x)
-                assert close(row.final_v, v)
+                assert close(row.final_x, x, 1e-4)
+                assert close(row.final_v, v, 1.0)
 
 
 def test_a_hypercube_over_hammer_drive_and_state(tmp_path: Path, hammer: ph.Hammer) -> None:
@@ -107,7 +114,6 @@ def test_a_hypercube_over_hammer_drive_and_state(tmp_path: Path, hammer: ph.Hamm
         duration="2 ms",
         drive={"overlap": "replace", "times": {"at": ["0 s", "700 us"]}},
         axis=axes,
-        tolerance=1e-10,
     )
     assert found.status.dims == ("member",)
     assert {"waveform_amplitude", "at_1", "state_v", "member"} <= set(found.coords)
@@ -116,17 +122,19 @@ def test_a_hypercube_over_hammer_drive_and_state(tmp_path: Path, hammer: ph.Hamm
         other = hammer.replace("waveform.amplitude", float(row.waveform_amplitude))
         drive = ph.PulseTrain(other.waveform, at=[0.0, float(row.at_1)], overlap="replace")
         state = (ph.rest_state(other), float(row.state_v))
-        motion = ph.simulate(other, drive, duration=2e-3, state=state, tolerance=1e-10)
+        motion = ph.simulate(other, drive, duration=2e-3, state=state, tolerance=TIGHT)
         check_member(row, motion)
 
 
 def test_the_waveform_of_the_drive_takes_the_place_of_the_hammers(tmp_path: Path, hammer: ph.Hammer) -> None:
-    own = {"shape": "half-sine", "amplitude": "1.2 A"}
-    widths = {"key": "waveform.width", "values": ["350 us", "400 us"]}
+    own = {"shape": "rectangle", "amplitude": "1.3 A", "rise": "60 us", "decay": "50 us"}
+    widths = {"key": "waveform.width", "values": ["250 us", "300 us"]}
     found = run(tmp_path, drive={"train": {"pulses": 1, "rate": "1 kHz"}, "waveform": own}, axis=[widths])
     for width in found.waveform_width.values:
-        drive = ph.PulseTrain(HalfSine(amplitude=1.2, width=float(width)), rate=1000.0, pulses=1)
-        check_member(found.sel(waveform_width=width), ph.simulate(hammer, drive))
+        wave = Rectangle(amplitude=1.3, width=float(width), rise=60e-6, decay=50e-6)
+        motion = ph.simulate(hammer, ph.PulseTrain(wave, rate=1000.0, pulses=1), tolerance=TIGHT)
+        assert motion.dots[0].struck
+        check_member(found.sel(waveform_width=width), motion)
 
 
 def test_members_that_fail_are_rows(tmp_path: Path, hammer: ph.Hammer) -> None:
@@ -228,9 +236,7 @@ def test_sweep_stays_a_function_when_its_modules_are_imported(tmp_path: Path) ->
     assert done.stdout.strip() == "function"
 
 
-def test_tables_that_change_meanwhile_are_told(
-    tmp_path: Path, hammer: ph.Hammer, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_tables_that_change_meanwhile_are_told(tmp_path: Path, hammer: ph.Hammer) -> None:
     (tmp_path / "pulse.csv").write_text("time [us],current [A]\n0,0\n100,1.2\n400,0\n", "utf-8")
     hammer.replace("waveform", {"shape": "sampled", "file": str(tmp_path / "pulse.csv")}).save(
         tmp_path / "sampled.toml"
@@ -238,18 +244,15 @@ def test_tables_that_change_meanwhile_are_told(
     spec = {
         "format": 1,
         "hammer": str(tmp_path / "sampled.toml"),
-        "chunk": 1,
         "drive": {"train": {"rate": "1 kHz", "pulses": 1}},
         "axis": [{"key": "mass", "values": ["3 g", "3.1 g", "3.2 g"]}],
         "outputs": {"dots": ["struck"]},
     }
-
-    def meanwhile(done: float, before: int, members: int) -> None:
-        if done >= 1:
-            (tmp_path / "pulse.csv").write_text("time [us],current [A]\n0,0\n100,1.3\n400,0\n", "utf-8")
-
+    before = make_plan(read_spec(spec))
+    check_tables(before.spec.base)
+    (tmp_path / "pulse.csv").write_text("time [us],current [A]\n0,0\n100,1.3\n400,0\n", "utf-8")
     with pytest.raises(ph.InputError, match="a table that it names has changed since the sweep began"):
-        ph.sweep(spec, tmp_path / "out.zarr", threads=1, progress=meanwhile)
+        run_chunk(before.spec.base, before.spec.outputs, before.rows([0]))
+    Store(tmp_path / "out.zarr", before.layout(), "now").close()
     with pytest.raises(ph.InputError, match="the store was made with hammer fingerprint"):
         ph.sweep(spec, tmp_path / "out.zarr")
-    assert set(np.unique(open_store(tmp_path / "out.zarr").status.values)) <= {-1, 0}
