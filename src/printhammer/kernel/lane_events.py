@@ -100,7 +100,7 @@ def sixth_term(pool: Any, i: int, which: int) -> float:
 
 
 @compiled
-def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth: float) -> float:
+def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth: float, fine: bool) -> float:
     """Return the displacement [m] at a time inside the step that a lane took last."""
     x0, x1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
@@ -110,6 +110,12 @@ def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth
         u = (time - pool[R.OLD_T * R.BLOCK + i]) / h
         bump = u * (u - 1.0)
         return quintic(u, h, x0, v0, a0, x1, v1, a1) + sixth * bump * bump * bump
+    if not fine and x1 > 0.5 * x0 and x0 > 0.5 * x1:
+        # Away from the end of the contact the displacement is smooth in time as well.
+        t0 = pool[R.OLD_T * R.BLOCK + i]
+        h = pool[R.NEW_T * R.BLOCK + i] - t0
+        a0, a1 = 0.5 * a0 / x0, 0.5 * a1 / x1
+        return quintic((time - t0) / h, h, b - x0 * x0, v0, a0, b - x1 * x1, v1, a1)
     part = part_at(pool, i, time)
     w = quintic(part, h, x0, -v0, -a0, x1, -v1, -a1)
     return b - w * w
@@ -145,7 +151,16 @@ def part_at(pool: Any, i: int, time: float) -> float:
 
 @compiled
 def note_samples(
-    pool: Any, i: int, which: int, until: float, last: bool, fine: bool, slot: Any, grid: Any, x: Any, b: float
+    pool: Any,
+    i: int,
+    which: int,
+    until: float,
+    last: bool,
+    fine: bool,
+    slot: Any,
+    grid: Any,
+    x: Any,
+    b: float,
 ) -> None:
     """Take the samples of a lane's latest step before the time `until`, and with `last` at it.
 
@@ -157,7 +172,7 @@ def note_samples(
     while sample < grid.size and (grid[sample] < until or (last and grid[sample] == until)):
         if sixth != sixth:  # noqa: PLR0124
             sixth = sixth_term(pool, i, which)
-        x[m, sample] = position_in_step(pool, i, which, grid[sample], b, sixth)
+        x[m, sample] = position_in_step(pool, i, which, grid[sample], b, sixth, fine)
         sample += 1
     slot[R.NEXT_SAMPLE] = sample
     due = grid[sample] if sample < grid.size else np.inf

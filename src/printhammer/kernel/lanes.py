@@ -19,7 +19,6 @@ from printhammer.kernel.modes import BACKSTOP, EDGE, FREE, NEAR_TOUCH, NO_SWITCH
 if TYPE_CHECKING:
     from printhammer.kernel.contact import contact_rate
     from printhammer.kernel.forces import Hammer, acceleration
-    from printhammer.kernel.lane_direct import LOOSE, land_directly
     from printhammer.kernel.lane_drive import add_up
     from printhammer.kernel.lane_events import (
         DONE,
@@ -184,12 +183,8 @@ def look_after(
             t, x = pool[R.NEW_T * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
             v = pool[R.NEW_V * R.BLOCK + i]
             if switch not in (NO_SWITCH, UNRESOLVED, NEAR_TOUCH) and part < 1.0:
-                good = False
-                if control[3] >= LOOSE:
-                    good, t, x, v = land_directly(pool, i, which, switch, part, hammer, control)
-                if not good:
-                    aim(pool, i, slot, switch, part)
-                    return STAYS
+                aim(pool, i, slot, switch, part)
+                return STAYS
         if switch == NEAR_TOUCH:
             slot[R.CAREFUL] = 0.0
             edges_at(pool[i], firings, pieces, replace, under_way, live)

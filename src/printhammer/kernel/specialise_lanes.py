@@ -27,7 +27,6 @@ _SOURCES = (
     "lane_steps",
     "lane_events",
     "lane_landing",
-    "lane_direct",
     "lanes",
     "specialise_lanes",
 )
@@ -89,7 +88,7 @@ def specialise_lanes(laws: Laws, kinds: LaneKinds) -> Kernel:
             if hasattr(value, "py_func") and (name.startswith("lane_") or name.endswith("_block"))
         }
     )
-    for name in ("lane_events", "lane_landing", "lane_direct"):
+    for name in ("lane_events", "lane_landing"):
         events = module(name, scalar, "lanes")
         scalar.update(
             {
