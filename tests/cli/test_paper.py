@@ -13,7 +13,7 @@ def quick_report(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = report.write_report
 
     def few(hammer, out, **options):
-        return whole(hammer, out, claims=["geometry", "settle_out", "poincare"], figures=[2], **options)
+        return whole(hammer, out, claims=["geometry", "settle_out", "print_force"], figures=[2], **options)
 
     monkeypatch.setattr(report, "write_report", few)
 
