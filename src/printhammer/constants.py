@@ -13,6 +13,7 @@ is no context).
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
@@ -141,6 +142,7 @@ def quantity(
     )
 
 
+@cache
 def quantities(model: type[BaseModel]) -> dict[str, Quantity]:
     """List the physical constants of a model class, field name to `Quantity`, in order of declaration."""
     found: dict[str, Quantity] = {}

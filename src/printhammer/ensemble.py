@@ -7,21 +7,21 @@ in the ensemble, nor on the number of threads.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
-from printhammer.ensemble_group import Group, Job
+from printhammer.ensemble_group import MOST_COLUMNS, Group, Job
 from printhammer.errors import InputError
 from printhammer.hammer import Hammer
 from printhammer.kernel.modes import MODE_NAMES, OK, STATUS_NAMES
-from printhammer.problem import TOLERANCE, laws_of
+from printhammer.problem import TOLERANCE, check_tolerance, laws_of
+from printhammer.start import check_branch, initial_state
 from printhammer.threads import PIECES_A_THREAD, in_threads, thread_count
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import numpy.typing as npt
 
     from printhammer.drive import Drive
@@ -30,7 +30,10 @@ if TYPE_CHECKING:
     from printhammer.segments import FloatArray
     from printhammer.threads import Progress
 
-__all__ = ["MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
+__all__ = ["DISPLAY_TOLERANCE", "MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
+
+DISPLAY_TOLERANCE: Final = 5e-7
+"""Tolerance for pictures: displacements are good to about 1e-4 of the stroke."""
 
 Engine = Literal["auto", "plain", "lanes"]
 ENGINES: Final = get_args(Engine)
@@ -168,14 +171,16 @@ class Ensemble:
         states: npt.ArrayLike | None = None,
         tolerance: float = TOLERANCE,
     ) -> None:
-        if not 1e-15 <= tolerance <= 1e-2:
-            raise InputError(f"tolerance = {tolerance!r}, expected a number from 1e-15 to 1e-2")
+        check_tolerance(tolerance)
         self.tolerance = tolerance
         one_hammer, one_drive = isinstance(hammers, Hammer), not isinstance(drives, list | tuple)
         many_hammers = [hammers] if isinstance(hammers, Hammer) else list(hammers)
         many_drives: list[Drive] = list(drives) if isinstance(drives, list | tuple) else [drives]  # type: ignore[list-item]
-        moments = np.atleast_1d(np.asarray(ends, dtype=np.float64))
-        rows = None if states is None else np.asarray(states, dtype=np.float64)
+        moments = _numbers(ends, "ends")
+        if moments.ndim > 1:
+            raise InputError(f"ends: an array of shape {moments.shape}, expected one number for each member")
+        moments = np.atleast_1d(moments)
+        rows = None if states is None else _numbers(states, "states")
         counts = {
             "hammers": 1 if one_hammer else len(many_hammers),
             "drives": 1 if one_drive else len(many_drives),
@@ -186,8 +191,9 @@ class Ensemble:
         for name, count in counts.items():
             if count not in (1, self.size):
                 raise InputError(f"{name}: {count} are given, expected 1 or {self.size}")
-        if not (np.isfinite(moments) & (moments > 0.0)).all():
-            raise InputError(f"ends = {moments[~(moments > 0.0)][:1]} s, expected positive numbers")
+        wrong = ~(np.isfinite(moments) & (moments > 0.0))
+        if wrong.any():
+            raise InputError(f"ends = {moments[wrong][0]!r} s, expected positive numbers")
         self.hammers: list[Hammer] = many_hammers * (self.size if len(many_hammers) == 1 else 1)
         self.drives: list[Drive] = many_drives * (self.size if len(many_drives) == 1 else 1)
         self.ends = np.broadcast_to(moments, (self.size,)).astype(np.float64)
@@ -206,9 +212,16 @@ class Ensemble:
                     rest[id(hammer)] = rest_state(hammer)
                 full[i, 1] = rest[id(hammer)]
             return full
-        if rows.shape[-1] not in (2, 4) or rows.ndim > 2 or not np.isfinite(rows).all():
-            raise InputError("states: expected rows of two finite numbers, or of four with mode and memory")
+        if rows.ndim not in (1, 2) or rows.shape[-1] not in (2, 4):
+            raise InputError(
+                f"states: an array of shape {rows.shape}, expected rows of displacement and velocity, or of"
+                " these with branch and memory"
+            )
         full[:, 1 : 1 + rows.shape[-1]] = rows
+        for hammer, row in zip(self.hammers, full, strict=True):
+            initial_state(hammer, (float(row[1]), float(row[2])))
+            if rows.shape[-1] == 4:
+                check_branch(hammer, row[1:].tolist())
         return full
 
     @property
@@ -324,7 +337,7 @@ class Ensemble:
         )
 
     def _gathered(self, parts: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        whole = np.empty(self.size, parts[0].dtype) if parts else np.empty(0)
+        whole = np.empty(self.size, parts[0].dtype if parts else np.int64)
         for group, part in zip(self.groups, parts, strict=True):
             whole[group.members] = part
         return whole
@@ -334,7 +347,7 @@ class Ensemble:
         tables = [getattr(job, which) for job in jobs]
         starts = [getattr(job, f"{which}_starts") for job in jobs]
         most = max((int(np.diff(start).max(initial=0)) for start in starts), default=0)
-        whole = np.full((self.size, most, tables[0].shape[1] if tables else 0), np.nan)
+        whole = np.full((self.size, most, tables[0].shape[1] if tables else MOST_COLUMNS), np.nan)
         for group, table, start in zip(self.groups, tables, starts, strict=True):
             counts = np.diff(start)
             column = np.arange(len(table)) - np.repeat(start[:-1], counts)
@@ -382,6 +395,8 @@ class Ensemble:
             if strobes != "firings":
                 raise InputError(f'strobes = {strobes!r}, expected "firings" or an array for each member')
             return [np.asarray(drive.times, dtype=np.float64) for drive in self.drives]
+        if not isinstance(strobes, Sequence | np.ndarray):
+            raise InputError(f'strobes = {strobes!r}, expected "firings" or an array for each member')
         if len(strobes) != self.size:
             raise InputError(f"strobes: {len(strobes)} arrays, expected {self.size}")
         return [_ascending(moment, "strobes") for moment in strobes]
@@ -402,8 +417,15 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
     in_threads(works, sizes, threads, progress, lengths)
 
 
+def _numbers(values: npt.ArrayLike, name: str) -> FloatArray:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {values!r}, expected numbers") from None
+
+
 def _ascending(times: npt.ArrayLike, name: str) -> FloatArray:
-    found = np.array(times, dtype=np.float64).reshape(-1)
+    found = _numbers(times, name).reshape(-1)
     if not np.isfinite(found).all() or (np.diff(found) < 0.0).any() or (found < 0.0).any():
         raise InputError(f"{name}: expected ascending numbers, not negative")
     return found

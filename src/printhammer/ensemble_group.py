@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _NODES: Final = 2048
 _CONTACTS: Final = 256
+MOST_COLUMNS: Final = 6
 _DOT_WIDTH: Final = 6
 _STROBE_WIDTH: Final = 4
 _PIECE: Final = 4 * lane_layout.LANES

@@ -70,6 +70,18 @@ def fresh_carry(pause_after: float = math.inf) -> FloatArray:
     return array
 
 
+def check_tolerance(tolerance: object) -> None:
+    """Refuse a tolerance with which the integrator does not work.
+
+    Raises
+    ------
+    InputError
+        Not a number from 1e-15 to 1e-2.
+    """
+    if not (isinstance(tolerance, float | int) and 1e-15 <= tolerance <= 1e-2):
+        raise InputError(f"tolerance = {tolerance!r}, expected a number from 1e-15 to 1e-2")
+
+
 def laws_of(hammer: Hammer, drive: Drive) -> Laws:
     """Return the laws of the parts of a hammer under a drive, for the kernel."""
     return Laws(
@@ -183,7 +195,8 @@ class Problem:
 
         return specialise(self.laws)
 
-    def _drive_arrays(self) -> tuple[Any, ...]:
+    def drive_arrays(self) -> tuple[Any, ...]:
+        """Return what the kernel needs of the drive, with working space of its own."""
         count = self.firings.size
         return (self.firings, self.pieces, self.replace, np.zeros(count, np.int64), np.zeros(1 + 7 * count))
 
@@ -194,7 +207,7 @@ class Problem:
         capacity = _NODES + int(_NODES_A_FLIGHT * flights)
         contact_capacity = _CONTACTS + int(flights)
         while True:
-            firings, pieces, replace, under_way, live = self._drive_arrays()
+            firings, pieces, replace, under_way, live = self.drive_arrays()
             nodes = np.empty((capacity, 5))
             contacts = np.empty((contact_capacity, 7))
             status, used, touched, steps = self.kernel.run(
@@ -223,13 +236,13 @@ class Problem:
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
         """Return states and forces, shape (n, 9), at ascending times, s; see the kernel's `resample`."""
         out = np.empty((times.size, 9))
-        self.kernel.resample(times, record.nodes, *self._drive_arrays(), self.constants, out)
+        self.kernel.resample(times, record.nodes, *self.drive_arrays(), self.constants, out)
         return out
 
     def peaks(self, record: Record) -> FloatArray:
         """Return time, depth and force, shape (m, 3), at the peaks of all contacts."""
         out = np.empty((len(record.contacts), 3))
-        self.kernel.peaks(record.contacts, record.nodes, *self._drive_arrays(), self.constants, out)
+        self.kernel.peaks(record.contacts, record.nodes, *self.drive_arrays(), self.constants, out)
         return out
 
     def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
@@ -240,7 +253,7 @@ class Problem:
             np.ascontiguousarray(starts, np.float64),
             np.ascontiguousarray(ends, np.float64),
             record.nodes,
-            *self._drive_arrays(),
+            *self.drive_arrays(),
             self.constants,
             out,
         )

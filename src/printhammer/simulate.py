@@ -9,7 +9,8 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.motion import Motion
-from printhammer.problem import TOLERANCE, Problem
+from printhammer.problem import TOLERANCE, Problem, check_tolerance
+from printhammer.start import initial_state
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -81,10 +82,9 @@ def simulate(
     """
     if scheme not in SCHEMES:
         raise InputError(f"scheme = {scheme!r}, expected one of {', '.join(SCHEMES)}")
-    if not 1e-15 <= tolerance <= 1e-2:
-        raise InputError(f"tolerance = {tolerance!r}, expected a number from 1e-15 to 1e-2")
+    check_tolerance(tolerance)
     end = _end(drive, duration)
-    start = _state(hammer, state)
+    start = initial_state(hammer, state)
     if scheme == "default":
         problem = Problem(hammer, drive, start, 0.0, tolerance)
     else:
@@ -104,29 +104,6 @@ def announce_compiling(callback: Callable[[str], None] | None) -> None:
     from printhammer.kernel import specialise
 
     specialise.announce = callback
-
-
-def _state(hammer: Hammer, state: tuple[float, float] | None) -> tuple[float, float]:
-    if state is None:
-        from printhammer.equilibrium import rest_state
-
-        return rest_state(hammer), 0.0
-    x, v = (float(number) for number in state)
-    if not (math.isfinite(x) and math.isfinite(v)):
-        raise InputError(
-            f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
-        )
-    if hammer.magnet is not None:
-        low, high = hammer.magnet.domain
-        if not low <= x <= high:
-            raise InputError(
-                f"state = {state!r}, expected a displacement from {low:.9g} m to {high:.9g} m, where the law"
-                " of the magnet holds"
-            )
-    rigid = hammer.backstop is not None and hammer.backstop.law == "rigid"
-    if rigid and hammer.position is not None and x < hammer.position:
-        raise InputError(f"state = {state!r}, expected a displacement not behind the rigid backstop")
-    return x, v
 
 
 def _end(drive: Drive, duration: float | str | None) -> float:

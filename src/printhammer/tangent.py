@@ -19,7 +19,7 @@ from printhammer.hammer import Hammer
 from printhammer.kernel import carry
 from printhammer.kernel.modes import HELD_UNLOADING, OK, PAUSED, RELOADING, STATUS_NAMES, UNLOADING
 from printhammer.problem import MAX_STEPS, TOLERANCE, Problem
-from printhammer.simulate import _state
+from printhammer.start import initial_state
 from printhammer.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
@@ -337,7 +337,7 @@ def standard_error(series: npt.ArrayLike) -> float:
 def _problem(hammer: Hammer, drive: Drive, state: tuple[float, float] | None, tolerance: float) -> Problem:
     if not 1e-15 <= tolerance <= 1e-2:
         raise InputError(f"tolerance = {tolerance!r}, expected a number from 1e-15 to 1e-2")
-    return Problem(hammer, drive, _state(hammer, state), 0.0, tolerance)
+    return Problem(hammer, drive, initial_state(hammer, state), 0.0, tolerance)
 
 
 def _strobes(
@@ -398,8 +398,8 @@ def _stretches(
     nodes, contacts = np.empty((capacity, 5)), np.empty((_CONTACTS, 7))
     state = np.zeros(carry.SIZE)
     state[carry.PAUSE_AFTER] = capacity // 2
-    arrays: tuple[Any, ...] = problem._drive_arrays()
-    own: tuple[Any, ...] = problem._drive_arrays()
+    arrays: tuple[Any, ...] = problem.drive_arrays()
+    own: tuple[Any, ...] = problem.drive_arrays()
     status = PAUSED
     while status == PAUSED:
         status, used, _touched, _steps = problem.kernel.run(

@@ -96,7 +96,7 @@ def sixth_term(pool: Any, i: int, which: int) -> float:
     a = lane_acceleration(pool, i, t, middle, 0.0, MODE_OF[which], memory)
     # The second derivative of the quintic in the middle, in the same unit.
     bend = 1.5 * h * (v1 - v0) - 0.25 * h * h * (a0 + a1)
-    return (a * h * h - bend) / 0.375
+    return float((a * h * h - bend) / 0.375)
 
 
 @compiled
@@ -109,7 +109,7 @@ def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth
     if which != R.CONTACT_POOL:
         u = (time - pool[R.OLD_T * R.BLOCK + i]) / h
         bump = u * (u - 1.0)
-        return quintic(u, h, x0, v0, a0, x1, v1, a1) + sixth * bump * bump * bump
+        return float(quintic(u, h, x0, v0, a0, x1, v1, a1) + sixth * bump * bump * bump)
     if not fine and x1 > 0.5 * x0 and x0 > 0.5 * x1:
         # Away from the end of the contact the displacement is smooth in time as well.
         t0 = pool[R.OLD_T * R.BLOCK + i]

@@ -2,8 +2,8 @@
 
 The laws of the parts are compiled for lanes with this module in the place of :mod:`math`. Sources: Cody and
 Waite, Software Manual for the Elementary Functions (1980), for the reductions; the polynomials are Taylor and
-atanh series, long enough for the reduced range. Relative errors stay below 3e-15; what `math` would refuse
-gives NaN or an infinity.
+atanh series, long enough for the reduced range. Relative errors: exp and log 2e-16, pow 2e-16 (1 + |y ln x|);
+sin and cos have that of rounding their argument. What `math` would refuse gives NaN or an infinity.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def pow(x: float, y: float) -> float:
 def sin(x: float) -> float:
     """Return the sine, for arguments up to some thousands."""
     n = (x * 0.3183098861837907 + _ROUND) - _ROUND
-    r = ((x - n * 3.1415926218032837) - n * 3.178650954705639e-08) - n * 1.2246467991473532e-16
+    r = (x - n * 3.1415926218032837) - n * 3.178650954705639e-08
     z = r * r
     # Taylor to r^21, |r| <= pi/2: remainder below 2e-18.
     p = 1.9572941063391263e-20

@@ -15,6 +15,7 @@ import importlib
 import importlib.util
 import inspect
 import sys
+import threading
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
@@ -144,7 +145,9 @@ def law_bindings(laws: Laws) -> tuple[dict[str, Any], bytes]:
     return bindings, text
 
 
-@functools.cache
+one_at_a_time = threading.RLock()
+
+
 def specialise(laws: Laws) -> Kernel:
     """Return the kernel compiled for `laws`; the same object for equal laws.
 
@@ -163,6 +166,12 @@ def specialise(laws: Laws) -> Kernel:
     ImportError
         If a module named in `laws` cannot be imported.
     """
+    with one_at_a_time:
+        return _specialised(laws)
+
+
+@functools.cache
+def _specialised(laws: Laws) -> Kernel:
     import numba
 
     bindings, text = law_bindings(laws)

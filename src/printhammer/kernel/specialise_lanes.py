@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel import lane_layout, lane_math
 from printhammer.kernel.compiling import all_inlined, inlined
-from printhammer.kernel.specialise import Kernel, execute, law_bindings, specialise
+from printhammer.kernel.specialise import Kernel, execute, law_bindings, one_at_a_time, specialise
 
 if TYPE_CHECKING:
     from printhammer.kernel.laws import Laws
@@ -49,12 +49,17 @@ def suits(laws: Laws) -> bool:
     )
 
 
-@functools.cache
 def specialise_lanes(laws: Laws, kinds: LaneKinds) -> Kernel:
     """Return the kernel for lanes, compiled for `laws` and the pieces that a drive consists of.
 
     Its entry point is `lanes`, see :mod:`printhammer.kernel.lanes`.
     """
+    with one_at_a_time:
+        return _specialised(laws, kinds)
+
+
+@functools.cache
+def _specialised(laws: Laws, kinds: LaneKinds) -> Kernel:
     plain = specialise(laws)
     here = Path(__file__).parent
     sources = hashlib.sha256(repr((plain.digest, kinds)).encode())

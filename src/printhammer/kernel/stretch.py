@@ -12,13 +12,13 @@ import numpy as np
 
 from printhammer.kernel.compiling import compiled
 from printhammer.kernel.layout import FRONT
-from printhammer.kernel.modes import BACKSTOP, LOADING, PACK_SURFACE
+from printhammer.kernel.modes import BACKSTOP, HELD, LOADING, PACK_SURFACE, RELOADING, UNLOADING
 
 if TYPE_CHECKING:
     from printhammer.kernel.forces import Hammer, pack_force
     from printhammer.kernel.laws import MEMORY
     from printhammer.kernel.pulses import Drive, edges_at, pass_edges
-    from printhammer.kernel.resample import peaks_of, state_in_step
+    from printhammer.kernel.resample import branch_of, peaks_of, state_in_step
 
 DOT_WIDTH = 6
 """Columns of a dot: pack contacts, time and velocity in, time out, depth, peak force."""
@@ -146,8 +146,10 @@ def note_states(
         else:
             strobes[strobe, 0] = displacement
             strobes[strobe, 1] = velocity
-            strobes[strobe, 2] = mode
-            strobes[strobe, 3] = 0.0 if mode == BACKSTOP else kept
+            # At rest or not, the same force acts.
+            branch = BACKSTOP if mode == HELD else branch_of(mode)
+            strobes[strobe, 2] = branch
+            strobes[strobe, 3] = kept if branch in (UNLOADING, RELOADING) else 0.0
             strobe += 1
 
 
