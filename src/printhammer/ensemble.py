@@ -185,7 +185,7 @@ class Ensemble:
             "hammers": 1 if one_hammer else len(many_hammers),
             "drives": 1 if one_drive else len(many_drives),
             "ends": len(moments) if np.ndim(ends) else 1,
-            "states": 1 if rows is None or rows.ndim == 1 else len(rows),
+            "states": 1 if rows is None or rows.ndim < 2 else len(rows),
         }
         self.size = max(counts.values()) if min(counts.values()) > 0 else 0
         for name, count in counts.items():
@@ -193,7 +193,7 @@ class Ensemble:
                 raise InputError(f"{name}: {count} are given, expected 1 or {self.size}")
         wrong = ~(np.isfinite(moments) & (moments > 0.0))
         if wrong.any():
-            raise InputError(f"ends = {moments[wrong][0]!r} s, expected positive numbers")
+            raise InputError(f"ends = {float(moments[wrong][0])!r} s, expected positive numbers")
         self.hammers: list[Hammer] = many_hammers * (self.size if len(many_hammers) == 1 else 1)
         self.drives: list[Drive] = many_drives * (self.size if len(many_drives) == 1 else 1)
         self.ends = np.broadcast_to(moments, (self.size,)).astype(np.float64)

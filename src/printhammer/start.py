@@ -38,8 +38,8 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
         low, high = hammer.magnet.domain
         if not low <= x <= high:
             raise InputError(
-                f"state = {tuple(state)!r}, expected a displacement from {low:.9g} m to {high:.9g} m, where the"
-                " law of the magnet holds"
+                f"state = {tuple(state)!r}, expected a displacement from {low:.9g} m to {high:.9g} m, where"
+                " the law of the magnet holds"
             )
     rigid = hammer.backstop is not None and hammer.backstop.law == "rigid"
     if rigid and hammer.position is not None and x < hammer.position:
