@@ -9,8 +9,11 @@ import sys
 
 
 def main() -> None:
+    import dask
     from distributed import Client, LocalCluster
 
+    # Otherwise a cluster of this kind closes the nanny of a worker that happens to be on its way back.
+    dask.config.set({"distributed.deploy.lost-worker-timeout": "1 hour"})
     preload = sys.argv[2:]
     with (
         LocalCluster(
