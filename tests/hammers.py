@@ -279,7 +279,7 @@ def _plain(laws: Any) -> specialise.Kernel:
         import_module(f"printhammer.kernel.{name}")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numba.config, "DISABLE_JIT", True)
-        return specialise.specialise.__wrapped__(laws)
+        return specialise._specialised.__wrapped__(laws)
 
 
 def magnet_table(folder: Path) -> dict[str, str]:

@@ -129,19 +129,17 @@ def begin_member(
     return LEAVES
 
 
-@compiled
-def step_pool(which: int, pool: Any, count: int) -> None:
-    """Take a step in the first `count` lanes of a pool, and in those that fill up their last block."""
-    for block in range((count + R.BLOCK - 1) // R.BLOCK):
-        begin = block * R.BLOCK_SIZE
-        if which == R.FREE_POOL:
-            free_block(pool, begin)
-        elif which == R.LOADING_POOL:
-            loading_block(pool, begin)
-        elif which == R.UNLOADING_POOL:
-            unloading_block(pool, begin)
-        else:
-            contact_block(pool, begin)
+@inlined
+def step_block(which: int, pool: Any, begin: int) -> None:
+    """Take a step in every lane of a block, idle ones included."""
+    if which == R.FREE_POOL:
+        free_block(pool, begin)
+    elif which == R.LOADING_POOL:
+        loading_block(pool, begin)
+    elif which == R.UNLOADING_POOL:
+        unloading_block(pool, begin)
+    else:
+        contact_block(pool, begin)
 
 
 @inlined
@@ -365,8 +363,12 @@ def lanes(
             return left
         for p in range(R.POOLS):
             pool = pools[p]
-            step_pool(p, pool, counts[p])
-            for lane in range(counts[p] - 1, -1, -1):
+            # From the last lane to the first: what fills a gap has had its step.
+            top = counts[p] - 1
+            for lane in range(top, -1, -1):
+                if lane == top or lane % R.BLOCK == R.BLOCK - 1:
+                    # The rows of a block are at hand right after its step.
+                    step_block(p, pool, (lane // R.BLOCK) * R.BLOCK_SIZE)
                 i = place(lane)
                 if pool[R.EVENT * R.BLOCK + i] == 0.0:
                     continue
