@@ -1,0 +1,54 @@
+"""How exact the members of an ensemble are: errors against the reference before the horizon, by tolerance.
+
+Forty rates from 500 to 2000 Hz, nine pulses each, at 512 times. For each member the largest error of the
+displacement up to its horizon, in units of the stroke: states in double precision, and pictures in single.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import printhammer as ph
+from printhammer.ensemble import DISPLAY_TOLERANCE
+from printhammer.kernel.reference import horizon, reference
+from printhammer.problem import TOLERANCE
+
+PULSES = 9
+GRID = np.linspace(0.0, 17e-3, 512)
+
+
+def main() -> None:
+    """Measure and print the table."""
+    hammer = ph.load("hendriks-1983")
+    drives = [
+        ph.PulseTrain(hammer.waveform, rate=rate, pulses=PULSES) for rate in np.linspace(500.0, 2000.0, 40)
+    ]
+    ends = [float(drive.times[-1]) + 1e-3 for drive in drives]
+    single = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
+    peak = single.peak_after(0)
+    if peak is None:
+        raise SystemExit("the hammer does not move")
+    stroke = peak[1] - hammer.origin
+    times, exact = [], []
+    for drive, end in zip(drives, ends, strict=True):
+        inside = GRID[: np.searchsorted(GRID, end, side="right")]
+        until = horizon(hammer, drive, end, inside, stroke=stroke)
+        inside = inside[inside <= until]
+        times.append(inside)
+        exact.append(reference(hammer, drive, float(inside[-1]), tolerance=1e-14, times=inside).x)
+    print("| tolerance | states, median | states, 95 % | picture, median | picture, 95 % |")
+    print("|---|---|---|---|---|")
+    for tolerance in (1e-6, DISPLAY_TOLERANCE, 1e-7, 1e-8, 1e-9, 2e-10, TOLERANCE):
+        found = ph.Ensemble(hammer, drives, ends, tolerance=tolerance).run(strobes=times, times=GRID)
+        columns = []
+        for values in (found.strobes.x, found.x):
+            errors = [
+                np.abs(row[: len(truth)] - truth).max() / stroke
+                for row, truth in zip(values, exact, strict=True)
+            ]
+            columns += [np.median(errors), np.percentile(errors, 95.0)]
+        print(f"| {tolerance:.0e} | " + " | ".join(f"{value:.1e}" for value in columns) + " |")
+
+
+if __name__ == "__main__":
+    main()
