@@ -7,13 +7,13 @@ in the ensemble, nor on the number of threads.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
-from printhammer.ensemble_group import MOST_COLUMNS, Group, Job
+from printhammer.ensemble_group import MOST_COLUMNS, Group, Job, kernel_of
 from printhammer.errors import InputError
 from printhammer.hammer import Hammer
 from printhammer.kernel.modes import MODE_NAMES, OK, STATUS_NAMES
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.drive import Drive
+    from printhammer.ensemble_group import LaneKinds
     from printhammer.kernel.laws import Laws
     from printhammer.motion import Motion
     from printhammer.segments import FloatArray
@@ -228,13 +229,15 @@ class Ensemble:
     def groups(self) -> list[Group]:
         """The members, sorted by the laws of their parts."""
         if self._groups is None:
-            by_laws: dict[tuple[Laws, bool], list[int]] = {}
+            alike: dict[Hashable, list[int]] = {}
             laws: dict[tuple[int, str], Laws] = {}
+            kinds: dict[int, LaneKinds | None] = {}
             for i, (hammer, drive) in enumerate(zip(self.hammers, self.drives, strict=True)):
                 key = (id(hammer), drive.quantity)
                 if key not in laws:
                     laws[key] = laws_of(hammer, drive)
-                by_laws.setdefault((laws[key], bool(drive.kernel_arrays()[2])), []).append(i)
+                kernel = laws[key], kernel_of(drive, kinds), bool(self.states[i, 3] >= 0.0)
+                alike.setdefault(kernel, []).append(i)
             self._groups = [
                 Group(
                     np.array(members),
@@ -244,7 +247,7 @@ class Ensemble:
                     self.ends[members],
                     self.tolerance,
                 )
-                for members in by_laws.values()
+                for members in alike.values()
             ]
         return self._groups
 
@@ -323,7 +326,7 @@ class Ensemble:
                 " float32, without gaps"
             )
         moments = self._moments(strobes)
-        jobs = [Job(group, dots, moments, grid, x) for group in self.groups]
+        jobs = [Job(group, bool(dots), moments, grid, x) for group in self.groups]
         _integrate(jobs, engine, workers, progress)
         for job in jobs:
             job.finish(x)

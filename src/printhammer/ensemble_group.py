@@ -11,7 +11,7 @@ from printhammer.kernel.layout import MAGNET, PLACES
 from printhammer.problem import MAX_STEPS, Problem
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Hashable, Sequence
 
     import numpy.typing as npt
 
@@ -35,8 +35,22 @@ def starts_of(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum([len(array) for array in arrays])]).astype(np.int64)
 
 
+LaneKinds = tuple[int, bool, bool]
+"""Number of exponentials in a waveform, whether it has a cubic piece, whether a sine."""
+
+
+def kernel_of(drive: Drive, known: dict[int, LaneKinds | None]) -> Hashable:
+    """Return what of a drive decides on the kernel: the overlap rule, and the kinds of its pieces."""
+    _times, pieces, replace, _force = drive.kernel_arrays()
+    if id(pieces) not in known:
+        known[id(pieces)] = closed_form(pieces)[1]
+    return bool(replace), known[id(pieces)]
+
+
 class Group:
-    """Members whose parts have the same laws.
+    """Members with the same laws, overlap rule and kinds of pieces in their waveforms, started alike.
+
+    All this is decided for each member, so that one kernel serves it in whatever company.
 
     Parameters
     ----------
@@ -101,7 +115,9 @@ class Group:
         self.firings = np.concatenate(firings)
         self.most_firings = max(len(times) for times in firings)
         self.uniform = len(problems) == 1 and len(tables) == 1
-        self.rates, self.lane_kinds = _closed_form(tables)
+        forms = [closed_form(table) for table in tables]
+        self.rates = np.array([rates for rates, _kinds in forms])
+        self.lane_kinds = forms[0][1]
 
     def fits_lanes(self) -> bool:
         """Tell whether there is a kernel for lanes for these members."""
@@ -125,26 +141,21 @@ class Group:
         return specialise_lanes(self.laws, self.lane_kinds)
 
 
-def _closed_form(tables: Sequence[FloatArray]) -> tuple[FloatArray, tuple[int, bool, bool] | None]:
-    """Return the rates of the pieces of each waveform, and what kinds of pieces there are, for lanes.
+def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
+    """Return the rates of a waveform's pieces, and what kinds of pieces there are, for lanes.
 
-    None instead of the kinds where a waveform has more rates than lanes provide for.
+    None instead of the kinds where the waveform has more rates than lanes provide for.
     """
-    rates = np.zeros((len(tables), lane_layout.RATES_WIDTH))
-    exponentials, cubic, sine = 0, False, False
-    for row, table in enumerate(tables):
-        pieces = table[:-1]
-        kind = pieces[:, 1]
-        decays = np.unique(pieces[kind == _EXPONENTIAL, 4])
-        frequencies = np.unique(pieces[kind == _SINE, 4])
-        if len(decays) > 2 or len(frequencies) > 1:
-            return rates, None
-        rates[row, : len(decays)] = decays
-        rates[row, 2 : 2 + len(frequencies)] = frequencies
-        exponentials = max(exponentials, len(decays))
-        cubic = cubic or bool(pieces[kind == _CUBIC, 3:].any())
-        sine = sine or len(frequencies) > 0
-    return rates, (exponentials, cubic, sine)
+    pieces = table[:-1]
+    kind = pieces[:, 1]
+    decays = np.unique(pieces[kind == _EXPONENTIAL, 4])
+    frequencies = np.unique(pieces[kind == _SINE, 4])
+    rates = [0.0] * lane_layout.RATES_WIDTH
+    if len(decays) > 2 or len(frequencies) > 1:
+        return rates, None
+    rates[: len(decays)] = decays
+    rates[2 : 2 + len(frequencies)] = frequencies
+    return rates, (len(decays), bool(pieces[kind == _CUBIC, 3:].any()), len(frequencies) > 0)
 
 
 class Job:
