@@ -215,7 +215,7 @@ def test_a_dataset_has_units_and_where_it_comes_from(hammer: "ph.Hammer", tmp_pa
         ({"period": 1e-3, "phase": 1.0}, "phase"),
         ({"period": 1e-3, "phase": -0.1}, "phase"),
         ({"period": 1e-3, "tolerance": 1.0}, "tolerance"),
-        ({"period": 1e-3, "state": (math.nan, 0.0)}, "states"),
+        ({"period": 1e-3, "state": (math.nan, 0.0)}, "state"),
         ({"drive": ph.SineForce(1.0, 1e3), "period": 1e-3}, "drive"),
     ],
 )

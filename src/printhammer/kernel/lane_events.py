@@ -106,6 +106,9 @@ def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth
     v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
     a0, a1 = pool[R.OLD_A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
     h = pool[R.LENGTH * R.BLOCK + i]
+    if not time > pool[R.OLD_T * R.BLOCK + i]:
+        # A run may end where a step begins.
+        return float(b - x0 * x0 if which == R.CONTACT_POOL else x0)
     if which != R.CONTACT_POOL:
         u = (time - pool[R.OLD_T * R.BLOCK + i]) / h
         bump = u * (u - 1.0)
