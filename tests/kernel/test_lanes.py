@@ -5,10 +5,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from tests import hammers
 from tests.ensembles import TIMES, Members, differing
 
+import printhammer as ph
 from printhammer import ensemble_group
-from printhammer.ensemble import EnsembleResult
+from printhammer.ensemble import DISPLAY_TOLERANCE, EnsembleResult
 from printhammer.kernel import lane_layout
 
 
@@ -149,3 +151,54 @@ def test_one_hammer_and_waveform_for_all_is_one_of_many(members: Members, whole:
             alike = which[members.states[which, 1] == members.states[i, 1]]
             assert members.ensemble(alike).groups[0].uniform
             assert differing(whole, members.run(alike, engine="lanes"), alike) == []
+
+
+def assert_no_gaps(result: EnsembleResult) -> None:
+    """Whatever became of a member, there is a number up to where it came, and none beyond."""
+    assert np.isfinite(result.reached).all()
+    assert result.x is not None
+    np.testing.assert_array_equal(np.isnan(result.x), result.reached[:, np.newaxis] < TIMES)
+    assert result.strobes is not None
+    there = result.strobes.t <= result.reached[:, np.newaxis]
+    for name in ("x", "v", "memory"):
+        np.testing.assert_array_equal(np.isfinite(getattr(result.strobes, name)), there)
+    np.testing.assert_array_equal(result.strobes.branch >= 0, there)
+    assert result.dots is not None
+    for name in ("flight_time", "impact_speed", "peak_force", "indentation"):
+        np.testing.assert_array_equal(np.isfinite(getattr(result.dots, name)), result.dots.struck)
+
+
+@pytest.mark.parametrize("engine", ["lanes", "plain"])
+@pytest.mark.parametrize("tolerance", [1e-14, 2e-11, DISPLAY_TOLERANCE, 1e-5])
+def test_there_are_no_gaps(members: Members, engine: Any, tolerance: float) -> None:
+    assert_no_gaps(members.run(engine=engine, tolerance=tolerance))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10, 30))
+def test_ten_thousand_members(seed: int) -> None:
+    """Other members, more hammers, more that leave the lanes: halves in any order, in two threads."""
+    some = Members(seed, 500, kinds=12, strange=seed % 4)
+    for tolerance in (2e-11, DISPLAY_TOLERANCE):
+        whole = some.run(engine="lanes", threads=1, tolerance=tolerance)
+        assert_no_gaps(whole)
+        half = np.random.default_rng(seed).permutation(500)[:250]
+        assert differing(whole, some.run(half, engine="lanes", threads=2, tolerance=tolerance), half) == []
+        plain = some.run(engine="plain", tolerance=tolerance)
+        np.testing.assert_array_equal(whole.status, plain.status)
+
+
+@pytest.mark.slow
+def test_the_company_of_other_waveforms_changes_nothing() -> None:
+    """Each kind of waveform has a kernel of its own, in whatever ensemble."""
+    some = Members(2, 70)
+    shapes = hammers.waveforms(1.2, "current")
+    for i, name in enumerate(shapes):
+        for j in range(i, len(some.drives), len(shapes)):
+            rule = "replace" if j % 4 == 1 else "add"
+            some.drives[j] = ph.PulseTrain(shapes[name], at=some.drives[j].times, overlap=rule)
+    whole = some.run(engine="lanes")
+    for i in range(len(shapes)):
+        which = np.arange(i, len(some.drives), len(shapes))
+        assert differing(whole, some.run(which, engine="lanes"), which) == []
+        assert differing(whole, some.run(which[:1], engine="lanes"), which[:1]) == []
