@@ -14,7 +14,14 @@ from printhammer.report.quantities import band_text, split_name, typeset, value_
 if TYPE_CHECKING:
     import printhammer as ph
 
-CLAIMS = ("geometry", "release_margin", "single_pulse_stroke", "settle_out", "print_force", "two_pulses_660us")
+CLAIMS = (
+    "geometry",
+    "release_margin",
+    "single_pulse_stroke",
+    "settle_out",
+    "print_force",
+    "two_pulses_660us",
+)
 VOID = {"meta", "img", "br"}
 
 

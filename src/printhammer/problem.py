@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 TOLERANCE: Final = 2e-11
 """Default tolerance: error allowed in one step, in units of the stroke and of a typical speed."""
 
+LEAST_TOLERANCE: Final = 1e-15
+LARGEST_TOLERANCE: Final = 1e-5
+"""With larger ones steps would be so long that the curves between their ends say little about the motion."""
+
 MAX_STEPS: Final = 50_000_000
 FAR: Final = 1e4
 """Distance from the origin, in strokes, beyond which the armature counts as run away."""
@@ -76,10 +80,12 @@ def check_tolerance(tolerance: object) -> None:
     Raises
     ------
     InputError
-        Not a number from 1e-15 to 1e-2.
+        Not a number between the least and the largest.
     """
-    if not (isinstance(tolerance, float | int) and 1e-15 <= tolerance <= 1e-2):
-        raise InputError(f"tolerance = {tolerance!r}, expected a number from 1e-15 to 1e-2")
+    if not (isinstance(tolerance, float | int) and LEAST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE):
+        raise InputError(
+            f"tolerance = {tolerance!r}, expected a number from {LEAST_TOLERANCE:g} to {LARGEST_TOLERANCE:g}"
+        )
 
 
 def laws_of(hammer: Hammer, drive: Drive) -> Laws:

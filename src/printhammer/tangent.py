@@ -18,7 +18,7 @@ from printhammer.errors import InputError
 from printhammer.hammer import Hammer
 from printhammer.kernel import carry
 from printhammer.kernel.modes import HELD_UNLOADING, OK, PAUSED, RELOADING, STATUS_NAMES, UNLOADING
-from printhammer.problem import MAX_STEPS, TOLERANCE, Problem
+from printhammer.problem import MAX_STEPS, TOLERANCE, Problem, check_tolerance
 from printhammer.start import initial_state
 from printhammer.threads import in_threads, thread_count
 
@@ -335,8 +335,7 @@ def standard_error(series: npt.ArrayLike) -> float:
 
 
 def _problem(hammer: Hammer, drive: Drive, state: tuple[float, float] | None, tolerance: float) -> Problem:
-    if not 1e-15 <= tolerance <= 1e-2:
-        raise InputError(f"tolerance = {tolerance!r}, expected a number from 1e-15 to 1e-2")
+    check_tolerance(tolerance)
     return Problem(hammer, drive, initial_state(hammer, state), 0.0, tolerance)
 
 

@@ -120,7 +120,7 @@ BAD_OPTIONS = {
     "no times": (["--at", ""], ("a time",)),
     "duration without unit": (["--duration", "4"], ("duration", "4", "unit")),
     "no duration": (["--duration", "0 ms"], ("duration", "positive")),
-    "tolerance too loose": (["--tolerance", "1"], ("tolerance", "1.0", "1e-2")),
+    "tolerance too loose": (["--tolerance", "1"], ("tolerance", "1.0", "1e-05")),
     "one point": (["--points", "1"], ("points", "1", "at least 2")),
     "unknown scheme": (["--scheme", "euler"], ("--scheme", "euler", "trapezoid")),
     "unknown overlap": (["--overlap", "both"], ("--overlap", "both", "add")),

@@ -41,7 +41,7 @@ def axes(*tables: dict[str, Any], **changes: Any) -> dict[str, Any]:
         (changed(hammer=None), r"hammer is missing, expected name of a shipped hammer"),
         (changed(hammer="no-such.toml"), r"no-such.toml: there is no such file"),
         (changed(colour="red"), r"the key colour is not known, expected one of format"),
-        (changed(tolerance=2.0), r"tolerance = 2.0: expected less than or equal to 0.01"),
+        (changed(tolerance=2.0), r"tolerance = 2.0: expected less than or equal to 0.00001"),
         (changed(duration="3"), r"duration: '3' has no unit, expected a time"),
         (changed(duration=0.003), r"duration = 0.003 has no unit"),
         (changed(duration="-3 ms"), r"duration = -0.003 s: expected more than 0 s"),

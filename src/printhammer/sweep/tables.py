@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from printhammer.constants import shown
 from printhammer.errors import InputError
-from printhammer.problem import TOLERANCE
+from printhammer.problem import LARGEST_TOLERANCE, LEAST_TOLERANCE, TOLERANCE
 from printhammer.sweep.quantities import ManyQuantities, OneQuantity
 
 FORMAT: Final = 1
@@ -68,7 +68,11 @@ class SpecTable(_Table):
     members: int | None = Field(None, ge=1, description="number of members of a Latin hypercube")
     seed: int | None = Field(None, ge=0, description="seed of a Latin hypercube")
     tolerance: float = Field(
-        TOLERANCE, ge=1e-15, le=1e-2, allow_inf_nan=False, description="error in one step"
+        TOLERANCE,
+        ge=LEAST_TOLERANCE,
+        le=LARGEST_TOLERANCE,
+        allow_inf_nan=False,
+        description="error in one step",
     )
     duration: OneQuantity = Field(None, description="end of each run; by default 4 ms after its last firing")
     chunk: int | None = Field(None, ge=1, description="members of a block of work")
