@@ -38,6 +38,18 @@ def lines(drawn: Figure, panel: int = 0) -> dict[str, Line2D]:
     return {line.get_gid(): line for line in drawn.axes[panel].lines if line.get_gid()}
 
 
+def strokes(line: Line2D) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of strokes, shape (n, 2), along time and rate."""
+    at, rate = (np.asarray(data).reshape(-1, 3)[:, :2] for data in line.get_data())
+    return at, rate
+
+
+def lost_dots(chart: xr.Dataset) -> list[tuple[int, int]]:
+    """Return the rows and firings of lost dots, firing by firing."""
+    struck = chart["struck"].values
+    return [(row, firing) for firing in range(9) for row in np.flatnonzero(~struck[:, firing])]
+
+
 def test_the_picture_is_the_map(chart: xr.Dataset, colours: Figure) -> None:
     (mesh,) = colours.axes[0].collections
     assert mesh.get_rasterized()
@@ -51,20 +63,46 @@ def test_the_picture_is_the_map(chart: xr.Dataset, colours: Figure) -> None:
     np.testing.assert_allclose(middle[:, 0, 1], 1e-3 * RATES, rtol=1e-12)
 
 
-def test_firings_and_lost_dots_are_marked(chart: xr.Dataset, colours: Figure) -> None:
-    found = lines(colours)
+def test_firings_and_lost_dots_are_lines_where_there_are_many_rates(hammer: "ph.Hammer") -> None:
+    rates = np.linspace(500.0, 2300.0, 50)
+    chart = ph.frequency_map(hammer, rates, times=20)
+    found = lines(FIGURES[9].draw(hammer, chart=chart))
     for firing in range(9):
         at, rate = found[f"firing {firing + 1}"].get_data()
-        np.testing.assert_allclose(at, 1e3 * firing / RATES, rtol=1e-12)
-        np.testing.assert_allclose(rate, 1e-3 * RATES, rtol=1e-12)
-    lost_at, lost_rate = (np.asarray(data).reshape(-1, 3)[:, :2] for data in found["lost dots"].get_data())
-    expected = [
-        (row, firing) for firing in range(9) for row in np.flatnonzero(~chart["struck"].values[:, firing])
-    ]
+        np.testing.assert_allclose(at, 1e3 * firing / rates, rtol=1e-12)
+        np.testing.assert_allclose(rate, 1e-3 * rates, rtol=1e-12)
+    lost_at, lost_rate = strokes(found["lost dots"])
+    expected = lost_dots(chart)
     assert len(expected) == len(lost_at) > 0
     for (row, firing), at, rate in zip(expected, lost_at, lost_rate, strict=True):
-        assert np.mean(rate) == pytest.approx(1e-3 * RATES[row], rel=1e-9)
-        assert np.mean(at) == pytest.approx(1e3 * firing / RATES[row], rel=1e-9)
+        assert np.mean(rate) == pytest.approx(1e-3 * rates[row], rel=1e-9)
+        assert np.mean(at) == pytest.approx(1e3 * firing / rates[row], rel=1e-9)
+        # Along the line: later at lower rates.
+        assert at[0] > at[1]
+
+
+def test_firings_and_lost_dots_are_upright_marks_where_there_are_few(
+    chart: xr.Dataset, colours: Figure
+) -> None:
+    found = lines(colours)
+    borders = 1e-3 * edges(RATES)
+    for firing in range(9):
+        at, rate = strokes(found[f"firing {firing + 1}"])
+        np.testing.assert_allclose(at, np.column_stack([1e3 * firing / RATES] * 2), rtol=1e-12)
+        np.testing.assert_allclose(rate, np.column_stack([borders[:-1], borders[1:]]), rtol=1e-12)
+    expected = lost_dots(chart)
+    at, rate = strokes(found["lost dots"])
+    assert len(expected) == len(at) > 0
+    for (row, firing), times, ends in zip(expected, at, rate, strict=True):
+        assert times == pytest.approx([1e3 * firing / RATES[row]] * 2, rel=1e-12)
+        assert ends == pytest.approx(borders[row : row + 2], rel=1e-12)
+
+
+def test_a_map_of_one_rate_is_marked(hammer: "ph.Hammer") -> None:
+    drawn = FIGURES[9].draw(hammer, rates=[1300.0])
+    at, rate = strokes(lines(drawn)["firing 4"])
+    assert at == pytest.approx(np.full((1, 2), 3e3 / 1300.0), rel=1e-12)
+    assert rate[0, 0] < 1.3 < rate[0, 1]
 
 
 def test_the_places_are_on_the_colour_bar(colours: Figure) -> None:

@@ -42,8 +42,8 @@ def figure9(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
     Returns
     -------
     Figure
-        The figure. Thin lines are firings, strong ones lost dots; the gids are "firing 1" and so on, and
-        "lost dots".
+        The figure. Thin lines are firings, strong ones lost dots, or marks in each row where there are fewer
+        than 50 rates; the gids are "firing 1" and so on, and "lost dots".
 
     Raises
     ------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -31,6 +31,9 @@ LINES: Final = "white"
 
 LOST: Final = "lost dots"
 """The gid of the marks of lost dots."""
+
+FEW: Final = 50
+"""Number of rates below which firings and lost dots are marked row by row."""
 
 UNKNOWN: Final = "#e4e4e4"
 """Where the displacement is not known."""
@@ -130,30 +133,61 @@ def picture(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> Qua
 
 
 def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
-    """Draw a thin line along each firing, and a strong one where its dot is lost."""
+    """Draw a thin line along each firing, and a strong one where its dot is lost.
+
+    Where the map has fewer than 50 rates, the lines are upright marks in the row of each rate instead.
+    """
     if "fired_at" not in chart:
         return
     time, shown = scales.time, scales.rate
     rates = chart["rate"].values
     rows = edges(rates)
+    few = len(rates) < FEW
     fired, struck = chart["fired_at"].values, chart["struck"].values
-    lost_at: list[float] = []
-    lost_rates: list[float] = []
+    lost: list[tuple[FloatArray, FloatArray]] = []
     for firing in range(fired.shape[1]):
         at = time.shown(fired[:, firing])
+        # A line leans as the firing times do, from one border of the cell to the other; a mark does not.
+        slopes = np.zeros_like(at) if few or firing == 0 else -at / rates
+        along = _strokes(at, slopes, rates, rows) if few else (at, rates)
         ax.plot(
-            at, shown.shown(rates), color=LINES, lw=HAIR, alpha=0.6, zorder=2.0, gid=f"firing {firing + 1}"
+            along[0],
+            shown.shown(along[1]),
+            color=LINES,
+            lw=HAIR,
+            alpha=0.6,
+            zorder=2.0,
+            gid=f"firing {firing + 1}",
         )
-        for row in np.flatnonzero(~struck[:, firing] & np.isfinite(at)):
-            # The line leans as the firing times do, from one border of the cell to the other.
-            slope = -at[row] / rates[row] if firing else 0.0
-            low, high = rows[row], rows[row + 1]
-            lost_at += [at[row] + slope * (low - rates[row]), at[row] + slope * (high - rates[row]), np.nan]
-            lost_rates += [*shown.shown([low, high]).tolist(), np.nan]
-    if lost_at:
+        missed = np.flatnonzero(~struck[:, firing] & np.isfinite(at))
+        lost.append(_strokes(at, slopes, rates, rows, missed))
+    lost_at, lost_rates = (np.concatenate(parts) for parts in zip(*lost, strict=True))
+    if lost_at.size:
+        cap: Literal["butt", "projecting"] = "butt" if few else "projecting"
         ax.plot(
-            lost_at, lost_rates, color=ORANGE, lw=_LOST, solid_capstyle="projecting", zorder=2.5, gid=LOST
+            lost_at,
+            shown.shown(lost_rates),
+            color=ORANGE,
+            lw=_LOST,
+            solid_capstyle=cap,
+            zorder=2.5,
+            gid=LOST,
         )
+
+
+def _strokes(
+    at: FloatArray,
+    slopes: FloatArray,
+    rates: FloatArray,
+    borders: FloatArray,
+    rows: npt.NDArray[np.intp] | slice = slice(None),
+) -> tuple[FloatArray, FloatArray]:
+    """Return strokes through the cells of some rows, from the lower border to the upper one, NaN between."""
+    centre, place, slope = rates[rows], at[rows], slopes[rows]
+    ends = np.column_stack([borders[:-1][rows], borders[1:][rows], np.full_like(centre, np.nan)])
+    return (
+        place[:, np.newaxis] + slope[:, np.newaxis] * (ends - centre[:, np.newaxis])
+    ).ravel(), ends.ravel()
 
 
 def key(ax: Axes, chart: xr.Dataset) -> None:
