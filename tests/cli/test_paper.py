@@ -2,9 +2,12 @@ import json
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from printhammer import report
 from printhammer.claims import claims
+from printhammer.claims.verdicts import printed_verdicts
+from printhammer.figures import PaperFigure
 
 
 @pytest.fixture
@@ -37,6 +40,20 @@ def test_strict_ends_with_status_1_where_a_claim_fails(cli, hammer, tmp_path: Pa
     assert cli("paper", moved, "--out", tmp_path / "paper").status == 0
     assert cli("paper", moved, "--out", tmp_path / "paper", "--strict").status == 1
     assert (tmp_path / "paper" / "index.html").is_file()
+
+
+def test_figure_11_is_told_what_the_paper_says(cli, hammer, tmp_path: Path, monkeypatch) -> None:
+    told = []
+
+    def blank(_entry: PaperFigure, _hammer: object, **options: object) -> Figure:
+        told.append(options)
+        return Figure()
+
+    monkeypatch.setattr(PaperFigure, "draw", blank)
+    assert cli("figure", "11", "--out", tmp_path / "alone").status == 0
+    report.write_report(hammer, tmp_path / "report", claims=[], figures=[11])
+    assert cli("figure", "3", "--out", tmp_path / "other").status == 0
+    assert told == [{"printed": printed_verdicts()}] * 2 + [{}]
 
 
 @pytest.mark.slow

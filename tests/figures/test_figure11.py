@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 
 import printhammer as ph
 from printhammer.chaos import Strobe, strobes
+from printhammer.claims.verdicts import printed_verdicts
 from printhammer.figures import FIGURES
 from printhammer.figures.figure11 import PERIODS
 from printhammer.figures.strobe import shown_period
@@ -78,6 +79,34 @@ def test_a_cycle_is_ringed_and_points_outside_are_counted(drawn: Figure, trains:
         beyond |= np.abs(train.v) > 0.635
         told = [text for text in texts(ax) if text.endswith("outside")]
         assert told == ([f"{beyond.sum()} outside"] if beyond.any() else [])
+
+
+def test_another_verdict_of_the_paper_is_written_beside(hammer: "ph.Hammer", trains: list[Strobe]) -> None:
+    printed = printed_verdicts()
+    # The caption of Fig. 11: a double cycle, three trains with the period of forcing, eight strange ones.
+    assert list(printed) == pytest.approx(PERIODS)
+    assert list(printed.values()).count("strange") == 8
+    drawn = FIGURES[11].draw(hammer, strobes=trains, printed=printed)
+    for ax, train in zip(drawn.axes, trains, strict=True):
+        (name,) = (name for period, name in printed.items() if period == pytest.approx(train.period))
+        told = [text for text in texts(ax) if text.startswith("paper")]
+        assert told == ([] if name == train.verdict.name else [f"paper: {name.replace('-', ' ')}"])
+
+
+def test_nothing_is_said_of_other_strobe_times(hammer: "ph.Hammer", trains: list[Strobe]) -> None:
+    for printed in (None, {}, {1.35001e-3: "strange"}):
+        drawn = FIGURES[11].draw(hammer, strobes=trains[:1], printed=printed)
+        assert not any(text.startswith("paper") for text in texts(drawn.axes[0]))
+    drawn = FIGURES[11].draw(hammer, strobes=trains[:1], printed={1.35e-3: "period-64"})
+    assert "paper: period 64" in texts(drawn.axes[0])
+
+
+def test_the_circles_have_a_key_where_there_are_any(hammer: "ph.Hammer", trains: list[Strobe]) -> None:
+    for train in trains:
+        drawn = FIGURES[11].draw(hammer, strobes=[train])
+        told = [text.get_text() for key in drawn.legends for text in key.get_texts()]
+        ringed = any(line.get_gid() == "cycle" for line in drawn.axes[0].lines)
+        assert told == (["last points of a periodic train"] if ringed else [])
 
 
 def test_one_train(hammer: "ph.Hammer", trains: list[Strobe]) -> None:

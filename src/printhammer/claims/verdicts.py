@@ -36,6 +36,12 @@ _CHANGED: Final[dict[str, Callable[[int], int]]] = {
 _APERIODIC: Final = "no period"
 
 
+def printed_verdicts() -> dict[float, str]:
+    """Return the verdicts that the paper prints on the panels of Fig. 11, by strobe time, s."""
+    claim = claims()["poincare"]
+    return dict(zip(claim.settings["strobe_times_s"], claim.band["verdicts"], strict=True))
+
+
 def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -> Hammer:
     """Return a hammer with every constant changed by a part of it, up or down."""
     # In the unit of the file, which tells a current from a force.

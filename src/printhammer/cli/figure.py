@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
@@ -11,6 +11,7 @@ from printhammer.cli.numbers import whole
 from printhammer.cli.run import HAMMER, HammerArgument
 
 EXAMPLE = "Example: printhammer figure 3 hendriks-1983 --out build/figures"
+_POINCARE: Final = 11
 
 
 def figure(
@@ -33,5 +34,10 @@ def figure(
     announce_compiling()
     screen = console()
     screen.print(f"[bold]Figure {entry.number}[/bold]  {entry.title}")
-    for path in save(entry.draw(loaded), out, f"figure{entry.number:02d}"):
+    options = {}
+    if entry.number == _POINCARE:
+        from printhammer.claims.verdicts import printed_verdicts
+
+        options["printed"] = printed_verdicts()
+    for path in save(entry.draw(loaded, **options), out, f"figure{entry.number:02d}"):
         screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)

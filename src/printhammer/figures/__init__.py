@@ -120,8 +120,8 @@ FIGURES: Final[dict[int, PaperFigure]] = {
             11,
             "Poincaré plots",
             "Displacement and velocity at the first 200 firings of trains, a panel for each strobe time, with"
-            " the verdict on firings 1001 to 2000. Vertical line: backstop; rings: the last points of a"
-            " periodic train.",
+            " the verdict on firings 1001 to 2000, and that of the paper where it is another. Vertical line:"
+            " backstop; orange circles: the last points of a train with a period of up to 8 firings.",
         ),
     )
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -9,11 +10,11 @@ from printhammer.errors import InputError
 from printhammer.figures.curves import waveform_of
 from printhammer.figures.marks import note
 from printhammer.figures.scales import label
-from printhammer.figures.strobe import panel, scales_of, shown_period
-from printhammer.figures.style import INK, new_figure, sign, styled
+from printhammer.figures.strobe import RING, panel, scales_of, shown_period
+from printhammer.figures.style import INK, SMALL, new_figure, sign, styled
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -51,6 +52,7 @@ def figure11(
     strobes: Sequence[Strobe] | None = None,
     periods: Sequence[float | str] = PERIODS,
     points: int = POINTS,
+    printed: Mapping[float, str] | None = None,
 ) -> Figure:
     """Draw Fig. 11: the states at the first firings of trains, a panel for each strobe time.
 
@@ -64,11 +66,15 @@ def figure11(
         Strobe times, s, or text with a unit.
     points : int, optional
         Points in each panel, from the first firing on.
+    printed : mapping, optional
+        Verdicts that the paper prints, such as "period-2", by strobe time, s; each is written in its panel
+        where the verdict on the points is another.
 
     Returns
     -------
     Figure
-        The figure. The vertical line is the backstop; rings are the last points of a periodic train.
+        The figure. The vertical line is the backstop; circles are the last points of a train with a period
+        of up to 8 firings.
 
     Raises
     ------
@@ -90,7 +96,7 @@ def figure11(
     for i, strobe in enumerate(found):
         row, column = divmod(i, columns)
         ax = figure.add_subplot(grid[row, column])
-        panel(ax, strobe, window, way, speed, size=1.6)
+        panel(ax, strobe, window, way, speed, size=1.6, printed=_printed(strobe, printed or {}))
         if len(found) <= len(ascii_lowercase):
             note(ax, f"({ascii_lowercase[i]})", (0.03, 0.96), color=INK)
         ax.locator_params(axis="both", nbins=5)
@@ -98,8 +104,29 @@ def figure11(
         ax.tick_params(labelbottom=lowest, labelleft=column == 0)
         _edge(ax, "x", way, lowest, row == 0)
         _edge(ax, "y", speed, column == 0, i + 1 == len(found) or column == columns - 1)
+    if any(line.get_gid() == "cycle" for ax in figure.axes for line in ax.lines):
+        _key(figure)
     sign(figure, hammer, *_remarks(found))
     return figure
+
+
+def _printed(strobe: Strobe, verdicts: Mapping[float, str]) -> str:
+    """Return what the paper says of a strobe time; empty if nothing."""
+    said = (name for period, name in verdicts.items() if math.isclose(period, strobe.period, rel_tol=1e-9))
+    return next(said, "")
+
+
+def _key(figure: Figure) -> None:
+    """Write below the panels what the circles are."""
+    from matplotlib.lines import Line2D
+
+    figure.legend(
+        handles=[Line2D([], [], label="last points of a periodic train", **RING)],
+        loc="outside lower left",
+        fontsize=SMALL,
+        frameon=False,
+        handletextpad=0.2,
+    )
 
 
 def _edge(ax: Axes, side: Literal["x", "y"], shown: Scale, here: bool, opposite: bool) -> None:

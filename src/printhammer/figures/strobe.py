@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -33,6 +33,16 @@ if TYPE_CHECKING:
 
 _CYCLE: Final = 8
 """Largest period whose points are ringed."""
+
+RING: Final[dict[str, Any]] = {
+    "ls": "none",
+    "marker": "o",
+    "ms": 6.0,
+    "mew": 0.9,
+    "mfc": "none",
+    "mec": ORANGE,
+}
+"""How the last points of a periodic train are marked."""
 
 
 @styled
@@ -86,7 +96,15 @@ def scales_of(window: Window) -> tuple[Scale, Scale]:
 
 
 def panel(
-    ax: Axes, strobe: Strobe, window: Window, way: Scale, speed: Scale, size: float, *, named: bool = True
+    ax: Axes,
+    strobe: Strobe,
+    window: Window,
+    way: Scale,
+    speed: Scale,
+    size: float,
+    *,
+    named: bool = True,
+    printed: str = "",
 ) -> None:
     """Draw the points of one train into axes.
 
@@ -104,6 +122,8 @@ def panel(
         Size of a point, points.
     named : bool, optional
         Whether strobe time and verdict are written inside.
+    printed : str, optional
+        The verdict of the paper, written above that on the points where it is another.
     """
     ax.set_xlim(*(float(way.shown(end)) for end in window.x))
     ax.set_ylim(*(float(speed.shown(end)) for end in window.v))
@@ -115,22 +135,14 @@ def panel(
     judged = strobe.verdict
     if judged is not None and judged.period is not None and judged.period <= min(_CYCLE, len(x)):
         cycle = slice(len(x) - judged.period, None)
-        ax.plot(
-            x[cycle],
-            v[cycle],
-            ls="none",
-            marker="o",
-            ms=size + 4.0,
-            mew=0.9,
-            mfc="none",
-            mec=ORANGE,
-            gid="cycle",
-            zorder=4.0,
-        )
+        ax.plot(x[cycle], v[cycle], **{**RING, "ms": size + 4.0}, gid="cycle", zorder=4.0)
     if named:
         note(ax, shown_period(strobe.period), (0.97, 0.96), ha="right", color=INK)
     if named and judged is not None:
         note(ax, judged.name.replace("-", " "), (0.97, 0.04), ha="right", va="bottom", bbox=HALO)
+        if printed and printed != judged.name:
+            told = f"paper: {printed.replace('-', ' ')}"
+            note(ax, told, (0.97, 0.15), ha="right", va="bottom", fontsize=TINY, bbox=HALO)
     outside = int(np.count_nonzero(np.isfinite(strobe.x) & ~window.inside(strobe.x, strobe.v)))
     if outside:
         note(ax, f"{outside} outside", (0.97, 0.86), ha="right", fontsize=TINY)

@@ -12,6 +12,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import Context, Result, buzz_search, judge_all
+from printhammer.claims.verdicts import printed_verdicts
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.outputs import make_folder, write_file
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
 
 _BUZZ: Final = 7
+_POINCARE: Final = 11
 
 
 @dataclass(frozen=True)
@@ -173,8 +175,12 @@ def _draw(
     start = perf_counter()
     svg, reason = b"", ""
     try:
-        # The train of Fig. 7 has been sought already.
-        options = {"search": buzz_search(context)} if number == _BUZZ else {}
+        options: dict[str, Any] = {}
+        if number == _BUZZ:
+            # The train of Fig. 7 has been sought already.
+            options["search"] = buzz_search(context)
+        elif number == _POINCARE:
+            options["printed"] = printed_verdicts()
         figure = entry.draw(context.hammer, **options)
     except InputError as error:
         reason = str(error)
