@@ -54,7 +54,9 @@ def check_strobes(result: EnsembleResult, i: int, motion: ph.Motion, times: npt.
     nodes = motion._record.nodes[np.searchsorted(motion.step_times, inside, side="right") - 1]
     memory = np.where(np.isin(nodes[:, 3], REMEMBERING), nodes[:, 4], 0.0)
     for name, expected in {"x": x, "v": v, "memory": memory}.items():
-        same(getattr(table, name)[i], [*expected, *[None] * (width - count)])
+        values = [*expected, *[np.nan] * (width - count)]
+        # Two entries of the kernel hold the same code, which the compiler may round differently at the end.
+        np.testing.assert_allclose(getattr(table, name)[i], values, rtol=1e-13, atol=1e-16)
     assert table.branch[i].tolist() == [*nodes[:, 3].astype(int), *[-1] * (width - count)]
 
 

@@ -409,11 +409,13 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
     works, lengths = [], []
     sizes = [len(job.group.members) for job in jobs]
     for job, size in zip(jobs, sizes, strict=True):
-        if engine != "plain" and job.group.fits_lanes():
+        in_lanes = engine != "plain" and job.group.fits_lanes()
+        if engine == "lanes" and not in_lanes:
+            raise InputError('engine = "lanes", expected "plain" or "auto": the parts do not allow lanes')
+        job.prepare(in_lanes)
+        if in_lanes:
             works.append(job.lane_piece)
             lengths.append(job.share_out(threads))
-        elif engine == "lanes":
-            raise InputError('engine = "lanes", expected "plain" or "auto": the parts do not allow lanes')
         else:
             works.append(job.piece)
             lengths.append(max(1, size // (PIECES_A_THREAD * threads)))

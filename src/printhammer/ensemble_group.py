@@ -214,6 +214,13 @@ class Job:
         self.order = np.concatenate([np.arange(piece, count, pieces) for piece in range(pieces)])
         return -(-count // pieces)
 
+    def prepare(self, lanes: bool) -> None:
+        """Have the machine code ready, in this thread, before others need it."""
+        if lanes:
+            self.lane_piece(0, 0)
+        else:
+            self._one_by_one(self.order[:0], prepare=True)
+
     def piece(self, first: int, last: int) -> None:
         """Integrate some members of the group one by one, in this thread."""
         self._one_by_one(self.order[first:last])
@@ -260,12 +267,13 @@ class Job:
         )
         self._one_by_one(left_over[:left])
 
-    def _one_by_one(self, which: npt.NDArray[np.int64]) -> None:
+    def _one_by_one(self, which: npt.NDArray[np.int64], prepare: bool = False) -> None:
         group = self.group
         nodes, contacts = _NODES, _CONTACTS
         under_way = np.zeros((2, group.most_firings), np.int64)
         live = np.zeros((2, 1 + 7 * group.most_firings))
-        while which.size:
+        while which.size or prepare:
+            prepare = False
             done = group.kernel.members(
                 which,
                 group.hammer_of,

@@ -180,10 +180,10 @@ def test_interrupting_is_polite(tmp_path: Path) -> None:
         time.sleep(0.02)
     told = ""
     # The compiler may swallow an interrupt; a second one then does what the first was meant to.
-    for _ in range(20):
+    for _ in range(100):
         process.send_signal(signal.SIGINT)
         with contextlib.suppress(subprocess.TimeoutExpired):
-            told = process.communicate(timeout=15)[1]
+            told = process.communicate(timeout=3)[1]
             break
     assert process.returncode == 130
     assert told.splitlines()[-1] == "printhammer: interrupted"
