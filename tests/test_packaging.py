@@ -1,6 +1,7 @@
 """The package as somebody else gets it: public names, start-up, the built wheel installed elsewhere."""
 
 import re
+import shlex
 import subprocess
 import sys
 import sysconfig
@@ -143,6 +144,15 @@ def test_the_readme_works_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
     (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
     dots = output_of(elsewhere / "python", "-c", example, cwd=tmp_path).strip().splitlines()
     assert len(dots) == 9  # one for each pulse of the example
+
+
+@pytest.mark.slow
+def test_the_commands_of_the_readme_work_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
+    blocks = re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+    (commands,) = (block for block in blocks if "printhammer map" in block)
+    output_of("sh", "-ec", f"PATH={shlex.quote(str(elsewhere))}:$PATH\n{commands}", cwd=tmp_path)
+    made = {path.name for path in (tmp_path / "build").iterdir()}
+    assert made == {"map.png", "strobe.png", "sweep.toml", "sweep.zarr", "bench.json"}
 
 
 def test_the_readme_names_files_and_targets_that_exist() -> None:
