@@ -61,7 +61,7 @@ axes.set(
 # The residual follows the tolerance of the run. At the default of 2e-11 it is
 # below a billionth of the throughput.
 
-tolerances = [10.0**-k for k in range(4, 14)]
+tolerances = [10.0**-k for k in range(5, 14)]
 residuals = []
 for tolerance in tolerances:
     run = ph.simulate(hammer, drive, tolerance=tolerance, points=2)

@@ -10,6 +10,8 @@ ORDER = (
     "two_pulses",
     "fast_train",
     "frequency_map",
+    "strobe",
+    "sweep",
     "backstops",
     "energy_ledger",
     "inch_pound_file",
