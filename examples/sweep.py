@@ -39,7 +39,9 @@ spread = (1e6 * found.flight_time_spread).where(found.status == 0)
 print(f"{int((found.status == 0).sum())} of {found.status.size} runs got to their end")
 
 rates, fronts = found.rate.values, 1e6 * found.pack_front.values
-figure, axes = plt.subplots(1, 2, sharex=True, sharey=True, figsize=(8.0, 3.6))
+figure, axes = plt.subplots(
+    1, 2, sharex=True, sharey=True, figsize=(8.0, 3.6), layout="constrained"
+)
 limits = {"vmin": -0.5, "vmax": 9.5, "cmap": plt.get_cmap("cividis", 10)}
 picture = axes[0].pcolormesh(rates, fronts, lost, rasterized=True, **limits)
 figure.colorbar(picture, ax=axes[0], label="dots lost of nine", ticks=range(10))
@@ -59,7 +61,6 @@ for panel in axes:
     panel.set_xlabel("rate (Hz)")
 axes[0].set_ylabel("front of the pack (µm)")
 figure.suptitle("Nine-pulse bursts; white: the pack front of the paper")
-figure.tight_layout()
 
 # %%
 # The store is a folder of plain Zarr arrays with units and provenance in their
