@@ -5,7 +5,6 @@ In the text everything else stays as it is, comments and layout too.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -130,10 +129,17 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
 
 def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
     """Return a copy of a plain document with edits made."""
-    result = copy.deepcopy(dict(document))
+    result: dict[str, Any] = _copied(document)
     for key, value in edits:
-        _put(result, key, copy.deepcopy(value), dict)
+        _put(result, key, _copied(value), dict)
     return result
+
+
+def _copied(value: Any) -> Any:
+    """Return a copy of a plain value: tables and lists are new, what they hold cannot change."""
+    if isinstance(value, Mapping):
+        return {name: _copied(entry) for name, entry in value.items()}
+    return [_copied(entry) for entry in value] if isinstance(value, list) else value
 
 
 def changed_text(text: str, edits: Iterable[Edit]) -> str:
