@@ -150,17 +150,20 @@ class Ensemble:
     ends : float or array
         End of the runs, s, one for all or one for each.
     states : tuple or array, optional
-        Displacement, m, and velocity, m/s, at time 0: one for all or one row for each member; by default
+        Displacement, m, and velocity, m/s, at the start: one for all or one row for each member; by default
         the rest state of the member's hammer. Rows of four also hold the mode and the memory, as in
         `Strobes`, for a start inside the pack.
+    starts : float or array, optional
+        Time of these states, s, not negative, one for all or one for each; by default 0. What was fired
+        before is under way then.
     tolerance : float, optional
         Error allowed in one step, in units of the way from backstop to pack and of a typical speed.
 
     Raises
     ------
     InputError
-        Numbers of hammers, drives, ends and states that do not fit together; an end not positive; a state not
-        finite; a hammer without a rest state where no states are given.
+        Numbers of hammers, drives, ends, states and starts that do not fit together; an end not positive or
+        not after its start; a state not finite; a hammer without a rest state where no states are given.
     """
 
     def __init__(
@@ -170,6 +173,7 @@ class Ensemble:
         ends: float | npt.ArrayLike,
         *,
         states: npt.ArrayLike | None = None,
+        starts: float | npt.ArrayLike = 0.0,
         tolerance: float = TOLERANCE,
     ) -> None:
         check_tolerance(tolerance)
@@ -177,16 +181,14 @@ class Ensemble:
         one_hammer, one_drive = isinstance(hammers, Hammer), not isinstance(drives, list | tuple)
         many_hammers = [hammers] if isinstance(hammers, Hammer) else list(hammers)
         many_drives: list[Drive] = list(drives) if isinstance(drives, list | tuple) else [drives]  # type: ignore[list-item]
-        moments = _numbers(ends, "ends")
-        if moments.ndim > 1:
-            raise InputError(f"ends: an array of shape {moments.shape}, expected one number for each member")
-        moments = np.atleast_1d(moments)
+        moments, begun = _each(ends, "ends"), _each(starts, "starts")
         rows = None if states is None else _numbers(states, "states")
         counts = {
             "hammers": 1 if one_hammer else len(many_hammers),
             "drives": 1 if one_drive else len(many_drives),
             "ends": len(moments) if np.ndim(ends) else 1,
             "states": 1 if rows is None or rows.ndim < 2 else len(rows),
+            "starts": len(begun) if np.ndim(starts) else 1,
         }
         self.size = max(counts.values()) if min(counts.values()) > 0 else 0
         for name, count in counts.items():
@@ -199,6 +201,7 @@ class Ensemble:
         self.drives: list[Drive] = many_drives * (self.size if len(many_drives) == 1 else 1)
         self.ends = np.broadcast_to(moments, (self.size,)).astype(np.float64)
         self.states = self._states(rows)
+        self.states[:, 0] = self._checked_starts(begun)
         self._groups: list[Group] | None = None
 
     def _states(self, rows: FloatArray | None) -> FloatArray:
@@ -224,6 +227,14 @@ class Ensemble:
             if rows.shape[-1] == 4:
                 check_branch(hammer, row[1:].tolist())
         return full
+
+    def _checked_starts(self, begun: FloatArray) -> FloatArray:
+        starts = np.broadcast_to(begun, (self.size,))
+        wrong = ~(np.isfinite(starts) & (starts >= 0.0) & (starts < self.ends))
+        if wrong.any():
+            start, end = float(starts[wrong][0]), float(self.ends[wrong][0])
+            raise InputError(f"starts = {start!r} s, expected a number from 0 to before the end at {end!r} s")
+        return starts
 
     @property
     def groups(self) -> list[Group]:
@@ -263,6 +274,8 @@ class Ensemble:
 
         if self.states[member, 3] >= 0.0:
             raise InputError(f"member {member} starts on a branch inside the pack, which a motion cannot yet")
+        if self.states[member, 0] > 0.0:
+            raise InputError(f"member {member} starts later than at time 0, which a motion cannot yet")
         x, v = self.states[member, 1:3]
         return simulate(
             self.hammers[member],
@@ -420,6 +433,13 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
             works.append(job.piece)
             lengths.append(max(1, size // (PIECES_A_THREAD * threads)))
     in_threads(works, sizes, threads, progress, lengths)
+
+
+def _each(values: npt.ArrayLike, name: str) -> FloatArray:
+    found = _numbers(values, name)
+    if found.ndim > 1:
+        raise InputError(f"{name}: an array of shape {found.shape}, expected one number for each member")
+    return np.atleast_1d(found)
 
 
 def _numbers(values: npt.ArrayLike, name: str) -> FloatArray:
