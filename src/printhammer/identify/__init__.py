@@ -1,0 +1,1 @@
+"""Constants of a hammer from measurements: tables, fits with their uncertainty, fragments of hammer files."""

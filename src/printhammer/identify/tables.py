@@ -1,0 +1,215 @@
+"""Tables of measurements: CSV files whose heading gives every column its unit.
+
+The first line that is no comment is the heading, ``displacement [um],current [A],force [N]``, in any order
+and any unit of the dimension; every line after it is one row. Blank lines and lines that begin with # are
+passed over; a comment such as ``# sampling rate: 1 MHz`` is kept as a key and its text.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.units import describe, to_si
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.segments import FloatArray
+
+_NONE: Final[Mapping[str, str]] = MappingProxyType({})
+_NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of a file in the order of its rows.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    values : dict of str to array, shape (rows,)
+        Columns of numbers by name, SI.
+    words : dict of str to list of str
+        Columns of words by name, in lower case.
+    lines : array of int, shape (rows,)
+        Line of the file in which each row stands, counted from 1.
+    comments : dict of str to str
+        Comments of the form ``# key: value``; of a key given twice, the last.
+    """
+
+    path: Path
+    values: dict[str, FloatArray]
+    words: dict[str, list[str]]
+    lines: npt.NDArray[np.int64]
+    comments: dict[str, str]
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+
+def read_table(
+    path: str | Path,
+    columns: Mapping[str, str],
+    *,
+    optional: Mapping[str, str] = _NONE,
+    text: Mapping[str, tuple[str, ...]] = _NO_WORDS,
+) -> Table:
+    """Read a table.
+
+    Parameters
+    ----------
+    path : path
+        The file, UTF-8.
+    columns : mapping of str to str
+        Columns that must be there: name, in lower case, to SI unit.
+    optional : mapping of str to str, optional
+        Columns of numbers that may be left out.
+    text : mapping of str to tuple of str, optional
+        Columns of words, which may be left out: name to the words allowed, in lower case. They have no unit.
+
+    Returns
+    -------
+    Table
+        Numbers in SI; a column that was left out is not in it.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, has no rows, a column is missing, not known or given twice, lacks its unit
+        or has one of another dimension, a cell is no finite number or no word allowed, or a row has too many
+        or too few cells.
+    """
+    source = Path(path)
+    lines, comments = _lines(source)
+    wanted = _wanted(columns, optional, text)
+    if not lines:
+        raise InputError(f"{source}: the file has no heading, expected {wanted}")
+    names, units = _heading(source, lines[0], {**columns, **optional}, text, wanted)
+    missing = [name for name in columns if name not in names]
+    if missing:
+        raise InputError(
+            f"{source}: line {lines[0][0]}: the column {missing[0]!r} is missing, expected {wanted}"
+        )
+    if len(lines) < 2:
+        raise InputError(f"{source}: the table has no rows, expected them below the heading")
+    values: dict[str, FloatArray] = {name: np.empty(len(lines) - 1) for name in units}
+    words: dict[str, list[str]] = {name: [] for name in names if name in text}
+    for row, (number, cells) in enumerate(lines[1:]):
+        if len(cells) != len(names):
+            raise InputError(f"{source}: line {number} has {len(cells)} cells, expected {len(names)}")
+        for name, cell in zip(names, cells, strict=True):
+            where = f"{source}: line {number}, column {name!r}"
+            if name in text:
+                words[name].append(_word(cell, text[name], where))
+            else:
+                values[name][row] = _number(cell, *units[name], where)
+    rows = np.array([number for number, _cells in lines[1:]], dtype=np.int64)
+    return Table(source, values, words, rows, comments)
+
+
+def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], dict[str, str]]:
+    """Read the lines that carry cells, with their numbers, and the comments with a key."""
+    try:
+        content = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: expected a table in UTF-8 text") from None
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file, expected a table of measurements") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: the table cannot be read ({reason})") from None
+    found: list[tuple[int, list[str]]] = []
+    comments: dict[str, str] = {}
+    for number, line in enumerate(content.split("\n"), start=1):
+        bare = line.strip()
+        if bare.startswith("#"):
+            key, colon, value = bare.lstrip("#").partition(":")
+            if colon and key.strip():
+                comments[key.strip()] = value.strip()
+        elif bare.strip(","):
+            try:
+                found.append((number, next(csv.reader([line], strict=True))))
+            except csv.Error as error:
+                raise InputError(
+                    f"{path}: line {number}: expected comma-separated values ({error})"
+                ) from None
+    return found, comments
+
+
+def _heading(
+    path: Path,
+    line: tuple[int, list[str]],
+    numbers: Mapping[str, str],
+    text: Mapping[str, tuple[str, ...]],
+    wanted: str,
+) -> tuple[list[str], dict[str, tuple[str, str]]]:
+    """Return the names of the columns, and of those that hold numbers their unit and its SI unit."""
+    where = f"{path}: line {line[0]}"
+    names: list[str] = []
+    units: dict[str, tuple[str, str]] = {}
+    for cell in line[1]:
+        name, bracket, rest = cell.strip().partition("[")
+        unit, closed, tail = rest.partition("]")
+        name, unit = " ".join(name.lower().split()), unit.strip()
+        if name not in numbers and name not in text:
+            raise InputError(f"{where}: the column {cell.strip()!r} is not known, expected {wanted}")
+        if name in names:
+            raise InputError(f"{where}: the column {name!r} is given twice, expected it once")
+        names.append(name)
+        if name in text:
+            if bracket:
+                raise InputError(f"{where}: heading {cell.strip()!r}: expected {name!r}, words have no unit")
+            continue
+        if not closed or tail.strip() or not unit:
+            such = f"{name} [{numbers[name]}]"
+            raise InputError(
+                f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}"
+            )
+        try:
+            to_si(1.0, unit, numbers[name])
+        except InputError as error:
+            raise InputError(f"{where}: heading {cell.strip()!r}: {error}") from None
+        units[name] = unit, numbers[name]
+    return names, units
+
+
+def _number(cell: str, unit: str, si: str, where: str) -> float:
+    try:
+        number = float(cell)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(
+            f"{where}: {cell.strip()!r} is expected to be a finite number, {describe(si)} in {unit}"
+        )
+    try:
+        return to_si(number, unit, si)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _word(cell: str, allowed: Sequence[str], where: str) -> str:
+    word = cell.strip().lower()
+    if word not in allowed:
+        raise InputError(f"{where}: {cell.strip()!r}, expected {' or '.join(allowed)}")
+    return word
+
+
+def _wanted(
+    columns: Mapping[str, str], optional: Mapping[str, str], text: Mapping[str, tuple[str, ...]]
+) -> str:
+    """Return the phrase that says which columns are expected."""
+    must = ",".join(f"{name} [{si}]" for name, si in columns.items())
+    may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
+    return f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")
