@@ -1,0 +1,290 @@
+"""What the reconstruction found, as it ships with the package: base rates, predictions, search and family.
+
+Four JSON files in the folder `data` beside this module, each with ``"format": 1``; any of them may be absent.
+All values are SI.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from printhammer.claims.definition import KINDS, claims
+from printhammer.constants import shown
+from printhammer.errors import InputError
+from printhammer.reconstruction.shares import Share
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
+
+_Count = Annotated[int, Field(ge=0)]
+_Some = Annotated[int, Field(ge=1)]
+_Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _known(name: str) -> str:
+    if name not in claims():
+        raise ValueError("expected the name of a claim of the paper")
+    return name
+
+
+_ClaimName = Annotated[str, AfterValidator(_known)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class _Counted(_Table):
+    measured: _Count = Field(description="the number of hammers")
+    holds: _Count = Field(description="the number of those for which the claim holds")
+
+    @model_validator(mode="after")
+    def _possible(self) -> _Counted:
+        if self.holds > self.measured:
+            raise ValueError("expected no more hammers for which it holds than were measured")
+        return self
+
+
+class _Predicted(_Counted):
+    kind: Literal["stated", "typical", "shape"] = Field(description=f"one of {', '.join(KINDS)}")
+
+
+class _Panel(_Table):
+    measured: _Count = Field(description="the number of hammers")
+    as_printed: _Count = Field(description="the number of those with the verdict of the paper")
+
+    @model_validator(mode="after")
+    def _possible(self) -> _Panel:
+        if self.as_printed > self.measured:
+            raise ValueError("expected no more panels as printed than were measured")
+        return self
+
+
+class BaseRates(_Table):
+    """How often each claim holds among random plausible hammers."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    hammers: _Some = Field(description="the number of random hammers")
+    seed: int = Field(description="the seed of the random hammers")
+    space: dict[str, Annotated[list[Any], Field(min_length=3, max_length=3)]] = Field(
+        description="for each constant its lowest and highest value and their unit"
+    )
+    claims: dict[_ClaimName, _Counted] = Field(description="for each claim how often it holds")
+    poincare_panels: dict[str, _Panel] = Field({}, description="for each panel of Fig. 11 the same")
+
+    def share(self, name: str) -> Share | None:
+        """Return how often a claim holds; None where that was not measured."""
+        return _share(self.claims.get(name))
+
+    @property
+    def panels(self) -> dict[str, Share]:
+        """How often each panel of Fig. 11 is as printed."""
+        return {
+            name: Share(panel.measured, panel.as_printed)
+            for name, panel in self.poincare_panels.items()
+            if panel.measured
+        }
+
+
+class Predictions(_Table):
+    """Hammers found by searching on the stated claims alone, and the claims that did not steer."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    seed: int = Field(description="the seed of the search")
+    candidates: _Some = Field(description="the number of hammers tried")
+    hammers: _Count = Field(description="the number of hammers kept")
+    stated_held: list[_ClaimName] = Field(description="the stated claims that all of them satisfy")
+    claims: dict[_ClaimName, _Predicted] = Field(description="for each claim how often it holds")
+
+    def share(self, name: str) -> Share | None:
+        """Return for how many of the hammers a claim holds; None where that was not measured."""
+        return _share(self.claims.get(name))
+
+
+class _Candidates(_Table):
+    stated: _Count = Field(description="the number tried on the stated claims alone")
+    all: _Count = Field(description="the number tried on all claims")
+
+
+class BestFor(_Table):
+    """The hammer that comes closest to one claim."""
+
+    value: dict[str, Any] = Field(description="what was measured with it")
+    holds: bool = Field(description="whether the claim holds for it")
+    constants: dict[str, _Number] = Field(description="its constants by file key, SI")
+    costs: list[_ClaimName] = Field(description="the claims that it loses")
+
+
+class Failing(_Table):
+    """A claim that fails for the shipped hammer."""
+
+    value: dict[str, Any] = Field(description="what was measured with the shipped hammer")
+    why: str = Field(description="why it fails")
+    best: BestFor | None = Field(None, description="the best hammer for this claim")
+
+
+class Search(_Table):
+    """The search that found the shipped hammer."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    shipped: str = Field(description="the fingerprint of the shipped hammer")
+    seed: int = Field(description="the seed of the search")
+    candidates: _Candidates = Field(description="the numbers of hammers tried")
+    core_hours: Annotated[_Number, Field(ge=0.0)] = Field(description="the hours of one core that it took")
+    tolerance: Annotated[_Number, Field(gt=0.0)] = Field(description="the tolerance of its runs")
+    waveform: str = Field(description="the shape of its waveforms")
+    gauge: str = Field(description="how the common scale of masses and forces was fixed")
+    failing: dict[_ClaimName, Failing] = Field(description="the claims that fail for the shipped hammer")
+
+
+class FamilyMember(_Table):
+    """One hammer of the family."""
+
+    name: str = Field(description="its name")
+    constants: dict[str, _Number] = Field(description="its constants by file key, SI")
+    verdicts: dict[_ClaimName, Literal["holds", "fails"]] = Field(description="its verdict on each claim")
+    panels: Annotated[int, Field(ge=0)] = Field(description="the number of panels of Fig. 11 as printed")
+    conclusions: dict[str, _Number | None] = Field(description="what follows for it, by name, SI")
+
+
+class Conclusion(_Table):
+    """What follows for all hammers of the family."""
+
+    low: _Number | None = Field(description="the lowest value in the family")
+    high: _Number | None = Field(description="the highest value in the family")
+    robust: bool = Field(description="whether it holds for all of them")
+    text: str = Field(description="a sentence about it")
+
+
+class Family(_Table):
+    """Clearly different hammers that satisfy the claims about as well as the shipped one."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    hammers: list[FamilyMember] = Field(min_length=1, description="the hammers")
+    conclusions: dict[str, Conclusion] = Field(description="what holds for all of them, and what does not")
+
+
+FILES: Final[dict[str, type[_Table]]] = {
+    "base_rates": BaseRates,
+    "predictions": Predictions,
+    "search": Search,
+    "family": Family,
+}
+"""Name of each file, less ".json", to what it holds."""
+
+_Model = TypeVar("_Model", bound=_Table)
+
+
+@dataclass(frozen=True)
+class Results:
+    """The results in a folder; each is None where its file is absent.
+
+    Attributes
+    ----------
+    folder : Path or Traversable
+        The folder.
+    """
+
+    folder: Path | Traversable
+
+    @cached_property
+    def base_rates(self) -> BaseRates | None:
+        """How often each claim holds among random plausible hammers."""
+        return self._read("base_rates", BaseRates)
+
+    @cached_property
+    def predictions(self) -> Predictions | None:
+        """What the search on the stated claims alone predicts."""
+        return self._read("predictions", Predictions)
+
+    @cached_property
+    def search(self) -> Search | None:
+        """The search that found the shipped hammer."""
+        return self._read("search", Search)
+
+    @cached_property
+    def family(self) -> Family | None:
+        """Different hammers for which the claims hold as well."""
+        return self._read("family", Family)
+
+    def check(self) -> None:
+        """Read all files.
+
+        Raises
+        ------
+        InputError
+            A file is not what it should be.
+        """
+        for name in FILES:
+            getattr(self, name)
+
+    def _read(self, name: str, model: type[_Model]) -> _Model | None:
+        path = self.folder / f"{name}.json"
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or "not UTF-8"
+            raise InputError(f"{path}: the file cannot be read ({reason})") from None
+        try:
+            document = json.loads(text, parse_constant=_refuse)
+        except ValueError as error:
+            raise InputError(f"{path}: expected JSON ({error})") from None
+        try:
+            return model.model_validate(document)
+        except ValidationError as error:
+            raise InputError(f"{path}: {_sentence(error, model)}") from None
+
+
+def shipped_results() -> Results:
+    """Return the results that ship with the package."""
+    return Results(files("printhammer").joinpath("reconstruction", "data"))
+
+
+def results_in(folder: str | Path) -> Results:
+    """Return the results in a folder.
+
+    Raises
+    ------
+    InputError
+        There is no such folder.
+    """
+    path = Path(folder)
+    if not path.is_dir():
+        raise InputError(f"{path}: expected a folder with the results of a reconstruction")
+    return Results(path)
+
+
+def _share(found: _Counted | None) -> Share | None:
+    return Share(found.measured, found.holds) if found is not None and found.measured else None
+
+
+def _refuse(text: str) -> None:
+    raise ValueError(f"{text} is no number of JSON")
+
+
+def _sentence(error: ValidationError, model: type[_Table]) -> str:
+    """Tell the first fault: key, value and what was expected."""
+    fault = error.errors(include_url=False)[0]
+    steps = [step for step in fault["loc"] if step != "[key]"]
+    key = "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")
+    if fault["type"] == "missing":
+        return f"{key} is missing"
+    if fault["type"] == "extra_forbidden":
+        place = f", expected one of {', '.join(model.model_fields)}" if len(steps) == 1 else ""
+        return f"the key {shown(key, quotes=False)} is not known{place}"
+    wanted = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    wanted = wanted if wanted.startswith("expected") else f"expected {wanted}"
+    if fault["type"] == "model_type":
+        return f"expected an object for {key or 'the whole file'}"
+    if isinstance(fault["input"], dict | list):
+        return f"{key}: {wanted}"
+    return f"{key} = {shown(fault['input'])}: {wanted}"

@@ -1,0 +1,61 @@
+"""How many of many: a share with its binomial interval."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from statistics import NormalDist
+from typing import Any, Final
+
+CONFIDENCE: Final = 0.95
+"""Of the interval of a share."""
+
+_Z: Final = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)
+
+
+@dataclass(frozen=True)
+class Share:
+    """Of `measured` hammers something holds for `holds`.
+
+    Attributes
+    ----------
+    measured : int
+        Number of hammers, at least one.
+    holds : int
+        Number of those for which it holds.
+    """
+
+    measured: int
+    holds: int
+
+    @property
+    def rate(self) -> float:
+        """The share, from 0 to 1."""
+        return self.holds / self.measured
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval of the share, after E. B. Wilson, J. Amer. Statist. Assoc. 22 (1927) 209.
+
+        It is the set of probabilities p with |rate - p| <= z sqrt(p (1 - p) / n), and so stays within 0 and 1
+        and has a width even where none or all hold.
+        """
+        n, p = self.measured, self.rate
+        middle = p + _Z**2 / (2.0 * n)
+        half = _Z * sqrt(p * (1.0 - p) / n + (_Z / (2.0 * n)) ** 2)
+        scale = 1.0 + _Z**2 / n
+        # The ends are exact where none or all hold.
+        low = 0.0 if self.holds == 0 else (middle - half) / scale
+        high = 1.0 if self.holds == n else (middle + half) / scale
+        return low, high
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what goes to `claims.json`."""
+        low, high = self.interval
+        return {
+            "rate": self.rate,
+            "low": low,
+            "high": high,
+            "measured": self.measured,
+            "holds": self.holds,
+        }
