@@ -46,6 +46,28 @@ def test_what_was_there_stays_if_writing_fails(hammer: "ph.Hammer", tmp_path: Pa
     assert (tmp_path / "figure2.png").read_bytes() == b"old"
 
 
+def test_an_interrupted_call_leaves_all_files_as_they_were(
+    hammer: "ph.Hammer", tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure = FIGURES[2].draw(hammer)
+    kinds = ("svg", "pdf", "png")
+    for kind in kinds:
+        (tmp_path / f"figure2.{kind}").write_bytes(b"old")
+    whole = figure.savefig
+
+    def stopped(path: Path, **options: object) -> None:
+        if options["format"] == "png":
+            raise KeyboardInterrupt
+        whole(path, **options)
+
+    monkeypatch.setattr(figure, "savefig", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        save(figure, tmp_path, "figure2")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {
+        f"figure2.{kind}": b"old" for kind in kinds
+    }
+
+
 def test_an_unknown_format_is_refused(hammer: "ph.Hammer", tmp_path: Path) -> None:
     with pytest.raises(ph.InputError, match=r"^format = 'gif', expected one of svg, pdf, png$"):
         save(FIGURES[2].draw(hammer), tmp_path, "figure2", formats=["gif"])

@@ -15,7 +15,7 @@ from printhammer.claims.judging import Measured, measures
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.chaos import Verdict
+    from printhammer.chaos import Strobe, Verdict
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
     from printhammer.hammer import Hammer
@@ -34,6 +34,7 @@ _CHANGED: Final[dict[str, Callable[[int], int]]] = {
 """How all constants of a hammer are changed at once: sign of the change by the number of the constant."""
 
 _APERIODIC: Final = "no period"
+_PANELS: Final = "panels of Fig. 11"
 
 
 def printed_verdicts() -> dict[float, str]:
@@ -58,13 +59,27 @@ def panel_name(period: float) -> str:
     return f"{period * 1e3:.2f} ms"
 
 
+def panel_strobes(context: Context) -> list[Strobe]:
+    """Return the first points of the trains of Fig. 11, judged; those of the claim if it has been judged."""
+    points = claims()["poincare_window"].settings["points"]
+    return context.once(
+        _PANELS,
+        lambda: strobes(context.hammer, [*printed_verdicts()], points=points, tolerance=context.tolerance),
+    )
+
+
 def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]:
     """Return the verdicts on trains by how they were computed, each in the order of the periods, s."""
     hammers = [context.hammer, *(changed(context.hammer, sign) for sign in _CHANGED.values())]
     every = strobes(
-        [hammer for hammer in hammers for _ in periods], periods * len(hammers), tolerance=context.tolerance
+        [hammer for hammer in hammers for _ in periods],
+        periods * len(hammers),
+        points=claims()["poincare_window"].settings["points"],
+        tolerance=context.tolerance,
     )
     fine = strobes(context.hammer, periods, tolerance=_TIGHTER * context.tolerance)
+    # For the figure, which shows the same trains.
+    context.once(_PANELS, lambda: every[: len(periods)])
     found = {}
     for number, name in enumerate((_PLAIN, *_CHANGED)):
         found[name] = _verdicts(every[number * len(periods) : (number + 1) * len(periods)])
@@ -72,7 +87,7 @@ def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]
     return found
 
 
-def _verdicts(found: Any) -> list[Verdict]:
+def _verdicts(found: list[Strobe]) -> list[Verdict]:
     return [strobe.verdict for strobe in found if strobe.verdict is not None]
 
 

@@ -55,20 +55,22 @@ def save(
     if unknown:
         raise InputError(f"format = {unknown[0]!r}, expected one of {', '.join(FORMATS)}")
     target = Path(folder)
-    written: list[Path] = []
+    paths = {kind: target / f"{name}.{kind}" for kind in formats}
+    drafts = {kind: target / f".{name}.{kind}.part" for kind in formats}
     try:
         target.mkdir(parents=True, exist_ok=True)
-        for kind in formats:
-            path, draft = target / f"{name}.{kind}", target / f".{name}.{kind}.part"
-            try:
+        try:
+            for kind, draft in drafts.items():
                 with in_style():
                     figure.savefig(draft, format=kind, dpi=dpi, metadata=_METADATA[kind])
-                draft.replace(path)
-            finally:
+            # All or none, so that an interrupted call leaves no files of two figures under one name.
+            for kind, draft in drafts.items():
+                draft.replace(paths[kind])
+        finally:
+            for draft in drafts.values():
                 draft.unlink(missing_ok=True)
-            written.append(path)
     except OSError as error:
         raise InputError(
             f"{target}: the figure {name} cannot be written ({error.strerror or error})"
         ) from None
-    return written
+    return list(paths.values())
