@@ -1,0 +1,109 @@
+"""What a sensor of limited bandwidth shows: the first-order low-pass of a motion and of a waveform, exactly.
+
+The output y of a sensor of bandwidth f (-3 dB) follows tau y' = u - y with tau = 1 / (2 pi f). Where u is a polynomial
+p, one solution is p - tau p' + tau^2 p'' - ..., and what is left of the past dies as exp(-t / tau). No sampling of u
+enters but its own pieces.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from printhammer.segments import EXPONENTIAL, POLYNOMIAL
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.segments import FloatArray
+
+
+def time_constant(bandwidth: float | None) -> float:
+    """Return the time constant, s, of a sensor of a bandwidth, Hz; 0 for None, a sensor without delay."""
+    return 0.0 if bandwidth is None else 1.0 / (2.0 * math.pi * bandwidth)
+
+
+def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) -> FloatArray:
+    """Return what the sensor shows of a motion that was at rest until the first time.
+
+    Between the times the displacement is the cubic that has the given values and slopes.
+
+    Parameters
+    ----------
+    times : array, shape (n,)
+        Ascending, s.
+    x, v : array, shape (n, columns)
+        Displacements, m, and velocities, m/s, of several motions, or derivatives of them.
+    tau : float
+        Time constant, s.
+
+    Returns
+    -------
+    array, shape (n, columns)
+        Output, m.
+    """
+    if tau == 0.0 or len(times) < 2:
+        return x.copy()
+    h = np.diff(times)[:, np.newaxis]
+    rise = np.diff(x, axis=0) / h
+    second = (6.0 * rise - 4.0 * v[:-1] - 2.0 * v[1:]) / h
+    third = 6.0 * (v[:-1] + v[1:] - 2.0 * rise) / (h * h)
+    at_start = x[:-1] - tau * (v[:-1] - tau * (second - tau * third))
+    at_end = x[1:] - tau * (v[1:] - tau * (second + third * h - tau * third))
+    kept = np.exp(-h / tau)
+    result = np.empty_like(x)
+    result[0] = x[0]
+    for k in range(len(h)):
+        result[k + 1] = at_end[k] + (result[k] - at_start[k]) * kept[k]
+    return result
+
+
+def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> FloatArray:
+    """Return what the sensor shows at times t, s, of a waveform that is fired at time 0.
+
+    Parameters
+    ----------
+    segments : array
+        Segment table, see `printhammer.segments`; its support ends.
+    t : array, shape (n,)
+        Ascending, s.
+    tau : float
+        Time constant, s; more than 0.
+
+    Returns
+    -------
+    array, shape (n,)
+        Output, A or N.
+    """
+    times = np.asarray(t, dtype=np.float64)
+    result = np.zeros(len(times))
+    left = 0.0
+    rows = segments.tolist()
+    for number, row in enumerate(rows):
+        last = number + 1 == len(rows)
+        end = math.inf if last else rows[number + 1][0]
+        inside = (times >= row[0]) & (times < end)
+        here = _settled(row, np.zeros(1), tau)[0]
+        s = times[inside] - row[0]
+        result[inside] = _settled(row, s, tau) + (left - here) * np.exp(-s / tau)
+        if not last:
+            span = np.array([end - row[0]])
+            left = float(_settled(row, span, tau)[0] + (left - here) * math.exp(-span[0] / tau))
+    return result
+
+
+def _settled(row: list[float], s: FloatArray, tau: float) -> FloatArray:
+    """Return the solution for one segment that has no decaying part of its own."""
+    _start, kind, p0, p1, p2, p3 = row
+    if kind == POLYNOMIAL:
+        value = p0 + s * (p1 + s * (p2 + s * p3))
+        return value - tau * (p1 + s * (2 * p2 + s * 3 * p3) - tau * (2 * p2 + 6 * p3 * s - tau * 6 * p3))
+    if kind == EXPONENTIAL:
+        left = 1.0 - p2 * tau
+        # Where both decay alike the solution is s exp(-s / tau), the limit of this one.
+        left = left if abs(left) > 1e-6 else math.copysign(1e-6, left)
+        return p0 + p1 / left * np.exp(-p2 * s)
+    turn = p2 * tau
+    return p0 + p1 * (np.sin(p2 * s + p3) - turn * np.cos(p2 * s + p3)) / (1.0 + turn * turn)

@@ -1,0 +1,87 @@
+"""What residuals and records say of their noise: its size, its outliers, its memory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.segments import FloatArray
+
+_MAD: Final = 1.482602218505602
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+_HUBER: Final = 1.345
+_FAR: Final = 4.5
+"""Residuals of more standard deviations are outliers: of 100 000 normal ones, less than one."""
+_LONGEST_MEMORY: Final = 8
+
+
+def robust_scale(values: FloatArray) -> float:
+    """Return the standard deviation of normal noise about 0 from its median absolute value."""
+    return _MAD * float(np.median(np.abs(values)))
+
+
+def noise_of_record(values: FloatArray) -> float:
+    """Return the standard deviation of the white noise in evenly spaced samples of something smoother.
+
+    From third differences, which leave no parabola; their median does not see outliers or contacts.
+    """
+    if len(values) < 8:
+        return 0.0
+    return robust_scale(np.diff(values, 3)) / float(np.sqrt(20.0))
+
+
+def huber_weights(residuals: FloatArray, scale: float) -> FloatArray:
+    """Return the weights of P. J. Huber (Ann. Math. Statist. 35 (1964) 73) for residuals of a given scale."""
+    size = np.abs(residuals) / scale
+    return np.where(size <= _HUBER, 1.0, _HUBER / np.maximum(size, _HUBER))
+
+
+def huber_cost(residuals: FloatArray, scale: float) -> float:
+    """Return the sum of Huber's loss, in units of half the variance."""
+    size = np.abs(residuals) / scale
+    return float(np.where(size <= _HUBER, size * size, _HUBER * (2.0 * size - _HUBER)).sum())
+
+
+def outliers_of(residuals: FloatArray, floor: float) -> npt.NDArray[np.bool_]:
+    """Return which residuals are larger than normal noise has them.
+
+    Parameters
+    ----------
+    residuals : array
+        Of data that are mostly good.
+    floor : float
+        Scale below which nothing counts as an outlier.
+    """
+    return np.abs(residuals) > _FAR * max(robust_scale(residuals), floor)
+
+
+def memory_factor(residuals: FloatArray) -> float:
+    """Return by how much the variance of a slow average exceeds that of independent residuals.
+
+    An autoregressive process is fitted (Yule and Walker), its order by the Bayes criterion; the factor is its
+    spectrum at frequency 0 over its variance. 1 for white noise.
+    """
+    count = len(residuals)
+    centred = residuals - residuals.mean() if count else residuals
+    longest = min(_LONGEST_MEMORY, count // 20)
+    if longest < 1 or not centred.any():
+        return 1.0
+    r = np.array([float(centred[: count - k] @ centred[k:]) for k in range(longest + 1)]) / count
+    best, factor = count * np.log(r[0]), 1.0
+    error = r[0]
+    a = np.zeros(0)
+    for order in range(1, longest + 1):
+        # Levinson's recursion.
+        reflection = (r[order] - a @ r[order - 1 : 0 : -1]) / error if order > 1 else r[1] / error
+        a = np.append(a - reflection * a[::-1], reflection)
+        error *= 1.0 - reflection * reflection
+        if error <= 0.0:
+            break
+        told = count * np.log(error) + order * np.log(count)
+        if told < best:
+            best, factor = told, error / (1.0 - a.sum()) ** 2 / r[0]
+    return float(factor)
