@@ -1,0 +1,323 @@
+"""Least squares as measurements need it: outliers left out, weights from the data, errors that stay honest.
+
+    data = law(p) + noise,   variance of the noise in row i = sum over j of spread[i, j] theta[j]
+
+A robust fit (soft-l1 loss, scale from the median absolute residual) finds the parameters and the components
+theta >= 0 of the variance; rows too far off are left out; the rest is fitted by weighted least squares until
+rows and weights stay as they are. The covariance is the sandwich HC3 (J. G. MacKinnon and H. White, J.
+Econometrics 29 (1985) 305), which is right also where the weights are not.
+
+An error in the abscissa enters as a column of `spread` that is the squared slope of the law (effective
+variance: J. Orear, Am. J. Phys. 50 (1982) 912).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.segments import FloatArray
+
+_FALSE_OUTLIERS: Final = 0.01
+"""How many rows of good data with normal noise are left out, on average, in one fit."""
+
+_CLIP: Final = 2.5
+"""Residuals count as no larger than this, in standard deviations, while the outliers are not known."""
+
+_EXACT: Final = 1e-11
+"""Residuals below this part of the data are rounding, not noise."""
+
+_ROUNDS: Final = 30
+
+
+class Law(Protocol):
+    """What is fitted: data as a function of parameters."""
+
+    def value(self, p: FloatArray) -> FloatArray:
+        """Return the data that the law expects, shape (m,)."""
+
+    def jacobian(self, p: FloatArray) -> FloatArray:
+        """Return their derivatives by the parameters, shape (m, n)."""
+
+    def spread(self, p: FloatArray) -> FloatArray:
+        """Return how much each component of the variance has in each row, shape (m, q), not negative."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Parameters and what the residuals say.
+
+    Attributes
+    ----------
+    p : array, shape (n,)
+        Parameters.
+    covariance : array, shape (n, n)
+        Of the parameters.
+    fitted, residuals : array, shape (m,)
+        The law, and the data less the law.
+    jacobian : array, shape (m, n)
+        At `p`.
+    variance : array, shape (m,)
+        Of the noise in each row; all 1 where the data are exact.
+    outliers : array of bool, shape (m,)
+        Rows left out.
+    degrees_of_freedom : int
+        Rows used less parameters.
+    residual_scale : float
+        Root of the sum of squared residuals over the degrees of freedom.
+    condition_number : float
+        Of the weighted Jacobian with columns of unit length.
+    exact : bool
+        Whether the residuals are no more than rounding.
+    """
+
+    p: FloatArray
+    covariance: FloatArray
+    fitted: FloatArray
+    residuals: FloatArray
+    jacobian: FloatArray
+    variance: FloatArray
+    outliers: npt.NDArray[np.bool_]
+    degrees_of_freedom: int
+    residual_scale: float
+    condition_number: float
+    exact: bool
+
+    @property
+    def used(self) -> npt.NDArray[np.bool_]:
+        """Rows that were not left out."""
+        found: npt.NDArray[np.bool_] = ~self.outliers
+        return found
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Roots of the diagonal of the covariance, shape (n,)."""
+        found: FloatArray = np.sqrt(np.diag(self.covariance))
+        return found
+
+    @property
+    def weights(self) -> FloatArray:
+        """Proportional to 1 / variance, the largest 1, shape (m,)."""
+        found: FloatArray = self.variance.min() / self.variance
+        return found
+
+
+def solve(law: Law, data: FloatArray, start: FloatArray, *, robust: bool = True) -> Solution:
+    """Fit a law to data.
+
+    Parameters
+    ----------
+    law : Law
+        The law and its derivatives.
+    data : array, shape (m,)
+        More rows than parameters.
+    start : array, shape (n,)
+        Parameters near enough to begin with.
+    robust : bool, optional
+        Whether rows that lie too far off are left out.
+
+    Returns
+    -------
+    Solution
+        The parameters with their covariance.
+    """
+    m, n = len(data), len(start)
+    used = np.ones(m, dtype=bool)
+    p = _least_squares(law, data, np.ones(m), used, start)
+    if robust:
+        for _ in range(3):
+            scale = _mad(data - law.value(p))
+            if scale <= _EXACT * np.abs(data).max():
+                break
+            p = _least_squares(law, data, np.full(m, scale * scale), used, p, loss="soft_l1")
+    exact = _is_exact(data, data - law.value(p))
+    variance = np.ones(m)
+    seen: set[bytes] = set()
+    for step in range(_ROUNDS):
+        residuals = data - law.value(p)
+        exact = _is_exact(data, residuals[used])
+        if exact:
+            variance = np.ones(m)
+        else:
+            variance = _variance(law.spread(p), residuals, used, n, clipped=robust and step == 0)
+        if robust and not exact:
+            found = _inside(law.jacobian(p), residuals, variance, used)
+            if found.tobytes() in seen:
+                # Where rows come and go by turns they stay out.
+                found &= used
+            seen.add(found.tobytes())
+        else:
+            found = used
+        if found.sum() <= n:
+            found = used
+        after = _least_squares(law, data, variance, found, p)
+        same = bool(np.array_equal(found, used))
+        moved = bool(np.any(np.abs(after - p) > 1e-9 * np.abs(after)))
+        p, used = after, found
+        if step > 0 and same and (exact or not moved):
+            break
+    return _solution(law, data, p, variance, used, exact=exact)
+
+
+def _solution(
+    law: Law,
+    data: FloatArray,
+    p: FloatArray,
+    variance: FloatArray,
+    used: npt.NDArray[np.bool_],
+    *,
+    exact: bool,
+) -> Solution:
+    fitted = law.value(p)
+    residuals, jacobian = data - fitted, law.jacobian(p)
+    freedom = int(used.sum()) - len(p)
+    root = np.sqrt(variance[used])
+    rows, errors = jacobian[used] / root[:, None], residuals[used] / root
+    length = np.linalg.norm(rows, axis=0)
+    length[length == 0.0] = 1.0
+    singular = np.linalg.svd(rows / length, compute_uv=False)
+    condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else math.inf
+    scale = math.sqrt(float(np.sum(residuals[used] ** 2)) / max(freedom, 1))
+    return Solution(
+        p,
+        sandwich(rows, errors),
+        fitted,
+        residuals,
+        jacobian,
+        variance,
+        ~used,
+        freedom,
+        scale,
+        condition,
+        exact,
+    )
+
+
+def sandwich(rows: FloatArray, errors: FloatArray) -> FloatArray:
+    """Return the covariance HC3 of a linear regression.
+
+    Parameters
+    ----------
+    rows : array, shape (m, n)
+        Weighted Jacobian.
+    errors : array, shape (m,)
+        Weighted residuals.
+
+    Returns
+    -------
+    array, shape (n, n)
+        Of the parameters.
+    """
+    length = np.linalg.norm(rows, axis=0)
+    length[length == 0.0] = 1.0
+    inverse = np.linalg.pinv(rows / length) / length[:, None]
+    # A row that alone determines a parameter has no residual of its own; it counts like one with 0.9.
+    left = np.maximum(1.0 - leverage(rows), 0.1)
+    half = inverse * (errors / left)
+    found: FloatArray = half @ half.T
+    return found
+
+
+def leverage(rows: FloatArray) -> FloatArray:
+    """Return how much each row determines its own fitted value, 0 to 1, shape (m,)."""
+    basis, singular, _ = np.linalg.svd(rows, full_matrices=False)
+    kept = basis[:, singular > 1e-12 * singular[0]] if singular.size else basis
+    found: FloatArray = np.sum(kept * kept, axis=1)
+    return found
+
+
+def _least_squares(
+    law: Law,
+    data: FloatArray,
+    variance: FloatArray,
+    used: npt.NDArray[np.bool_],
+    start: FloatArray,
+    loss: Any = "linear",
+) -> FloatArray:
+    from scipy.optimize import least_squares
+
+    root = np.sqrt(variance[used])
+    found = least_squares(
+        lambda p: (law.value(p)[used] - data[used]) / root,
+        start,
+        jac=lambda p: law.jacobian(p)[used] / root[:, None],
+        method="trf",
+        loss=loss,
+        x_scale="jac",
+        ftol=1e-15,
+        xtol=1e-15,
+        gtol=1e-15,
+        max_nfev=200,
+    )
+    return np.asarray(found.x, dtype=np.float64)
+
+
+def _is_exact(data: FloatArray, residuals: FloatArray) -> bool:
+    return bool(np.sqrt(np.mean(residuals**2)) <= _EXACT * np.abs(data).max())
+
+
+def _mad(residuals: FloatArray) -> float:
+    """Return the standard deviation of normal noise that has this median absolute residual."""
+    return 1.482602218505602 * float(np.median(np.abs(residuals)))
+
+
+def _variance(
+    spread: FloatArray,
+    residuals: FloatArray,
+    used: npt.NDArray[np.bool_],
+    parameters: int,
+    *,
+    clipped: bool,
+) -> FloatArray:
+    """Return the variance of each row by maximum likelihood of its components.
+
+    Each step multiplies every component by the ratio of what the residuals ask for to what they have; a
+    component that is not needed goes to zero.
+    """
+    from scipy.stats import chi2
+
+    g, r2 = spread[used], residuals[used] ** 2
+    size = g.mean(axis=0)
+    g = g[:, size > 0.0] / size[size > 0.0]
+    kept = spread[:, size > 0.0] / size[size > 0.0]
+    first = _mad(residuals[used]) ** 2 if clipped else float(r2.mean())
+    theta = np.full(g.shape[1], (first or float(r2.mean())) / g.shape[1])
+    limit = _CLIP * _CLIP
+    # Mean of a squared normal number that is cut at the limit.
+    mean = float(chi2.cdf(limit, 3) + limit * chi2.sf(limit, 1)) if clipped else 1.0
+    share = len(r2) / (len(r2) - parameters) if len(r2) > parameters else 1.0
+    for _ in range(500):
+        v = g @ theta
+        ratio = share * r2 / v
+        if clipped:
+            ratio = np.minimum(ratio, limit)
+        factor = np.sqrt((g.T @ (ratio / (mean * v))) / (g.T @ (1.0 / v)))
+        theta = theta * factor
+        if np.abs(np.where(theta > 1e-9 * theta.max(), factor, 1.0) - 1.0).max() < 1e-6:
+            break
+    # Weights that rest on a handful of residuals would follow their noise: no row counts 1e4 times another.
+    v = kept @ theta
+    found: FloatArray = np.maximum(v, 1e-4 * v.max())
+    return found
+
+
+def _inside(
+    jacobian: FloatArray, residuals: FloatArray, variance: FloatArray, used: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.bool_]:
+    """Return which rows lie as far off as noise can put them."""
+    from scipy.stats import norm
+
+    root = np.sqrt(variance)
+    rows = jacobian / root[:, None]
+    freedom = int(used.sum()) - rows.shape[1]
+    free = np.ones(len(root))
+    free[used] = np.maximum(1.0 - leverage(rows[used]), 0.1) if freedom > 0 else 1.0
+    limit = float(norm.isf(0.5 * _FALSE_OUTLIERS / len(root)))
+    found: npt.NDArray[np.bool_] = np.abs(residuals) <= limit * root * np.sqrt(free)
+    return found
