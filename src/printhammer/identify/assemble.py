@@ -97,10 +97,9 @@ def assemble(
     for k in kept:
         key, unit, in_file = parameters[k]
         value, error = float(solution.p[k]), float(errors[k])
-        constants[key] = FittedConstant.of(
-            key, value, error, solution.degrees_of_freedom, unit, in_file=in_file
-        )
-        if error > _WEAK * abs(value) and not solution.exact:
+        freedom = float(solution.freedoms[k])
+        constants[key] = FittedConstant.of(key, value, error, freedom, unit, in_file=in_file)
+        if in_file and error > _WEAK * abs(value) and not solution.exact:
             profiles[key] = profile(law, data.values, solution, k)
     weak = [
         f"{key} is weakly determined: its profile puts it between {found.interval[0]:.4g} and"
@@ -166,29 +165,28 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
     values = best + error * np.linspace(-4.0, 4.0, _GRID)
     increase = np.empty(_GRID)
 
-    def cost(value: float, start: FloatArray) -> tuple[float, FloatArray]:
-        def full(rest: FloatArray) -> FloatArray:
-            p = solution.p.copy()
-            p[others], p[index] = rest, value
-            return p
+    def full(rest: FloatArray, value: float) -> FloatArray:
+        p = solution.p.copy()
+        p[others], p[index] = rest, value
+        return p
 
-        if not others.any():
-            return float(np.sum(((law.value(full(start)) - data)[used] / root) ** 2)), start
-        found = least_squares(
-            lambda rest: (law.value(full(rest)) - data)[used] / root,
-            start,
-            jac=lambda rest: law.jacobian(full(rest))[used][:, others] / root[:, None],
-            x_scale="jac",
-        )
-        return 2.0 * float(found.cost), found.x
+    def residuals(rest: FloatArray, value: float) -> FloatArray:
+        found: FloatArray = (law.value(full(rest, value)) - data)[used] / root
+        return found
+
+    def jacobian(rest: FloatArray, value: float) -> FloatArray:
+        found: FloatArray = law.jacobian(full(rest, value))[used][:, others] / root[:, None]
+        return found
 
     middle = _GRID // 2
     for way in (range(middle, _GRID), range(middle, -1, -1)):
         rest = solution.p[others]
         for k in way:
-            total, rest = cost(float(values[k]), rest)
+            if others.any():
+                rest = least_squares(residuals, rest, jac=jacobian, x_scale="jac", args=(values[k],)).x
+            total = float(np.sum(residuals(rest, float(values[k])) ** 2))
             increase[k] = max(total - least, 0.0) * freedom / least
-    level = student(freedom) ** 2
+    level = student(float(solution.freedoms[index])) ** 2
     ends = (
         _crossing(values[middle::-1], increase[middle::-1], level, -math.inf),
         _crossing(values[middle:], increase[middle:], level, math.inf),

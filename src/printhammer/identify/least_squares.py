@@ -4,8 +4,9 @@
 
 A robust fit (soft-l1 loss, scale from the median absolute residual) finds the parameters and the components
 theta >= 0 of the variance; rows too far off are left out; the rest is fitted by weighted least squares until
-rows and weights stay as they are. The covariance is the sandwich HC3 (J. G. MacKinnon and H. White, J.
-Econometrics 29 (1985) 305), which is right also where the weights are not.
+rows and weights stay as they are. The covariance is the sandwich HC2, which is right also where the weights
+are not, with degrees of freedom of its own for each parameter (R. M. Bell and D. F. McCaffrey, Survey
+Methodology 28 (2002) 169; G. W. Imbens and M. Kolesar, Rev. Econ. Stat. 98 (2016) 701).
 
 An error in the abscissa enters as a column of `spread` that is the squared slope of the law (effective
 variance: J. Orear, Am. J. Phys. 50 (1982) 912).
@@ -34,6 +35,9 @@ _EXACT: Final = 1e-11
 """Residuals below this part of the data are rounding, not noise."""
 
 _ROUNDS: Final = 30
+
+_FEW: Final = 1000
+"""With more rows than this, the degrees of freedom are those of all residuals."""
 
 
 class Law(Protocol):
@@ -69,6 +73,8 @@ class Solution:
         Rows left out.
     degrees_of_freedom : int
         Rows used less parameters.
+    freedoms : array, shape (n,)
+        Degrees of freedom with which the variance of each parameter is known.
     residual_scale : float
         Root of the sum of squared residuals over the degrees of freedom.
     condition_number : float
@@ -85,6 +91,7 @@ class Solution:
     variance: FloatArray
     outliers: npt.NDArray[np.bool_]
     degrees_of_freedom: int
+    freedoms: FloatArray
     residual_scale: float
     condition_number: float
     exact: bool
@@ -184,23 +191,25 @@ def _solution(
     singular = np.linalg.svd(rows / length, compute_uv=False)
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else math.inf
     scale = math.sqrt(float(np.sum(residuals[used] ** 2)) / max(freedom, 1))
+    covariance, freedoms = sandwich(rows, errors)
     return Solution(
         p,
-        sandwich(rows, errors),
+        covariance,
         fitted,
         residuals,
         jacobian,
         variance,
         ~used,
         freedom,
+        freedoms,
         scale,
         condition,
         exact,
     )
 
 
-def sandwich(rows: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return the covariance HC3 of a linear regression.
+def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the covariance HC2 of a linear regression, and its degrees of freedom.
 
     Parameters
     ----------
@@ -211,17 +220,28 @@ def sandwich(rows: FloatArray, errors: FloatArray) -> FloatArray:
 
     Returns
     -------
-    array, shape (n, n)
+    covariance : array, shape (n, n)
         Of the parameters.
+    freedoms : array, shape (n,)
+        For the Student's t of each parameter, those of Bell and McCaffrey.
     """
+    m, n = rows.shape
     length = np.linalg.norm(rows, axis=0)
     length[length == 0.0] = 1.0
     inverse = np.linalg.pinv(rows / length) / length[:, None]
     # A row that alone determines a parameter has no residual of its own; it counts like one with 0.9.
-    left = np.maximum(1.0 - leverage(rows), 0.1)
-    half = inverse * (errors / left)
-    found: FloatArray = half @ half.T
-    return found
+    left = np.sqrt(np.maximum(1.0 - leverage(rows), 0.1))
+    half = inverse / left
+    covariance: FloatArray = (half * errors) @ (half * errors).T
+    freedoms = np.full(n, float(max(m - n, 1)))
+    if m > _FEW or m <= n:
+        return covariance, freedoms
+    rest = np.eye(m) - rows @ inverse
+    for k in range(n):
+        # The estimated variance is a quadratic form of the noise; its mean and spread give the freedom.
+        form = rest * half[k] ** 2 @ rest
+        freedoms[k] = np.trace(form) ** 2 / np.sum(form * form)
+    return covariance, freedoms
 
 
 def leverage(rows: FloatArray) -> FloatArray:
@@ -243,10 +263,19 @@ def _least_squares(
     from scipy.optimize import least_squares
 
     root = np.sqrt(variance[used])
+
+    def residuals(p: FloatArray) -> FloatArray:
+        found: FloatArray = (law.value(p)[used] - data[used]) / root
+        return found
+
+    def jacobian(p: FloatArray) -> FloatArray:
+        found: FloatArray = law.jacobian(p)[used] / root[:, None]
+        return found
+
     found = least_squares(
-        lambda p: (law.value(p)[used] - data[used]) / root,
+        residuals,
         start,
-        jac=lambda p: law.jacobian(p)[used] / root[:, None],
+        jac=jacobian,
         method="trf",
         loss=loss,
         x_scale="jac",

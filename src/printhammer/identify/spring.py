@@ -40,7 +40,8 @@ class SpringLaw:
 
     def value(self, p: FloatArray) -> FloatArray:
         """Return the force, N."""
-        return p[0] * (1.0 - self.travel / p[1])
+        force: FloatArray = p[0] * (1.0 - self.travel / p[1])
+        return force
 
     def jacobian(self, p: FloatArray) -> FloatArray:
         """Return its derivatives by Bs and As."""
