@@ -265,12 +265,22 @@ def remember_step(pool: Any, i: int, which: int, slot: Any) -> None:
 
 @compiled
 def turn_in_pack(
-    pool: Any, i: int, t: float, x: float, which: int, slot: Any, dots: Any, hammer: Hammer
+    pool: Any,
+    i: int,
+    t: float,
+    x: float,
+    which: int,
+    slot: Any,
+    dots: Any,
+    hammer: Hammer,
+    control: Any,
 ) -> int:
     """Go on after the velocity became zero inside the pack at displacement `x`.
 
     As :func:`printhammer.kernel.run.reversed_mode` tells; where the armature would rest, the member leaves.
     """
+    # As in the plain kernel: swings too small to be told from rest would never end.
+    still = R.STILL * control[1] * control[1] / control[0]
     inward = lane_acceleration(pool, i, t, x, 0.0, LOADING, 0.0) > 0.0
     if (inward and which == R.LOADING_POOL) or (RELOAD_ALONG_UNLOADING and which == R.UNLOADING_POOL):
         return LEAVES
@@ -280,10 +290,10 @@ def turn_in_pack(
         dots[dot, 5] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
     if inward:
         enter(pool, i, t, x, 0.0, LOADING, slot[R.PACK_STEP], 0.0)
-        return R.LOADING_POOL
+        return R.LOADING_POOL if pool[R.A * R.BLOCK + i] > still else LEAVES
     enter(pool, i, t, x, 0.0, UNLOADING, slot[R.PACK_STEP], pack_memory(hammer[PACK:BACKSTOP_PART], x))
     pool[R.PEAK * R.BLOCK + i] = x
-    return R.UNLOADING_POOL if pool[R.A * R.BLOCK + i] < 0.0 else LEAVES
+    return R.UNLOADING_POOL if pool[R.A * R.BLOCK + i] < -still else LEAVES
 
 
 @compiled
@@ -325,7 +335,7 @@ def after_switch(
     if switch == REVERSAL:
         if x <= hammer[FRONT]:
             return LEAVES
-        return turn_in_pack(pool, i, t, x, which, slot, dots, hammer)
+        return turn_in_pack(pool, i, t, x, which, slot, dots, hammer, control)
     if switch == LEFT_FRONT:
         if int(slot[R.DOT]) >= 0:
             dots[int(slot[R.DOT]), 3] = t

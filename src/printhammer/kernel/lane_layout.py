@@ -13,6 +13,9 @@ BLOCK = 16
 MOST_STEPS = 5e7
 """Steps after which a member leaves the lanes."""
 
+STILL = 1e-12
+"""Acceleration that counts as none, in typical speeds over typical times, as in the plain kernel."""
+
 # The constants of a hammer, in the places that `layout` gives them otherwise.
 INVERSE_MASS = 0
 POSITION = 1
