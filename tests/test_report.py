@@ -9,6 +9,7 @@ import pytest
 from printhammer.claims import claims
 from printhammer.errors import InputError
 from printhammer.report import build, write_report
+from printhammer.report.citations import cited_figures
 from printhammer.report.quantities import band_text, split_name, typeset, value_text
 
 if TYPE_CHECKING:
@@ -121,11 +122,12 @@ def test_figures_are_written_and_shown(folder: Path, page: Page) -> None:
 
 
 def test_claims_are_shown_beside_the_figures_they_cite() -> None:
-    assert build._cited("captions of Figs. 2 and 3") == {2, 3}
-    assert build._cited("Fig. 7 and its text") == {7}
-    assert build._cited("abstract, Figs. 8 and 9") == {8, 9}
-    assert build._cited("Figs. 3, 8 and 9") == {3, 8, 9}
-    assert build._cited("Introduction") == set()
+    assert cited_figures("captions of Figs. 2 and 3") == {2, 3}
+    assert cited_figures("Fig. 7 and its text") == {7}
+    assert cited_figures("abstract, Figs. 8 and 9") == {8, 9}
+    assert cited_figures("Figs. 3, 8 and 9") == {3, 8, 9}
+    assert cited_figures("Poincaré plots") == {11}
+    assert cited_figures("Introduction") == set()
 
 
 def test_the_same_again_is_the_same(hammer: "ph.Hammer", folder: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from printhammer import report
 from printhammer.claims import claims
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.figures import PaperFigure
+from printhammer.report import build
 
 
 @pytest.fixture
@@ -50,10 +51,15 @@ def test_figure_11_is_told_what_the_paper_says(cli, hammer, tmp_path: Path, monk
         return Figure()
 
     monkeypatch.setattr(PaperFigure, "draw", blank)
+    monkeypatch.setattr(build, "panel_strobes", lambda _context: "those of the claim")
     assert cli("figure", "11", "--out", tmp_path / "alone").status == 0
     report.write_report(hammer, tmp_path / "report", claims=[], figures=[11])
     assert cli("figure", "3", "--out", tmp_path / "other").status == 0
-    assert told == [{"printed": printed_verdicts()}] * 2 + [{}]
+    assert told == [
+        {"printed": printed_verdicts()},
+        {"printed": printed_verdicts(), "strobes": "those of the claim"},
+        {},
+    ]
 
 
 @pytest.mark.slow

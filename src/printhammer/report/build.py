@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import tomllib
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -12,15 +11,21 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import Context, Result, buzz_search, judge_all
-from printhammer.claims.verdicts import printed_verdicts
+from printhammer.claims.verdicts import panel_strobes, printed_verdicts
 from printhammer.errors import InputError, PrinthammerError
-from printhammer.outputs import make_folder, write_file
+from printhammer.outputs import write_file
+from printhammer.reconstruction.results import Results, shipped_results
+from printhammer.report.citations import cited_figures
+from printhammer.report.publish import CLAIMS, PAGE, PDF, PICTURES, staged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
+    from matplotlib.figure import Figure
+
     from printhammer.hammer import Hammer
+    from printhammer.reconstruction.results import BaseRates
 
 _BUZZ: Final = 7
 _POINCARE: Final = 11
@@ -46,6 +51,8 @@ class Drawing:
         Claims that cite the figure.
     seconds : float
         Time that it took.
+    figure : Figure or None
+        The picture, to be drawn elsewhere.
     """
 
     number: int
@@ -56,6 +63,7 @@ class Drawing:
     reason: str
     claims: tuple[Result, ...]
     seconds: float
+    figure: Figure | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)
@@ -72,6 +80,8 @@ class Report:
         The figures.
     provenance : mapping
         Versions, fingerprint, tolerance.
+    found : Results
+        What the reconstruction found.
     seconds : float
         Time that all took.
     files : list of Path
@@ -81,13 +91,19 @@ class Report:
     hammer: Hammer
     results: list[Result]
     drawings: list[Drawing]
-    provenance: Mapping[str, str]
+    provenance: Mapping[str, Any]
+    found: Results
     seconds: float
     files: list[Path] = field(default_factory=list)
 
     def count(self, verdict: str) -> int:
         """Return how many claims have a verdict."""
         return sum(result.verdict == verdict for result in self.results)
+
+    @property
+    def reconstructed(self) -> bool:
+        """Whether the hammer is the one that the reconstruction is about."""
+        return self.found.search is not None and self.found.search.shipped == self.hammer.fingerprint
 
 
 def write_report(
@@ -97,6 +113,8 @@ def write_report(
     progress: Callable[[str], None] | None = None,
     claims: Iterable[str] | None = None,
     figures: Iterable[int] | None = None,
+    found: Results | None = None,
+    pdf: bool = False,
 ) -> Report:
     """Judge the claims, draw the figures, and write the report of a hammer.
 
@@ -110,6 +128,10 @@ def write_report(
         Called with a phrase before each step.
     claims, figures : iterable, optional
         Names and numbers of those to report; by default all.
+    found : Results, optional
+        What the reconstruction found; by default what ships with the package.
+    pdf : bool, optional
+        Whether to write `report.pdf` too.
 
     Returns
     -------
@@ -119,37 +141,52 @@ def write_report(
     Raises
     ------
     InputError
-        The folder cannot be written to; what was there stays.
+        The folder cannot be written to, or a result of the reconstruction cannot be read. What was there
+        stays.
     """
     from printhammer.report.page import page
 
     tell = progress or (lambda _: None)
-    folder = make_folder(out)
-    pictures = make_folder(folder / "figures")
-    start = perf_counter()
-    context = Context(hammer)
-    results = judge_all(hammer, claims, progress=lambda name: tell(f"claim {name}"), context=context)
-    drawn = None if figures is None else set(figures)
-    written: list[Path] = []
-    drawings = []
-    for number, says in _sayings().items():
-        if drawn is not None and number not in drawn:
-            continue
-        tell(f"figure {number}")
-        drawing = _draw(context, number, says, results, pictures, written)
-        if drawing is not None:
-            drawings.append(drawing)
-    report = Report(hammer, results, drawings, _provenance(hammer, context), perf_counter() - start, written)
-    tell("page")
-    for name, text in (("claims.json", claims_json(results)), ("index.html", page(report))):
-        write_file(folder / name, text)
-        written.append(folder / name)
+    found = shipped_results() if found is None else found
+    found.check()
+    with staged(out) as folder:
+        start = perf_counter()
+        context = Context(hammer)
+        results = judge_all(hammer, claims, progress=lambda name: tell(f"claim {name}"), context=context)
+        drawn = None if figures is None else set(figures)
+        written: list[Path] = []
+        drawings = []
+        for number, says in _sayings().items():
+            if drawn is not None and number not in drawn:
+                continue
+            tell(f"figure {number}")
+            drawing = _draw(context, number, says, results, folder / PICTURES, written)
+            if drawing is not None:
+                drawings.append(drawing)
+        provenance = _provenance(hammer, context)
+        report = Report(hammer, results, drawings, provenance, found, perf_counter() - start, written)
+        tell("page")
+        for name, text in ((CLAIMS, claims_json(results, found.base_rates)), (PAGE, page(report))):
+            write_file(folder / name, text)
+            written.append(folder / name)
+        if pdf:
+            from printhammer.report.pdf import write_pdf
+
+            tell("PDF")
+            write_pdf(report, folder / PDF)
+            written.append(folder / PDF)
+        places = [path.relative_to(folder) for path in written]
+    written[:] = [folder.parent / place for place in places]
     return report
 
 
-def claims_json(results: list[Result]) -> str:
-    """Return the claims as JSON: a list of objects with name, kind, value, band and verdict, and more."""
-    return json.dumps([result.as_dict() for result in results], indent=2, allow_nan=False) + "\n"
+def claims_json(results: list[Result], rates: BaseRates | None = None) -> str:
+    """Return the claims as JSON: a list of objects with name, kind, value, band, verdict and more."""
+    entries = []
+    for result in results:
+        share = rates.share(result.claim.name) if rates is not None else None
+        entries.append({**result.as_dict(), "base_rate": None if share is None else share.as_dict()})
+    return json.dumps(entries, indent=2, allow_nan=False) + "\n"
 
 
 def _sayings() -> dict[int, dict[str, str]]:
@@ -173,7 +210,7 @@ def _draw(
         return None
     entry = FIGURES[number]
     start = perf_counter()
-    svg, reason = b"", ""
+    svg, reason, figure = b"", "", None
     try:
         options: dict[str, Any] = {}
         if number == _BUZZ:
@@ -181,6 +218,7 @@ def _draw(
             options["search"] = buzz_search(context)
         elif number == _POINCARE:
             options["printed"] = printed_verdicts()
+            options["strobes"] = panel_strobes(context)
         figure = entry.draw(context.hammer, **options)
     except InputError as error:
         reason = str(error)
@@ -188,16 +226,18 @@ def _draw(
         paths = save(figure, folder, f"figure{number:02d}")
         svg = next(path for path in paths if path.suffix == ".svg").read_bytes()
         written += paths
-    cited = tuple(result for result in results if number in _cited(result.claim.source))
+    cited = tuple(result for result in results if number in cited_figures(result.claim.source))
     return Drawing(
-        number, entry.title, entry.caption, says["says"], svg, reason, cited, perf_counter() - start
+        number,
+        entry.title,
+        entry.caption,
+        " ".join(says["says"].split()),
+        svg,
+        reason,
+        cited,
+        perf_counter() - start,
+        figure,
     )
-
-
-def _cited(source: str) -> set[int]:
-    """Return the numbers of the figures that a source names."""
-    found = re.search(r"Figs?\. ([\d, and]+)", source)
-    return {int(number) for number in re.findall(r"\d+", found[1])} if found else set()
 
 
 def _provenance(hammer: Hammer, context: Context) -> dict[str, Any]:

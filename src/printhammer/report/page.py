@@ -7,61 +7,83 @@ import json
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.report.quantities import band_text, split_name, typeset, value_text
+from printhammer.report.misses import misses
+from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text
+from printhammer.report.views import (
+    claims_of_family,
+    conclusions_view,
+    constants_of_family,
+    failing_view,
+    linked_source,
+    members_view,
+    panels_view,
+    predictions_view,
+    rates_view,
+    timings_view,
+)
 
 if TYPE_CHECKING:
     from printhammer.claims import Result
     from printhammer.hammer import Hammer
     from printhammer.report.build import Report
 
-_KINDS: Final = {
+KINDS: Final = {
     "stated": "the paper prints the number or the verdict; the band is the printed precision",
     "typical": "the paper calls it typical of such actuators, or an ideal; the band is wide",
     "shape": "a qualitative statement turned into a number; the threshold is ours",
 }
+VERDICTS: Final = ("holds", "fails", "not yet")
 
 
 def page(report: Report) -> str:
     """Return the HTML page of a report."""
-    from jinja2 import Environment, StrictUndefined
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    folder = files("printhammer").joinpath("report")
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("printhammer", "report/templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters["typeset"] = typeset
-    template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
-    return template.render(
+    environment.filters["percent"] = percent
+    environment.filters["words"] = lambda name: name.replace("_", " ")
+    folder = files("printhammer").joinpath("report", "templates")
+    found = report.found
+    drawn = {drawing.number for drawing in report.drawings}
+    return environment.get_template("page.html.j2").render(
         style=folder.joinpath("page.css").read_text(encoding="utf-8"),
+        report=report,
         hammer=report.hammer,
-        statuses=_statuses(report.hammer),
-        reconstruction=any(c.status == "reconstructed" for c in report.hammer.constants.values()),
+        statuses=statuses_of(report.hammer),
+        has_reconstructed=any(c.status == "reconstructed" for c in report.hammer.constants.values()),
         parts=_parts(report.hammer),
-        verdicts={verdict: report.count(verdict) for verdict in ("holds", "fails", "not yet")},
-        kinds=_KINDS,
-        by_kind=_by_kind(report.results),
-        claims=[_claim(result) for result in report.results],
+        verdicts={verdict: report.count(verdict) for verdict in VERDICTS},
+        kinds=KINDS,
+        by_kind=by_kind(report.results),
+        judged={result.claim.name for result in report.results},
+        claims=[_claim(result, report, drawn) for result in report.results],
         drawings=[
-            {
-                "number": drawing.number,
-                "title": drawing.title,
-                "caption": drawing.caption,
-                "says": " ".join(drawing.says.split()),
-                "image": base64.b64encode(drawing.svg).decode("ascii"),
-                "reason": drawing.reason,
-                "claims": drawing.claims,
-            }
+            {"drawing": drawing, "image": base64.b64encode(drawing.svg).decode("ascii")}
             for drawing in report.drawings
         ],
-        provenance=report.provenance,
-        seconds=report.seconds,
-        slowest=sorted(report.results, key=lambda result: -result.seconds)[:5],
-        figure_seconds=sum(drawing.seconds for drawing in report.drawings),
-        claim_seconds=sum(result.seconds for result in report.results),
+        failing=failing_view(report),
+        rates=rates_view(report),
+        panels=panels_view(report),
+        search=found.search if report.reconstructed else None,
+        predictions=predictions_view(report) if report.reconstructed else None,
+        family=found.family if report.reconstructed else None,
+        conclusions=conclusions_view(report),
+        members=members_view(report),
+        spread=constants_of_family(report),
+        family_claims=claims_of_family(report),
+        timings=timings_view(report),
     )
 
 
-def _statuses(hammer: Hammer) -> dict[str, int]:
+def statuses_of(hammer: Hammer) -> dict[str, int]:
+    """Return how many constants of a hammer have each status."""
     found: dict[str, int] = {}
     for constant in hammer.constants.values():
         found[constant.status] = found.get(constant.status, 0) + 1
@@ -69,7 +91,7 @@ def _statuses(hammer: Hammer) -> dict[str, int]:
 
 
 def _parts(hammer: Hammer) -> list[dict[str, Any]]:
-    """Return the constants by part, sources numbered."""
+    """Return the constants by part."""
     laws = {role: part.law for role, part in hammer.parts.items()}
     if hammer.waveform is not None:
         laws["waveform"] = hammer.waveform.shape
@@ -82,29 +104,30 @@ def _parts(hammer: Hammer) -> list[dict[str, Any]]:
     ]
 
 
-def _by_kind(results: list[Result]) -> dict[str, dict[str, int]]:
-    counts: dict[str, dict[str, int]] = {}
+def by_kind(results: list[Result]) -> dict[str, dict[str, int]]:
+    """Return how many claims of each kind have each verdict."""
+    counts = {kind: dict.fromkeys(VERDICTS, 0) for kind in KINDS}
     for result in results:
-        row = counts.setdefault(result.claim.kind, {"holds": 0, "fails": 0, "not yet": 0})
-        row[result.verdict] += 1
+        counts[result.claim.kind][result.verdict] += 1
     return counts
 
 
-def _claim(result: Result) -> dict[str, Any]:
+def judged_lines(result: Result) -> list[dict[str, Any]]:
+    """Return the measured values of a claim that are banded, as text."""
+    value, missed = result.value or {}, set(result.missed)
+    lines = []
+    for name, wanted in result.claim.band.items():
+        words, unit = split_name(name)
+        shown = value_text(value.get(name), unit) if result.value is not None else ""
+        lines.append(
+            {"words": words, "value": shown, "band": band_text(wanted, unit), "met": name not in missed}
+        )
+    return lines
+
+
+def _claim(result: Result, report: Report, drawn: set[int]) -> dict[str, Any]:
     """Return a claim with its values as text: those that are banded, and the others."""
     value, band = result.value or {}, result.claim.band
-    missed = set(result.missed)
-    judged = []
-    for name, wanted in band.items():
-        words, unit = split_name(name)
-        judged.append(
-            {
-                "words": words,
-                "value": value_text(value.get(name), unit) if result.value is not None else "",
-                "band": band_text(wanted, unit),
-                "met": name not in missed,
-            }
-        )
     rest = {name: entry for name, entry in value.items() if name not in band}
     plain = {
         words: value_text(entry, unit)
@@ -115,10 +138,14 @@ def _claim(result: Result) -> dict[str, Any]:
     long = {
         name: json.dumps(entry) for name, entry in rest.items() if isinstance(entry, (dict, list)) and entry
     }
+    rates = report.found.base_rates
     return {
         "result": result,
-        "judged": judged,
+        "source": linked_source(result.claim.source, drawn),
+        "judged": judged_lines(result),
+        "misses": misses(result),
         "plain": plain,
         "long": long,
         "measured": result.value is not None,
+        "share": None if rates is None else rates.share(result.claim.name),
     }

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from decimal import Decimal
 from typing import Any, Final
 
 from printhammer.units import from_si
@@ -90,6 +92,21 @@ def typeset(text: str) -> str:
     """Return a sentence of ours with the signs that a page can show."""
     text = re.sub(r"(?<=\d) u([ms])\b", "\N{NO-BREAK SPACE}µ\\1", text)
     return text.replace(">=", "≥").replace("<=", "≤").replace(" -> ", " → ")
+
+
+def percent(part: float) -> str:
+    """Return a part of the whole as text, such as "3.1 %"; never 100 % or 0 % unless it is all or none."""
+    if part in (0.0, 1.0):
+        return f"{part:.0%}".replace("%", "\N{NO-BREAK SPACE}%")
+    shown = 100.0 * part
+    # The digits that tell it from all or none.
+    text = f"{shown:.2g}" if shown < 10.0 else f"{shown:.{max(0, math.ceil(-math.log10(100.0 - shown)))}f}"
+    return f"{_plain(text)}\N{NO-BREAK SPACE}%"
+
+
+def _plain(text: str) -> str:
+    """Return a number without exponent."""
+    return f"{Decimal(text):f}"
 
 
 def _both(value: float, unit: str, digits: str, *, other: bool = True) -> str:

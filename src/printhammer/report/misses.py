@@ -1,0 +1,103 @@
+"""By how much a claim fails."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.report.quantities import band_text, split_name, value_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from printhammer.claims import Claim, Result
+
+_LEAST: Final = {"above", "at_least"}
+
+
+@dataclass(frozen=True)
+class Miss:
+    """A measured value outside its band, as text.
+
+    Attributes
+    ----------
+    words : str
+        What was measured.
+    value, band : str
+        What it is, and what it must be.
+    distance : str
+        How far that is apart.
+    """
+
+    words: str
+    value: str
+    band: str
+    distance: str
+
+
+def misses(result: Result) -> list[Miss]:
+    """Return what of a result is not within its band; nothing where nothing could be measured."""
+    return [] if result.value is None else misses_of(result.claim, result.value)
+
+
+def misses_of(claim: Claim, value: Mapping[str, Any]) -> list[Miss]:
+    """Return what of measured values is not within the band of a claim."""
+    found = []
+    for name in claim.missed(value):
+        words, unit = split_name(name)
+        measured, band = value.get(name), claim.band[name]
+        if isinstance(band, list) and isinstance(band[0], str):
+            # One by one they are told elsewhere.
+            found.append(Miss(words, agreement(measured, band), "", ""))
+        else:
+            found.append(
+                Miss(words, value_text(measured, unit), band_text(band, unit), distance(measured, band, unit))
+            )
+    return found
+
+
+def agreement(value: Any, band: list[str]) -> str:
+    """Return how many words of a list are those that are wanted."""
+    given = value if isinstance(value, (list, tuple)) else []
+    same = sum(one == other for one, other in zip(given, band, strict=False))
+    return f"{same} of {len(band)} as printed"
+
+
+def distance(value: Any, band: Any, unit: str) -> str:
+    """Return how far a value is from its band, as text; empty where that is no number.
+
+    Parameters
+    ----------
+    value
+        A measured value outside the band, SI.
+    band
+        What it must be, as `printhammer.claims.Claim.band` has it.
+    unit : str
+        SI unit; empty for a pure number.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return ""
+    limit = _limit(float(value), band)
+    if limit is None:
+        return ""
+    if value == limit:
+        return "exactly at the limit"
+    way = "too small" if value < limit else "too large"
+    if limit == 0.0 or isinstance(value, int):
+        return f"{way} by {value_text(abs(value - limit), unit, other=False)}"
+    part = abs((value - limit) / limit)
+    return f"{way} by {100.0 * part:.3g} %" if part < 1.0 else f"{way} by {part:.2g} times the limit"
+
+
+def _limit(value: float, band: Any) -> float | None:
+    """Return the end of a band that a value outside it misses."""
+    if isinstance(band, dict):
+        for side, limit in band.items():
+            if (value <= limit if side == "above" else value < limit) and side in _LEAST:
+                return float(limit)
+            if (value >= limit if side == "below" else value > limit) and side not in _LEAST:
+                return float(limit)
+        return None
+    if isinstance(band, list):
+        return float(band[0] if value < band[0] else band[1])
+    return None if isinstance(band, (bool, str)) else float(band)

@@ -1,0 +1,303 @@
+"""What the templates of a report show: results of search and family as text and places on tracks."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.claims import claims as every_claim
+from printhammer.claims.verdicts import panel_name, printed_verdicts
+from printhammer.report.citations import CITATION, SECTIONS
+from printhammer.report.misses import Miss, misses, misses_of
+from printhammer.report.quantities import band_text, percent, split_name, value_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from printhammer.claims import Claim, Result
+    from printhammer.hammer import Hammer
+    from printhammer.reconstruction.results import BestFor
+    from printhammer.reconstruction.shares import Share
+    from printhammer.report.build import Report
+
+_ROOM: Final = 4.0
+"""Free part of a track at each end, in percent."""
+
+_SAME: Final = 1e-9
+"""Relative difference up to which two constants are the same."""
+
+
+def linked_source(source: str, drawn: set[int]) -> Any:
+    """Return a source as HTML, the numbers of drawn figures linked."""
+    from markupsafe import Markup, escape
+
+    def link(match: re.Match[str]) -> str:
+        number = match[0]
+        return f'<a href="#figure-{number}">{number}</a>' if int(number) in drawn else number
+
+    text = str(escape(source))
+    text = CITATION.sub(lambda found: re.sub(r"\d+", link, found[0]), text)
+    number = SECTIONS.get(source)
+    if number in drawn:
+        text += f' (<a href="#figure-{number}">Fig. {number}</a>)'
+    return Markup(text)
+
+
+def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
+    """Return a share as text and as places on a track, in percent; on a logarithmic one from a floor up."""
+    low, high = share.interval
+
+    def place(part: float) -> float:
+        if floor is None:
+            return 100.0 * part
+        return 100.0 * (1.0 - math.log10(max(part, floor)) / math.log10(floor))
+
+    return {
+        "share": share,
+        "rate": percent(share.rate),
+        "interval": f"{percent(low)} to {percent(high)}",
+        "dot": f"{place(share.rate):.2f}",
+        "low": f"{place(low):.2f}",
+        "width": f"{place(high) - place(low):.2f}",
+    }
+
+
+def rates_view(report: Report) -> dict[str, Any] | None:
+    """Return the base rates, the rarest first, on a logarithmic axis; None where there are none."""
+    rates = report.found.base_rates
+    if rates is None:
+        return None
+    found = [(result, rates.share(result.claim.name)) for result in report.results]
+    known = [(result, share) for result, share in found if share is not None]
+    # A rate of none is drawn at the left end.
+    positive = [share.rate or share.interval[1] for _, share in known]
+    decades = max(1, math.ceil(-math.log10(min(positive)) - 1e-12)) if positive else 1
+    floor = 10.0**-decades
+    known.sort(key=lambda entry: entry[1].rate)
+    return {
+        "rates": rates,
+        "rows": [{"result": result, **share_view(share, floor)} for result, share in known],
+        "unknown": [result for result, share in found if share is None],
+        "ticks": [
+            {"text": percent(10.0**-k), "place": f"{100.0 * (1.0 - k / decades):.2f}"}
+            for k in range(decades, -1, -1)
+        ],
+    }
+
+
+def panels_view(report: Report) -> list[dict[str, Any]]:
+    """Return the panels of Fig. 11: what is printed, what was found, and how often it is so by chance."""
+    verdicts: list[str] = []
+    for result in report.results:
+        if result.claim.name == "poincare" and result.value is not None:
+            verdicts = result.value["verdicts"]
+    rates = report.found.base_rates
+    shares = {} if rates is None else rates.panels
+    if not verdicts:
+        return []
+    rows = []
+    for (period, printed), found in zip(printed_verdicts().items(), verdicts, strict=True):
+        share = shares.get(panel_name(period))
+        rows.append(
+            {
+                "name": panel_name(period),
+                "printed": printed.replace("-", " "),
+                "found": found.replace("-", " "),
+                "same": found == printed,
+                "base": None if share is None else share_view(share),
+            }
+        )
+    return rows
+
+
+def predictions_view(report: Report) -> dict[str, Any] | None:
+    """Return what the search on the stated claims alone predicts; None where there is nothing."""
+    found = report.found.predictions
+    if found is None:
+        return None
+    rates = report.found.base_rates
+    verdicts = {result.claim.name: result for result in report.results}
+    rows = []
+    for name in every_claim():
+        share = found.share(name)
+        if share is None or found.claims[name].kind == "stated":
+            continue
+        base = None if rates is None else rates.share(name)
+        rows.append(
+            {
+                "name": name,
+                "kind": found.claims[name].kind,
+                "result": verdicts.get(name),
+                "base": None if base is None else share_view(base),
+                **share_view(share),
+            }
+        )
+    return {"found": found, "rows": rows}
+
+
+def failing_view(report: Report) -> list[dict[str, Any]]:
+    """Return the claims that fail: by how much, why, and the best hammer for each that the search met."""
+    search = report.found.search if report.reconstructed else None
+    rows = []
+    for result in report.results:
+        if result.verdict == "fails":
+            known = None if search is None else search.failing.get(result.claim.name)
+            best = None if known is None else known.best
+            rows.append(
+                {
+                    "result": result,
+                    "misses": misses(result),
+                    "why": "" if known is None else known.why,
+                    "best": None if best is None else _best_view(best, result.claim, report.hammer),
+                }
+            )
+    return rows
+
+
+def _best_view(best: BestFor, claim: Claim, hammer: Hammer) -> dict[str, Any]:
+    missed = {miss.words: miss for miss in misses_of(claim, best.value)}
+    lines = []
+    for name, wanted in claim.band.items():
+        words, unit = split_name(name)
+        if name in best.value:
+            miss = missed.get(words)
+            kept = Miss(words, value_text(best.value[name], unit), band_text(wanted, unit), "")
+            lines.append({"miss": miss or kept, "met": miss is None})
+    constants = []
+    for key, value in best.constants.items():
+        constant = hammer.constants.get(key)
+        ratio = value / constant.si if constant is not None and constant.si else None
+        if ratio is None or not math.isclose(ratio, 1.0, rel_tol=_SAME):
+            constants.append(
+                {
+                    "key": key,
+                    "value": f"{value:.4g}",
+                    "shipped": "" if constant is None else f"{constant.si:.4g}",
+                    "unit": "" if constant is None else constant.si_unit,
+                    "ratio": "" if ratio is None else f"{ratio:.3g}",
+                }
+            )
+    return {"holds": best.holds, "lines": lines, "constants": constants, "costs": best.costs}
+
+
+def conclusions_view(report: Report) -> list[dict[str, Any]]:
+    """Return the conclusions of the family, those that hold for all of its hammers first."""
+    family = report.found.family if report.reconstructed else None
+    if family is None:
+        return []
+    rows = []
+    for name, conclusion in family.conclusions.items():
+        words, unit = split_name(name)
+        values = [member.conclusions.get(name) for member in family.hammers]
+        rows.append(
+            {
+                "words": words,
+                "low": value_text(conclusion.low, unit, other=False),
+                "high": value_text(conclusion.high, unit, other=False),
+                "robust": conclusion.robust,
+                "text": conclusion.text,
+                "dots": _dots([value for value in values if value is not None]),
+            }
+        )
+    return sorted(rows, key=lambda row: not row["robust"])
+
+
+def _dots(values: Iterable[float], ends: tuple[float, float] | None = None) -> list[str]:
+    """Return places on a track, in percent, linear between the least and the largest value."""
+    values = list(values)
+    low, high = ends or (min(values, default=0.0), max(values, default=0.0))
+    span = high - low
+    return [f"{_ROOM + (100.0 - 2.0 * _ROOM) * ((v - low) / span if span else 0.5):.2f}" for v in values]
+
+
+def members_view(report: Report) -> dict[str, Any] | None:
+    """Return the hammers of the family with their verdicts and conclusions."""
+    family = report.found.family if report.reconstructed else None
+    if family is None:
+        return None
+    names = list(dict.fromkeys(name for member in family.hammers for name in member.conclusions))
+    kinds = {name: claim.kind for name, claim in every_claim().items()}
+    rows = []
+    for member in family.hammers:
+        stated = [verdict for name, verdict in member.verdicts.items() if kinds[name] == "stated"]
+        rows.append(
+            {
+                "name": member.name,
+                "stated": f"{stated.count('holds')} of {len(stated)}",
+                "all": f"{list(member.verdicts.values()).count('holds')} of {len(member.verdicts)}",
+                "panels": member.panels,
+                "values": [
+                    value_text(member.conclusions.get(name), split_name(name)[1], other=False)
+                    for name in names
+                ],
+            }
+        )
+    return {"heads": [split_name(name)[0] for name in names], "rows": rows, "panels": len(printed_verdicts())}
+
+
+def constants_of_family(report: Report) -> dict[str, Any] | None:
+    """Return the constants of the family relative to those of the shipped hammer, on a logarithmic axis."""
+    family = report.found.family if report.reconstructed else None
+    if family is None:
+        return None
+    ratios: dict[str, list[float]] = {}
+    for key, constant in report.hammer.constants.items():
+        values = [member.constants[key] for member in family.hammers if key in member.constants]
+        if values and all(value * constant.si > 0.0 for value in values):
+            ratios[key] = [value / constant.si for value in values]
+    moved = {key: found for key, found in ratios.items() if any(abs(ratio - 1.0) > _SAME for ratio in found)}
+    widest = max((abs(math.log(ratio)) for found in moved.values() for ratio in found), default=1.0)
+    return {
+        "rows": [
+            {
+                "constant": report.hammer.constants[key],
+                "low": f"{min(found):.3g}",
+                "high": f"{max(found):.3g}",
+                "dots": _dots([math.log(ratio) for ratio in found], (-widest, widest)),
+            }
+            for key, found in moved.items()
+        ],
+        "same": [key for key in ratios if key not in moved],
+        "ends": (f"{math.exp(-widest):.2g}", f"{math.exp(widest):.2g}"),
+    }
+
+
+def claims_of_family(report: Report) -> dict[str, Any] | None:
+    """Return which claims hold for all hammers of the family, for some, and for none."""
+    family = report.found.family if report.reconstructed else None
+    if family is None:
+        return None
+    counts = {}
+    for name in every_claim():
+        verdicts = [member.verdicts[name] for member in family.hammers if name in member.verdicts]
+        if verdicts:
+            counts[name] = (verdicts.count("holds"), len(verdicts))
+    return {
+        "every": [name for name, (holds, count) in counts.items() if holds == count],
+        "some": [(name, holds, count) for name, (holds, count) in counts.items() if 0 < holds < count],
+        "none": [name for name, (holds, _) in counts.items() if not holds],
+    }
+
+
+def timings_view(report: Report) -> dict[str, Any]:
+    """Return what took how long: figures and claims, the slowest first."""
+    entries: list[tuple[str, str, float]] = [
+        (f"Figure {drawing.number}", f"figure-{drawing.number}", drawing.seconds)
+        for drawing in report.drawings
+    ]
+    entries += [(_words(result), result.claim.name, result.seconds) for result in report.results]
+    longest = max((seconds for *_, seconds in entries), default=0.0) or 1.0
+    return {
+        "rows": [
+            {"name": name, "to": to, "seconds": f"{seconds:.2f}", "width": f"{100.0 * seconds / longest:.1f}"}
+            for name, to, seconds in sorted(entries, key=lambda entry: -entry[2])
+        ],
+        "all": f"{report.seconds:.1f}",
+        "figures": f"{sum(drawing.seconds for drawing in report.drawings):.1f}",
+        "claims": f"{sum(result.seconds for result in report.results):.1f}",
+    }
+
+
+def _words(result: Result) -> str:
+    return result.claim.name.replace("_", " ")
