@@ -162,6 +162,7 @@ def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
         The single pulse does not print, or does not return to the backstop; or a run ended early.
     """
     shared = Context(hammer) if context is None else context
+    force = shared.print_force
     largest, limits = flight_times(shared)
     energy = shared.single.energy
     return Conclusions(
@@ -174,7 +175,7 @@ def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
         pack_loss_J=energy.pack_loss,
         backstop_loss_J=energy.backstop_loss,
         settle_out_s=settle_out(shared),
-        print_force_N=shared.print_force,
+        print_force_N=force,
     )
 
 
@@ -232,8 +233,10 @@ def flight_times(context: Context) -> tuple[float, dict[str, float | None]]:
     dots = context.dots(
         [PulseTrain(context.waveform, rate=rate, pulses=settings["pulses"]) for rate in rates]
     )
-    # The first dot of a burst always has a flight time, or the single pulse would not print.
-    spreads = [spread(times[struck]) for times, struck in zip(dots.flight_time, dots.struck, strict=True)]
+    spreads = [
+        spread(times[struck].tolist()) if struck.any() else 0.0
+        for times, struck in zip(dots.flight_time, dots.struck, strict=True)
+    ]
     limits = {
         name: next((rate for rate, found in zip(rates, spreads, strict=True) if found > settings[name]), None)
         for name in ("engraved_s", "dot_matrix_s")

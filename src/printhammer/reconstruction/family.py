@@ -164,6 +164,8 @@ def write_family(
     forces = print_forces(hammers)
     printing = np.flatnonzero(np.isfinite(forces)).tolist()
     found, hammers = [found[i] for i in printing], [hammers[i] for i in printing]
+    if not found:
+        raise InputError(_too_few(paths, 0, least))
     tables = compared([row.constants for row in found], forces[printing].tolist())
     shelf = Shelf(place / "family.part.jsonl")
     members: dict[int, Member] = {}
@@ -180,10 +182,7 @@ def write_family(
         tell(f"{len(chosen)} hammers far from each other; now as many as there are")
         chosen = max(chosen, choose(tables, count, accept, wide=False), key=len)
     if len(chosen) < least:
-        names = ", ".join(str(path) for path in paths)
-        raise InputError(
-            f"{names}: {len(chosen)} clearly different hammers are in the logs, expected {least}"
-        )
+        raise InputError(_too_few(paths, len(chosen), least))
     family = [members[number] for number in chosen]
     rows = [
         dict(zip(_keys([row.constants for row in found]), tables[1][number], strict=True))
@@ -193,6 +192,11 @@ def write_family(
     write_file(place / "family.json", json_text(family, rows))
     shelf.remove()
     return family
+
+
+def _too_few(paths: Sequence[str | Path], count: int, least: int) -> str:
+    names = ", ".join(str(path) for path in paths)
+    return f"{names}: {count} clearly different hammers are in the logs, expected {least}"
 
 
 def promising(logged: Sequence[Logged], most: int = _MOST) -> list[Logged]:

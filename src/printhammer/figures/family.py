@@ -1,0 +1,188 @@
+"""The family of reconstructed hammers: their constants side by side, and what follows from each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.figures.marks import note
+from printhammer.figures.style import (
+    BLUE,
+    FAINT,
+    FAMILY,
+    HAIR,
+    INK,
+    MUTED,
+    ORANGE,
+    SMALL,
+    TINY,
+    new_figure,
+    sign,
+    styled,
+)
+from printhammer.units import from_si
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.hammer import Hammer
+
+_SHOWN: Final = {"s": ("ms", "ms"), "J": ("mJ", "mJ"), "Hz": ("Hz", "Hz"), "N": ("N", "N"), "m": ("um", "µm")}
+"""SI unit to the unit drawn, and how it is written."""
+
+_ROW: Final = 0.2
+_STRIP: Final = 0.52
+_COLUMNS: Final = 2
+_FAN: Final = 0.52
+"""Part of a row over which the members are spread, so that equal values do not hide each other."""
+
+_NICE: Final = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+_FEWEST_TICKS: Final = 5
+_EQUAL: Final = 1e-2
+"""Relative difference up to which a constant is the same for all, as one that sets a scale is."""
+
+
+@styled
+def family(
+    hammer: Hammer,
+    constants: Sequence[Mapping[str, float]],
+    conclusions: Sequence[Mapping[str, float | None]],
+    told: Mapping[str, Mapping[str, Any]],
+    *,
+    order: str = "safe_rate_Hz",
+) -> Figure:
+    """Draw the constants of a family over those of a hammer, and below them the conclusions.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer whose constants are 1.
+    constants : sequence of mapping
+        Of each member, key of a hammer file to value, SI, at the common gauge; of the hammer first.
+    conclusions : sequence of mapping
+        Of each member, name to value, SI, None where it has none.
+    told : mapping
+        Name of a conclusion to `title`, `unit`, `robust`, `low` and `high`, in the order in which they are
+        drawn.
+    order : str, optional
+        Conclusion by which members are coloured, light to dark, in all panels.
+
+    Returns
+    -------
+    Figure
+        A dot for each member in each row.
+    """
+    from matplotlib.colors import LinearSegmentedColormap
+
+    own, *members = constants
+    rows = [key for key in own if any(abs(row[key] - own[key]) > _EQUAL * abs(own[key]) for row in members)]
+    ranks = _ranks([row.get(order) for row in conclusions])
+    shades = LinearSegmentedColormap.from_list("family", FAMILY)(ranks)
+    deep = -(-len(told) // _COLUMNS)
+    upper, lower = 0.55 + _ROW * len(rows), _STRIP * deep
+    figure = new_figure(0.5 + upper + lower)
+    top, bottom = figure.subfigures(2, 1, height_ratios=(upper, lower), squeeze=False)[:, 0]
+    ax = top.add_subplot()
+    _constants(ax, rows, own, members, ranks, shades)
+    key = f"A dot for each of {len(members)} hammers; darker: higher {told[order]['title']}"
+    ax.set_title(key, loc="left", fontsize=SMALL, color=MUTED)
+    grid = bottom.add_gridspec(deep, _COLUMNS, wspace=0.06)
+    for number, (name, entry) in enumerate(told.items()):
+        column, row = divmod(number, deep)
+        strip = bottom.add_subplot(grid[row, column])
+        _conclusion(strip, entry, [found.get(name) for found in conclusions], ranks, shades)
+    sign(figure, hammer)
+    return figure
+
+
+def _ranks(values: Sequence[float | None]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return the places of values in their order, from 0 to 1; what is missing comes first."""
+    known = np.array([-np.inf if value is None else value for value in values])
+    places = np.argsort(np.argsort(known, kind="stable"), kind="stable")
+    return np.asarray(places / max(len(known) - 1, 1), dtype=np.float64)
+
+
+def _constants(
+    ax: Axes,
+    rows: Sequence[str],
+    own: Mapping[str, float],
+    members: Sequence[Mapping[str, float]],
+    ranks: Any,
+    shades: Any,
+) -> None:
+    ratios = np.array([[member[key] / own[key] for key in rows] for member in members])
+    ax.set_xscale("log")
+    ax.axvline(1.0, color=MUTED, lw=HAIR, zorder=1.0)
+    fan = _FAN * (0.5 - ranks)
+    for row, key in enumerate(rows):
+        found = ratios[:, row]
+        inside = found > 0.0
+        ax.axhline(row, color=FAINT, lw=HAIR, zorder=0.5)
+        ax.scatter(found[inside], row + fan[inside], s=11, c=shades[inside], lw=0.0, zorder=3.0, gid=key)
+        if not inside.all():
+            signs = f"{int((~inside).sum())} of the other sign"
+            ax.annotate(
+                signs,
+                (0.0, row),
+                (3, 0),
+                xycoords=("axes fraction", "data"),
+                textcoords="offset points",
+                fontsize=TINY,
+                color=ORANGE,
+                va="center",
+            )
+    seen = ratios[ratios > 0.0]
+    low, high = min(float(seen.min(initial=1.0)), 0.9) / 1.06, max(float(seen.max(initial=1.0)), 1.1) * 1.06
+    ax.set(xlim=(low, high), ylim=(len(rows) - 0.4, -0.6))
+    ax.set_yticks(range(len(rows)), list(rows))
+    ax.set_xlabel("Constant over that of the shipped hammer")
+    ticks = _ticks(low, high)
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    ax.tick_params(axis="x", which="minor", bottom=False)
+    ax.tick_params(axis="y", length=0.0)
+    ax.spines[["left", "right", "top"]].set_visible(False)
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Return round numbers for a logarithmic axis about 1."""
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    for steps in ((1.0,), (1.0, 2.0, 5.0), _NICE, tuple(np.arange(10, 100) / 10.0)):
+        ticks = [round(step * 10.0**decade, 9) for decade in decades for step in steps]
+        inside = [tick for tick in ticks if low <= tick <= high]
+        if len(inside) >= _FEWEST_TICKS:
+            return inside
+    return [1.0]
+
+
+def _conclusion(
+    ax: Axes, entry: Mapping[str, Any], values: Sequence[float | None], ranks: Any, shades: Any
+) -> None:
+    unit, written = _SHOWN.get(entry["unit"], (entry["unit"], entry["unit"]))
+    factor = from_si(1.0, entry["unit"], unit)
+    known = np.array([value is not None for value in values], dtype=np.bool_)
+    found = np.array([np.nan if value is None else value * factor for value in values])
+    colour = BLUE if entry["robust"] else ORANGE
+    if known.any():
+        low, high = float(np.nanmin(found)), float(np.nanmax(found))
+        room = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
+        # Values that hardly differ should look so.
+        room = max(room, 0.5 * (0.2 * abs(high) - (high - low)))
+        ax.set_xlim(low - room, high + room)
+        ax.plot([low, high], [0.0, 0.0], color=colour, lw=6.0, alpha=0.25, solid_capstyle="round", zorder=1.0)
+        fan = 0.8 * (ranks - 0.5)
+        ax.scatter(found[known], fan[known], s=9, c=shades[known], lw=0.0, zorder=3.0, gid=entry["title"])
+    ax.set(ylim=(-0.75, 0.75), yticks=[])
+    ax.locator_params(axis="x", nbins=5)
+    ax.tick_params(axis="x", labelsize=TINY, pad=1.5)
+    ax.spines[["left", "right", "top"]].set_visible(False)
+    missing = int((~known).sum())
+    told = f"{entry['title'].replace(' us ', ' µs ')}  [{written}]" + (
+        f", {missing} without" if missing else ""
+    )
+    ax.set_title(told, loc="left", fontsize=SMALL, color=INK, pad=2.0)
+    word = "robust" if entry["robust"] else "depends"
+    note(ax, word, (1.0, 1.02), ha="right", va="bottom", color=colour, fontsize=TINY)
