@@ -13,8 +13,8 @@ BLOCK = 16
 MOST_STEPS = 5e7
 """Steps after which a member leaves the lanes."""
 
-STILL = 1e-12
-"""Acceleration that counts as none, in typical speeds over typical times, as in the plain kernel."""
+STILL = 1e-8
+"""Acceleration, in typical speeds over typical times, at which a member about to rest leaves the lanes."""
 
 # The constants of a hammer, in the places that `layout` gives them otherwise.
 INVERSE_MASS = 0
