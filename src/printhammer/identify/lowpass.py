@@ -1,8 +1,8 @@
 """What a sensor of limited bandwidth shows: the first-order low-pass of a motion and of a waveform, exactly.
 
-The output y of a sensor of bandwidth f (-3 dB) follows tau y' = u - y with tau = 1 / (2 pi f). Where u is a polynomial
-p, one solution is p - tau p' + tau^2 p'' - ..., and what is left of the past dies as exp(-t / tau). No sampling of u
-enters but its own pieces.
+The output y of a sensor of bandwidth f (-3 dB) follows tau y' = u - y with tau = 1 / (2 pi f). Where u is a
+polynomial p, one solution is p - tau p' + tau^2 p'' - ..., and what is left of the past dies as exp(-t /
+tau). No sampling of u enters but its own pieces.
 """
 
 from __future__ import annotations

@@ -58,10 +58,10 @@ class Pulse:
         new = dict(zip(self.names, (float(value) for value in values), strict=True))
         return type(self.waveform)(**{**self.waveform.model_dump(), **new})
 
-
-def known_pulse(waveform: Waveform) -> Pulse:
-    """Return a waveform that is known exactly."""
-    return Pulse(waveform, (), np.zeros(0), np.zeros((0, 0)))
+    def at(self, values: Sequence[float]) -> Pulse:
+        """Return the waveform at other values of its constants, as one that is known exactly."""
+        waveform = self.changed(values) if self.names else self.waveform
+        return Pulse(waveform, (), np.zeros(0), np.zeros((0, 0)))
 
 
 def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform | None, tau: float) -> Pulse:
