@@ -49,7 +49,8 @@ def fragment(fit: Fit) -> str:
     """Return the constants as TOML text for a hammer file, with comments on what they hold for."""
     from printhammer.hammer_edit import changed_text
 
-    remarks = [f"Constants of a hammer file, fitted to {' and '.join(fit.source)}"]
+    files = f", fitted to {' and '.join(fit.source)}" if fit.source else ""
+    remarks = [f"Constants of a hammer file{files}"]
     remarks += [f"taken as known: {name} = {value}" for name, value in fit.given.items()]
     remarks += fit.indistinct
     if fit.rejected:
@@ -94,10 +95,11 @@ def report(fit: Fit) -> list[str]:
             f" {constant.standard_error:.2g}, 95 % interval {low:.6g} to {high:.6g}"
         )
     used = int((~fit.outliers).sum())
-    lines.append(
-        f"{used} data, {fit.degrees_of_freedom:g} degrees of freedom, residual scale"
-        f" {fit.residual_scale:.3g} {fit.axes[1][1]}, condition number {fit.condition_number:.3g}"
-    )
+    if used:
+        lines.append(
+            f"{used} data, {fit.degrees_of_freedom:g} degrees of freedom, residual scale"
+            f" {fit.residual_scale:.3g} {fit.axes[1][1]}, condition number {fit.condition_number:.3g}"
+        )
     if fit.outliers.any():
         which = ", ".join(str(line) for line in fit.lines[fit.outliers]) if len(fit.lines) else ""
         lines.append(f"{int(fit.outliers.sum())} outliers left out" + (f": lines {which}" if which else ""))
