@@ -24,6 +24,8 @@ from printhammer.identify.tables import read_table
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import numpy.typing as npt
+
     from printhammer.identify.least_squares import Solution
     from printhammer.identify.result import Fit
     from printhammer.identify.tables import Table
@@ -113,13 +115,14 @@ def fit_magnet(
 
 def _data(table: Table, alone: Table | None) -> Data:
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
-    shown = np.unique(current)
-    if len(shown) <= _LEVELS:
-        series = np.searchsorted(shown, current)
-        names = tuple(f"{level:.4g} A" for level in shown)
-    else:
-        series = np.zeros(len(x), dtype=np.int64)
-        names = ("magnet and spring",)
+    series = np.zeros(len(x), dtype=np.int64)
+    names: tuple[str, ...] = ("magnet and spring",)
+    groups = clusters(current)
+    if 1 < groups <= _LEVELS:
+        series = group_of(current)
+        digits = 2 - math.floor(math.log10(float(np.ptp(current))))
+        means = [round(float(np.mean(current[series == group])), digits) for group in range(groups)]
+        names = tuple(f"{mean + 0.0:g} A" for mean in means)
     files: tuple[Path, ...] = (table.path,)
     lines = table.lines
     if alone is not None:
@@ -130,7 +133,7 @@ def _data(table: Table, alone: Table | None) -> Data:
         lines = np.concatenate([lines, alone.lines])
         names, files = (*names, "spring alone"), (table.path, alone.path)
     axes = (("displacement", "m"), ("force", "N"))
-    return Data(files, "magnet", x, force, axes, series.astype(np.int64), names, lines)
+    return Data(files, "magnet", x, force, axes, series, names, lines)
 
 
 def _current(table: Table, alone: Table | None) -> FloatArray:
@@ -232,8 +235,16 @@ def _indistinct(with_spring: bool, levels: int) -> list[str]:
 
 def clusters(values: FloatArray) -> int:
     """Count the groups into which values fall, with gaps of a twentieth of their span; 0 for a continuum."""
-    span = float(np.ptp(values))
-    if span <= 1e-3 * float(np.abs(values).max()):
+    if float(np.ptp(values)) <= 1e-3 * float(np.abs(values).max()):
         return 1
-    found = 1 + int(np.count_nonzero(np.diff(np.sort(values)) > 0.05 * span))
+    found = 1 + int(group_of(values).max())
     return found if found > 1 else 0
+
+
+def group_of(values: FloatArray) -> npt.NDArray[np.int64]:
+    """Return to which of these groups each value belongs, from 0 for the least."""
+    order = np.argsort(values, kind="stable")
+    apart = np.diff(values[order]) > 0.05 * float(np.ptp(values))
+    group = np.empty(len(values), dtype=np.int64)
+    group[order] = np.concatenate([[0], np.cumsum(apart)])
+    return group

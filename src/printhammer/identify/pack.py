@@ -142,8 +142,8 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
         depth,
         force,
         (("indentation", "m"), ("force", "N")),
-        cycles.unloading.astype(np.int64),
-        ("loading", "unloading"),
+        cycles.unloading * (1 + law.column),
+        ("loading", *(f"unloading {turn + 1}" for turn in law.turns)),
         table.lines,
     )
     enough(data, law.parameters + _SPARE, "the stiffness of the pack, the turning points and their errors")

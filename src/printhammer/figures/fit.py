@@ -1,0 +1,226 @@
+"""A fit: data and law, residuals, their distribution, and how the constants go together."""
+
+from __future__ import annotations
+
+from itertools import cycle
+from textwrap import fill
+from typing import TYPE_CHECKING, Final, cast
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.figures.marks import note
+from printhammer.figures.scales import Name, Scale, label, scale
+from printhammer.figures.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    HAIR,
+    INK,
+    MUTED,
+    ORANGE,
+    SMALL,
+    THIN,
+    TINY,
+    YELLOW,
+    new_figure,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.identify.result import Fit
+    from printhammer.segments import FloatArray
+
+_COLOURS: Final = (BLUE, GREEN, YELLOW, INK, "#56b4e9", "#cc79a7", MUTED)
+_KINDS: Final = {
+    "displacement": "displacement",
+    "indentation": "displacement",
+    "force": "force",
+    "time": "time",
+    "current": "current",
+    "impact speed": "velocity",
+    "rebound speed": "velocity",
+}
+"""How each quantity of a table is shown."""
+
+_MANY: Final = 400
+"""From so many data on, points are drawn small."""
+
+_LEGEND: Final = 8
+_NAMED: Final = 6
+"""Largest number of outliers whose lines are named."""
+
+
+@styled
+def plot(fit: Fit) -> Figure:
+    """Draw a fit.
+
+    Parameters
+    ----------
+    fit : Fit
+        From `printhammer.identify`.
+
+    Returns
+    -------
+    Figure
+        Data with the law, residuals below; on the right the correlation of the constants and the residuals
+        against those of a normal distribution. Outliers that were left out are ringed.
+
+    Raises
+    ------
+    InputError
+        The fit has no data, as a stiffness computed from bodies.
+    """
+    if not len(fit.data):
+        raise InputError("the constants were computed without a table, expected a fit to data to draw")
+    figure = new_figure(5.6, 7.6)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0), height_ratios=(1.35, 1.0))
+    top, below = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0])
+    across = _scale(fit.axes[0][0], fit.abscissa)
+    up = _scale(fit.axes[1][0], fit.data)
+    _data(top, fit, across, up)
+    _residuals(below, fit, across, up)
+    if len(fit.keys) > 1:
+        _correlation(figure.add_subplot(grid[0, 1]), fit)
+        _quantiles(figure.add_subplot(grid[1, 1]), fit)
+    else:
+        _quantiles(figure.add_subplot(grid[:, 1]), fit)
+    told = f"{fit.kind} · {' and '.join(fit.source)}"
+    text = figure.supxlabel(told, x=0.99, ha="right", fontsize=TINY, color=MUTED)
+    text.set_in_layout(True)
+    if fit.rejected:
+        remark = fill(f"The data reject the law: {fit.rejected}.", 118)
+        figure.suptitle(remark, x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
+    return figure
+
+
+def _scale(name: str, values: FloatArray) -> Scale:
+    return scale(cast(Name, _KINDS[name]), float(np.abs(values).max()))
+
+
+def _size(fit: Fit) -> float:
+    return 3.2 if len(fit.data) < _MANY else 1.0
+
+
+def _data(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
+    x, measured, law = across.shown(fit.abscissa), up.shown(fit.data), up.shown(fit.fitted)
+    for number, (name, colour) in enumerate(zip(fit.series_names, cycle(_COLOURS), strict=False)):
+        mine = np.flatnonzero((fit.series == number) & ~fit.outliers)
+        order = mine[np.argsort(x[mine], kind="stable")]
+        ax.plot(x[order], measured[order], ls="none", marker="o", ms=_size(fit), mew=0.0, color=colour)
+        if _is_curve(law[order]):
+            ax.plot(x[order], law[order], lw=THIN, color=colour, label=name)
+        else:
+            ax.plot(x[order], law[order], ls="none", marker="_", ms=5.0, color=colour, label=name)
+    _ring(ax, fit, x, measured)
+    if len(fit.series_names) <= _LEGEND:
+        columns = 1 + (len(fit.series_names) > 4)
+        ax.legend(fontsize=TINY, loc="best", ncols=columns, framealpha=0.85, edgecolor="none")
+    label(ax, "x", across, fit.axes[0][0].capitalize())
+    label(ax, "y", up, fit.axes[1][0].capitalize())
+    ax.margins(0.03, 0.06)
+
+
+def _is_curve(values: FloatArray) -> bool:
+    """Tell whether values in the order of the abscissa make one curve, not several in turns."""
+    return float(np.abs(np.diff(values)).sum()) <= 4.0 * float(np.ptp(values)) if len(values) > 1 else False
+
+
+def _residuals(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
+    x, residuals = across.shown(fit.abscissa), up.shown(fit.residuals)
+    ax.axhline(0.0, color=MUTED, lw=HAIR, zorder=1.0)
+    used = ~fit.outliers
+    half = 1.96 * float(up.shown(fit.residual_scale)) * _spread(fit)
+    order = np.argsort(x[used], kind="stable")
+    if np.ptp(half) == 0.0:
+        ax.axhspan(-half[0], half[0], color=FAINT, alpha=0.6, lw=0.0, zorder=0.5)
+    else:
+        ax.vlines(x[used][order], -half[used][order], half[used][order], color=FAINT, lw=2.4, zorder=0.5)
+    for number, colour in zip(range(len(fit.series_names)), cycle(_COLOURS), strict=False):
+        mine = used & (fit.series == number)
+        ax.plot(x[mine], residuals[mine], ls="none", marker="o", ms=_size(fit), mew=0.0, color=colour)
+    top = 1.15 * max(float(np.abs(residuals[used]).max()), float(half[used].max())) or 1.0
+    inside = fit.outliers & (np.abs(residuals) <= top)
+    _ring(ax, fit, x, np.clip(residuals, -0.9 * top, 0.9 * top))
+    ax.set_ylim(-top, top)
+    beyond = int(fit.outliers.sum()) - int(inside.sum())
+    if beyond:
+        note(ax, f"{beyond} beyond", (0.98, 0.05), ha="right", va="bottom", color=ORANGE, fontsize=TINY)
+    label(ax, "x", across, fit.axes[0][0].capitalize())
+    label(ax, "y", up, "Data − law")
+    ax.margins(x=0.03)
+
+
+def _spread(fit: Fit) -> FloatArray:
+    """Return the standard deviation of each datum over the residual scale."""
+    used = ~fit.outliers
+    spread = 1.0 / np.sqrt(fit.weights)
+    found: FloatArray = spread / np.sqrt(np.mean(spread[used] ** 2))
+    return found
+
+
+def _ring(ax: Axes, fit: Fit, x: FloatArray, y: FloatArray) -> None:
+    rows = np.flatnonzero(fit.outliers)
+    ax.plot(x[rows], y[rows], ls="none", marker="o", ms=5.0, mew=0.9, mfc="none", mec=ORANGE, zorder=4.0)
+    if len(rows) <= _NAMED and len(fit.lines):
+        for row in rows:
+            where = (float(x[row]), float(y[row]))
+            text = f"line {fit.lines[row]}"
+            ax.annotate(text, where, (5, -2), textcoords="offset points", fontsize=TINY, color=ORANGE)
+
+
+def _correlation(ax: Axes, fit: Fit) -> None:
+    from matplotlib.colors import LinearSegmentedColormap
+
+    colours = LinearSegmentedColormap.from_list("correlation", [BLUE, "white", ORANGE])
+    found = fit.correlation
+    n = len(fit.keys)
+    ax.imshow(found, vmin=-1.0, vmax=1.0, cmap=colours, aspect="equal")
+    for row in range(n):
+        for column in range(n):
+            value = float(found[row, column])
+            shade = "white" if abs(value) > 0.7 else INK
+            ax.text(
+                column,
+                row,
+                f"{round(value, 2) + 0.0:.2f}",
+                ha="center",
+                va="center",
+                fontsize=TINY,
+                color=shade,
+            )
+    names = [_short(key) for key in fit.keys]
+    ax.set_xticks(range(n), names, fontsize=TINY, rotation=30.0, ha="right", rotation_mode="anchor")
+    ax.set_yticks(range(n), names, fontsize=TINY)
+    ax.tick_params(length=0.0)
+    ax.set_title("Correlation", loc="left", fontsize=SMALL)
+
+
+def _short(key: str) -> str:
+    """Return a key as it fits beside a matrix."""
+    plain = key if " " in key else key.rpartition(".")[2]
+    for section in ("magnet.", "spring.", "backstop."):
+        plain = plain.replace(section, "")
+    return fill(plain, 16)
+
+
+def _quantiles(ax: Axes, fit: Fit) -> None:
+    """Draw sorted residuals, each over its own standard deviation, against normal quantiles."""
+    from scipy.stats import norm
+
+    used = ~fit.outliers
+    scale_of = fit.residual_scale * _spread(fit)[used]
+    ordered = np.sort(fit.residuals[used] / np.where(scale_of > 0.0, scale_of, 1.0))
+    at = norm.ppf((np.arange(1, len(ordered) + 1) - 0.375) / (len(ordered) + 0.25))
+    end = 1.1 * max(float(np.abs(ordered).max()), float(np.abs(at).max()))
+    ax.plot([-end, end], [-end, end], color=MUTED, lw=HAIR)
+    ax.plot(at, ordered, ls="none", marker="o", ms=0.8 * _size(fit) + 0.4, mew=0.0, color=BLUE)
+    ax.set_xlim(-end, end)
+    ax.set_ylim(-end, end)
+    ax.set_aspect("equal")
+    ax.set_xlabel("Normal quantile")
+    ax.set_ylabel("Residual / its deviation")
+    ax.tick_params(top=True, right=True)
