@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
     from printhammer.errors import InputError, PrinthammerError
     from printhammer.hammer import Hammer, load
+    from printhammer.identify.laboratory import measure
     from printhammer.maps import frequency_map
     from printhammer.motion import Motion
     from printhammer.simulate import simulate
@@ -42,6 +43,7 @@ __all__ = [
     "frequency_map",
     "holding_margin",
     "load",
+    "measure",
     "release_current",
     "rest_state",
     "simulate",
@@ -64,6 +66,7 @@ _HOME = {
     "frequency_map": "maps",
     "holding_margin": "equilibrium",
     "load": "hammer",
+    "measure": "identify.laboratory",
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
     "simulate": "simulate",

@@ -60,6 +60,9 @@ BEFORE: Final = 100e-6
 _FINEST: Final = 0.5e-6
 """Largest step of the displacement that goes through the sensor, s: a hundredth of a contact."""
 
+_MOST: Final = 2_000_000
+"""Steps of a record, which bound its room in the memory."""
+
 _RUN_UP: Final = 10e-6
 """Way before the backstop, m; without any force it changes nothing."""
 
@@ -156,6 +159,11 @@ def pack(
     deepest = _peaks(hammer) if peaks is None else _array(peaks, "peaks")
     if points < 2 or not (deepest > 0.0).all():
         raise InputError("peaks and points are expected to be positive indentations and 2 points or more")
+    room = getattr(hammer.pack, "thickness", math.inf)
+    if deepest.max() >= room:
+        raise InputError(
+            f"a peak of {deepest.max():.6g} m is expected to be less than the thickness, {room:.6g} m"
+        )
     loading, memory, unloading = (_law(hammer, name) for name in ("loading", "memory", "unloading"))
     share = np.arange(1, points + 1) / points
     indentation, force = [], []
@@ -215,8 +223,10 @@ def motion(
     first, last = -math.floor(early * rate + 1e-9), math.floor(length * rate + 1e-9)
     if last < 1:
         raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz has no sample after the firing")
-    t = np.arange(first, last + 1) / rate
     each = max(1, math.ceil(1.0 / (rate * _FINEST)))
+    if last * each - first > _MOST:
+        raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz is too long, expected a shorter one")
+    t = np.arange(first, last + 1) / rate
     fine = np.arange(last * each + 1) / (rate * each)
     shot = simulate(hammer, PulseTrain(hammer.waveform), duration=max(float(fine[-1]), length), times=fine)
     if not shot.ok:

@@ -15,8 +15,10 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.identify.bench import BENCHES
 from printhammer.identify.sensor import FULL_SCALE, READING, Amount, Channel, Sensor, full_scale, wrong_rows
+from printhammer.identify.sensor_settings import adjusted
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     import numpy.typing as npt
@@ -37,6 +39,9 @@ UNITS: Final = {
     "time": ("s", "us"),
 }
 """SI unit of each column, and the unit in which it is written."""
+
+SI: Final = {name: si for name, (si, _unit) in UNITS.items()}
+"""SI unit of each column."""
 
 SAMPLING_RATE: Final = 1e6
 BANDWIDTH: Final = 200e3
@@ -113,7 +118,12 @@ class Measurement:
 
 
 def measure(
-    kind: str, hammer: Hammer, *, sensor: Sensor | None = None, seed: int = 0, **bench: Any
+    kind: str,
+    hammer: Hammer,
+    *,
+    sensor: Sensor | Mapping[str, Any] | None = None,
+    seed: int = 0,
+    **bench: Any,
 ) -> Measurement:
     """Measure a hammer on a bench.
 
@@ -124,8 +134,9 @@ def measure(
         spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": the record of one shot.
     hammer : Hammer
         The hammer.
-    sensor : Sensor, optional
-        By default that of an ordinary bench, `SENSORS`.
+    sensor : Sensor or mapping, optional
+        By default that of an ordinary bench, `SENSORS`; or what is different there, such as
+        {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `printhammer.identify.sensor_settings.adjusted`.
     seed : int, optional
         Of the random numbers; the same seed gives the same table.
     **bench
@@ -147,7 +158,7 @@ def measure(
         raise InputError(f"kind = {kind!r}, expected one of {', '.join(KINDS)}")
     if seed < 0:
         raise InputError(f"seed = {seed!r} is expected to be a whole number, 0 or more")
-    used = SENSORS[kind] if sensor is None else sensor
+    used = sensor if isinstance(sensor, Sensor) else adjusted(SENSORS[kind], sensor or {}, SI)
     there = BENCHES[kind](hammer, used, **bench)
     streams = np.random.SeedSequence([seed, KINDS.index(kind)]).spawn(len(UNITS) + 1)
     generators = dict(zip([*UNITS, ""], map(np.random.default_rng, streams), strict=True))

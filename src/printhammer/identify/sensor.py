@@ -114,6 +114,10 @@ class Channel:
     resolution: Amount = field(default_factory=Amount)
     offset: Amount = field(default_factory=Amount)
 
+    def __post_init__(self) -> None:
+        if self.resolution.of == READING:
+            raise InputError(f"a resolution {READING} is given, expected one in steps of the same size")
+
     def readings(self, true: FloatArray, normal: FloatArray) -> FloatArray:
         """Return what is read.
 
