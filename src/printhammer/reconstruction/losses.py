@@ -1,0 +1,352 @@
+"""How far candidates are from what the paper tells, in numbers without jumps where that is possible.
+
+A loss is 0 where the claim holds and at most 1. They are found in stages, dear ones only for candidates that
+did well in the cheap ones; what was not looked at counts 1. Verdicts are those of the claims alone, at the
+default tolerance: a loss only leads the search.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.verdict import repeats
+from printhammer.claims.definition import claims
+from printhammer.claims.two_pulses import half_rise
+from printhammer.claims.verdicts import printed_verdicts
+from printhammer.drive import PulseTrain
+from printhammer.ensemble import Ensemble, EnsembleResult
+from printhammer.equilibrium import holding_margin
+from printhammer.reconstruction.candidates import TOLERANCE
+from printhammer.reconstruction.space import geometry
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive import Drive
+    from printhammer.reconstruction.candidates import Candidate
+    from printhammer.segments import FloatArray
+
+Losses = dict[str, float]
+
+_GRID: Final = 1e-6
+_SETTLED: Final = 3.5e-3
+_COARSE: Final = 4e-6
+_TAIL: Final = 1e-3
+"""Time after the second of two pulses within which its peak lies, s."""
+
+_CHUNK: Final = 64
+_BURST_RATES: Final = 8
+_PULSES: Final = 9
+FIRINGS: Final = 200
+"""Firings of each panel of Fig. 11 in the search; the claim itself is about many more."""
+
+_LAST: Final = 40
+_LONGEST: Final = 16
+
+
+def hinge(excess: float, scale: float) -> float:
+    """Return 0 where nothing is in excess, and 1 from one scale on; 1 where it is not known."""
+    if math.isnan(excess):
+        return 1.0
+    return min(max(excess / scale, 0.0), 1.0)
+
+
+@dataclass
+class Score:
+    """What is known of a candidate.
+
+    Attributes
+    ----------
+    losses : dict
+        Loss of each claim looked at so far.
+    measured : dict
+        Numbers behind them, for the log.
+    """
+
+    losses: Losses = field(default_factory=dict)
+    measured: dict[str, Any] = field(default_factory=dict)
+
+    def total(self, weights: dict[str, float]) -> float:
+        """Return the weighted sum; what was not looked at counts in full."""
+        return sum(weight * self.losses.get(name, 1.0) for name, weight in weights.items())
+
+
+def _run(
+    chosen: Sequence[Candidate], drives: Sequence[Drive], ends: Sequence[float], repeat: int, **wanted: Any
+) -> EnsembleResult:
+    hammers = [candidate.hammer for candidate in chosen for _ in range(repeat)]
+    states = [candidate.state for candidate in chosen for _ in range(repeat)]
+    return Ensemble(hammers, list(drives), ends, states=states, tolerance=TOLERANCE).run(threads=1, **wanted)
+
+
+def statics(candidate: Candidate, score: Score) -> None:
+    """Look at the force of magnet and spring alone: return from everywhere, release margin."""
+    place, hammer = geometry(), candidate.hammer
+    held = holding_margin(hammer, np.linspace(place["b"], place["platen"], 48))
+    magnet = candidate.constants["magnet.Am"] ** 2 / math.sqrt(place["b"]) - candidate.constants["magnet.F0"]
+    least = float(held.min()) / magnet
+    score.losses["return_from_everywhere"] = hinge(1e-3 - least, 0.2)
+    share = float(held[0]) / magnet
+    score.losses["release_margin"] = hinge(
+        share - claims()["release_margin"].band["net_over_magnet_force"]["at_most"], 0.4
+    )
+    score.measured["margin"] = share
+
+
+def single_pulse(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
+    """Look at the single pulse: contacts with the pack, settle-out."""
+    for start in range(0, len(chosen), _CHUNK):
+        some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
+        drives = [PulseTrain(candidate.hammer.waveform) for candidate in some]
+        times = np.arange(0.0, _SETTLED, _GRID)
+        result = _run(some, drives, [_SETTLED] * len(some), 1, times=times, dots=True)
+        assert result.x is not None
+        assert result.dots is not None
+        for row, score in enumerate(own):
+            _settling(result.x[row], score)
+            score.losses["single_pulse_stroke"] = float(result.dots.extra_contacts[row, 0] != 0)
+            score.measured["flight_time"] = float(result.dots.flight_time[row, 0])
+            score.measured["force"] = float(result.dots.peak_force[row, 0])
+
+
+def _settling(x: npt.NDArray[np.float32], score: Score) -> None:
+    b = np.float32(geometry()["b"])
+    stroke = geometry()["top"] - geometry()["b"]
+    above = x > b
+    peak = int(np.argmax(x))
+    below = np.flatnonzero(~above[peak:])
+    band = claims()["settle_out"].band
+    if not below.size:
+        score.losses["settle_out"] = 1.0
+        return
+    touch = peak + int(below[0])
+    later = x[touch:]
+    highest = float(later.max() - b) / stroke
+    up = np.flatnonzero(np.diff(above[touch:].astype(np.int8)) == 1) + 1
+    down = np.flatnonzero(np.diff(above[touch:].astype(np.int8)) == -1) + 1
+    count = min(len(up), len(down))
+    heights = [float(later[up[k] : down[k]].max() - b) for k in range(count)]
+    falls = all(after < before for before, after in zip(heights, heights[1:], strict=False))
+    wanted = band["rebounds"]["at_least"]
+    score.measured |= {"first_touch": touch * _GRID, "highest": highest, "rebounds": count}
+    score.losses["settle_out"] = min(
+        1.0,
+        hinge(highest - band["largest_excursion_over_stroke"]["at_most"], 0.4)
+        + 0.5 * hinge(wanted - count, wanted)
+        + (0.0 if falls else 0.1),
+    )
+
+
+def _pair_gaps() -> FloatArray:
+    """Return the times between two pulses at which the second is looked at, s: quenched, then all others."""
+    quenched = claims()["two_pulses_660us"].settings["interval_s"]
+    caught = claims()["two_pulses_700us"].settings["interval_s"]
+    slowest = 1.0 / claims()["second_dot_lost"].settings["first_rate_Hz"]
+    close = np.arange(caught, 1.3e-3, 20e-6)
+    return np.concatenate([[quenched], close, np.arange(1.3e-3, slowest, 50e-6)])
+
+
+def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
+    """Look at two pulses: quench, catch on the rise, and no loss of the second dot at longer times."""
+    gaps = _pair_gaps()
+    for start in range(0, len(chosen), _CHUNK):
+        some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
+        drives = [
+            PulseTrain(candidate.hammer.waveform, at=[0.0, gap]) for candidate in some for gap in gaps
+        ]
+        ends = np.tile(gaps + _TAIL, len(some))
+        half = half_times(some)
+        moments = [np.array([gap + half[k]]) for k in range(len(some)) for gap in gaps]
+        times = np.arange(0.0, float(ends.max()), _COARSE)
+        result = _run(some, drives, ends.tolist(), len(gaps), times=times, dots=True, strobes=moments)
+        assert result.x is not None
+        assert result.dots is not None
+        assert result.strobes is not None
+        shape = (len(some), len(gaps))
+        x = result.x.reshape(*shape, len(times))
+        force = result.dots.peak_force[:, 1].reshape(shape)
+        struck = result.dots.struck[:, 1].reshape(shape)
+        flight = result.dots.flight_time.reshape(*shape, 2)
+        speed = result.strobes.v[:, 0].reshape(shape)
+        for k, score in enumerate(own):
+            peaks = np.array([_peak_after(x[k, j], times, gap) for j, gap in enumerate(gaps)])
+            _judge_pairs(score, gaps, peaks, force[k], struck[k], flight[k], speed[k])
+
+
+def half_times(some: Sequence[Candidate]) -> list[float]:
+    """Return the times after the firing at which the currents first reach half their peaks, s."""
+    found = []
+    for candidate in some:
+        waveform = candidate.hammer.waveform
+        assert waveform is not None
+        found.append(half_rise(waveform))
+    return found
+
+
+def _peak_after(x: npt.NDArray[np.float32], times: FloatArray, gap: float) -> float:
+    """Return the largest local maximum after the second firing, m; b where there is none."""
+    later = x[np.searchsorted(times, gap) :]
+    later = later[np.isfinite(later)]
+    if later.size < 3:
+        return geometry()["b"]
+    tops = later[1:-1][(later[1:-1] >= later[:-2]) & (later[1:-1] > later[2:])]
+    return float(tops.max()) if tops.size else geometry()["b"]
+
+
+def _judge_pairs(
+    score: Score,
+    gaps: FloatArray,
+    peaks: FloatArray,
+    force: FloatArray,
+    struck: npt.NDArray[np.bool_],
+    flight: FloatArray,
+    speed: FloatArray,
+) -> None:
+    front, way = geometry()["xp"], geometry()["xp"] - geometry()["b"]
+    miss = (peaks - front) / way
+    score.losses["two_pulses_660us"] = hinge(float(miss[0]) + 0.002, 0.5)
+    band = claims()["two_pulses_700us"].band
+    low, high = band["second_over_first_peak_force"]
+    ratio = float(force[1] / score.measured["force"]) if struck[1] else 0.0
+    gain = float(flight[1, 0] - flight[1, 1]) if struck[1] else 0.0
+    wanted = band["flight_time_gain_s"]["at_least"]
+    score.losses["two_pulses_700us"] = (
+        0.5 * hinge(max(low - ratio, ratio - high), 1.0)
+        + 0.25 * hinge(-float(speed[1]), 1.0)
+        + 0.25 * hinge(wanted - gain, 100e-6)
+    )
+    lost = np.maximum(-miss[1:], 0.0)
+    # Gently, so that every gap at which the dot is lost counts, not the worst alone.
+    share = float(np.mean(miss[1:] <= 0.0))
+    score.losses["second_dot_lost"] = min(1.0, 0.5 * float(lost.max()) + 0.5 * share**0.5)
+    score.measured |= {
+        "quench": float(miss[0]),
+        "ratio": ratio,
+        "rise_speed": float(speed[1]),
+        "gain": gain,
+        "gaps_lost": int(np.sum(miss[1:] <= 0.0)),
+    }
+
+
+def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
+    """Look at fast bursts: does the armature stay off the backstop, are the impacts weak?"""
+    settings = claims()["hang_up_at_high_rate"].settings
+    top = claims()["weak_prints_when_hung_up"].band["largest_force_over_single"]["at_most"]
+    must = claims()["hang_up_at_high_rate"].band["hang_up_rate_Hz"]["at_most"]
+    b, xp = geometry()["b"], geometry()["xp"]
+    for start in range(0, len(chosen), _CHUNK):
+        some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
+        plan = []
+        for candidate in some:
+            waveform = candidate.hammer.waveform
+            assert waveform is not None
+            limit = settings["current_limit_A"]
+            fast = settings["last_rate_Hz"]
+            while fast > must and _highest(PulseTrain(waveform, rate=fast, pulses=_PULSES)) > limit:
+                fast -= 100.0
+            plan.append(np.linspace(2000.0, fast, _BURST_RATES * 2))
+        drives = [
+            PulseTrain(candidate.hammer.waveform, rate=float(rate), pulses=_PULSES)
+            for candidate, rates in zip(some, plan, strict=True)
+            for rate in rates
+        ]
+        ends = [float(drive.times[-1]) + 1e-3 for drive in drives]
+        times = np.arange(0.0, max(ends), _COARSE)
+        result = _run(some, drives, ends, _BURST_RATES * 2, times=times, dots=True)
+        assert result.x is not None
+        assert result.dots is not None
+        for k, score in enumerate(own):
+            free, strong = [], []
+            for j in range(len(plan[k])):
+                row = k * len(plan[k]) + j
+                x = result.x[row]
+                last = float(drives[row].times[-1])
+                inside = np.flatnonzero(x > xp)
+                out = np.flatnonzero(x[inside[0] :] < xp) if inside.size else inside
+                left = times[inside[0] + out[0]] if out.size else math.inf
+                between = (times > left) & (times < last)
+                free.append(bool(between.any() and (x[between] > b).all()) or (left >= last and inside.size > 0))
+                depth = np.nanmax(x[times > left]) - xp if (times > left).any() else 0.0
+                strong.append(max(float(depth) / (geometry()["top"] - xp), 0.0) ** 2.7)
+            # From the fastest down, as long as all hang up.
+            reach = len(free)
+            while reach > 0 and free[reach - 1]:
+                reach -= 1
+            rates = plan[k]
+            lowest = float(rates[reach]) if reach < len(rates) else 1.5 * float(rates[-1])
+            score.losses["hang_up_at_high_rate"] = hinge(lowest - must, must)
+            worst = max(strong[reach:], default=math.nan)
+            score.losses["weak_prints_when_hung_up"] = hinge(worst - top + 0.03, 0.6)
+            score.measured |= {"hang_up": lowest, "weak": worst}
+
+
+def _highest(drive: PulseTrain) -> float:
+    """Return about the largest current of a train, A."""
+    return float(np.abs(drive.value(np.linspace(0.0, float(drive.times[-1]) + 1e-3, 400))).max())
+
+
+def panels(chosen: Sequence[Candidate], scores: Sequence[Score], firings: int = FIRINGS) -> None:
+    """Look at the twelve panels of Fig. 11: verdicts, as far as short trains tell, and the window."""
+    printed = printed_verdicts()
+    settings = claims()["poincare_window"].settings
+    window_x, window_v = settings["window_x_m"], settings["window_v_m_per_s"]
+    wanted_share = claims()["poincare_window"].band["least_share_inside"]["at_least"]
+    scales = np.array([np.ptp(window_x) / 2.0, np.ptp(window_v) / 2.0, np.ptp(window_x) / 2.0])
+    periods = list(printed)
+    for start in range(0, len(chosen), _CHUNK):
+        some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
+        drives = [
+            PulseTrain(candidate.hammer.waveform, period=period, pulses=firings + 1)
+            for candidate in some
+            for period in periods
+        ]
+        ends = [period * firings for _ in some for period in periods]
+        result = _run(some, drives, ends, len(periods), strobes="firings")
+        table = result.strobes
+        assert table is not None
+        for k, score in enumerate(own):
+            losses, shares, found = [], [], []
+            for j, period in enumerate(periods):
+                row = k * len(periods) + j
+                states = np.column_stack([table.x[row], table.v[row], table.memory[row]])[:firings]
+                branch = np.where(states[:, 0] > geometry()["xp"], table.branch[row, :firings], 0)
+                x, v = states[: settings["points"], 0], states[: settings["points"], 1]
+                inside = (
+                    (x >= window_x[0]) & (x <= window_x[1]) & (v >= window_v[0]) & (v <= window_v[1])
+                )
+                shares.append(float(inside.mean()))
+                loss, name = _panel(states, branch, scales, printed[period])
+                losses.append(loss)
+                found.append(name)
+            score.losses["poincare"] = float(np.mean(losses))
+            score.losses["poincare_window"] = hinge(wanted_share - min(shares), wanted_share)
+            right = sum(name == wanted for name, wanted in zip(found, printed.values(), strict=True))
+            score.measured |= {"panels": right, "verdicts": found, "least_share": min(shares)}
+
+
+def _panel(
+    states: FloatArray, branch: npt.NDArray[np.int64], scales: FloatArray, printed: str
+) -> tuple[float, str]:
+    """Return the loss of a panel and the verdict that a short train suggests."""
+    late = repeats(states[-_LAST:], branch[-_LAST:], scales, _LONGEST)
+    early = repeats(states[-2 * _LAST : -_LAST], branch[-2 * _LAST : -_LAST], scales, _LONGEST)
+    finite = np.where(np.isfinite(late), np.maximum(late, 1e-12), 10.0)
+    before = np.where(np.isfinite(early), np.maximum(early, 1e-12), 10.0)
+    closing = finite < 0.3 * before
+    near = np.flatnonzero((finite < 1e-6) | (closing & (finite < 1e-2)))
+    name = f"period-{near[0] + 1}" if near.size else "strange"
+    if name == printed:
+        return 0.0, name
+    if printed == "strange":
+        # The nearer to repeating, the farther from strange.
+        return 0.4 + 0.6 * min(1.0, -math.log10(float(finite[near[0]])) / 9.0), name
+    period = int(printed.rpartition("-")[2])
+    # Log distance of states that far apart: 0 is as far as the window, -6 agrees.
+    distance = 0.5 + 0.5 * min(max((math.log10(float(finite[period - 1])) + 3.0) / 3.0, 0.0), 1.0)
+    return distance, name
