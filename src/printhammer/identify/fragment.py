@@ -63,6 +63,15 @@ def fragment(fit: Fit) -> str:
     return changed_text(comments, sorted([*laws, *found.items()], key=lambda edit: "." in edit[0]))
 
 
+def covariance_table(fit: Fit) -> str:
+    """Return the covariance as CSV: a row and a column for each constant, SI, units in comments."""
+    lines = [f"# unit of {key}: {fit.constants[key].unit}" for key in fit.keys]
+    lines.append(",".join(["constant", *fit.keys]))
+    for key, row in zip(fit.keys, fit.covariance, strict=True):
+        lines.append(",".join([key, *(repr(float(entry)) for entry in row)]))
+    return "\n".join(lines) + "\n"
+
+
 def into(fit: Fit, hammer: Hammer) -> Hammer:
     """Return a hammer with the constants of a fit.
 
