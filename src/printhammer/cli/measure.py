@@ -163,7 +163,7 @@ def _settings(kinds: list[str], chosen: dict[str, Any]) -> dict[str, dict[str, A
     """Return the settings of the sensors of each kind; a setting must belong to one of them."""
     from printhammer.errors import InputError
     from printhammer.identify.laboratory import SENSORS, SI
-    from printhammer.identify.sensor_settings import PARTS, by_quantity
+    from printhammer.identify.sensor_settings import PARTS, applicable, by_quantity
 
     known = {name: SI[name] for kind in kinds for name in SENSORS[kind].channels}
     recorded = [kind for kind in kinds if SENSORS[kind].sampling_rate is not None]
@@ -175,17 +175,7 @@ def _settings(kinds: list[str], chosen: dict[str, Any]) -> dict[str, dict[str, A
         if name in given and not recorded:
             flag = name.replace("_", "-")
             raise InputError(f"--{flag} {given[name]} is given with {kinds[0]}, expected it with motion only")
-    found = {}
-    for kind in kinds:
-        mine = dict(given)
-        for part in PARTS:
-            if part in mine:
-                channels = SENSORS[kind].channels
-                mine[part] = {name: text for name, text in mine[part].items() if name in channels}
-        if kind not in recorded:
-            mine = {name: value for name, value in mine.items() if name not in ("sampling_rate", "bandwidth")}
-        found[kind] = mine
-    return found
+    return {kind: applicable(SENSORS[kind], given) for kind in kinds}
 
 
 def _options(kinds: list[str], bench: dict[str, str | None]) -> dict[str, dict[str, Any]]:

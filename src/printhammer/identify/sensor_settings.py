@@ -70,6 +70,18 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
     return replace(sensor, **changes)
 
 
+def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings that are about what a sensor has: its quantities, and records if it makes them."""
+    found = dict(settings)
+    for part in PARTS:
+        if part in found:
+            given = _quantities(part, found[part])
+            found[part] = {name: value for name, value in given.items() if name in sensor.channels}
+    if sensor.sampling_rate is None:
+        found = {name: value for name, value in found.items() if name not in ("sampling_rate", "bandwidth")}
+    return found
+
+
 def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> dict[str, str]:
     """Read settings such as "force=0.5 %" or "0.2 um", which goes to all quantities of its dimension.
 
