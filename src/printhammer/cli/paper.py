@@ -19,6 +19,7 @@ def paper(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the report.")] = Path(
         "build/paper"
     ),
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write the report as report.pdf too.")] = False,
     strict: Annotated[bool, typer.Option("--strict", help="End with status 1 if a claim fails.")] = False,
 ) -> None:
     """Draw the figures, judge the claims, and write one HTML report, the figures and claims.json."""
@@ -26,18 +27,18 @@ def paper(
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from printhammer.cli.terminal import announce_compiling, console, load_checked, plain_table
-    from printhammer.outputs import make_folder
     from printhammer.report import write_report
 
     loaded = load_checked(hammer)
-    make_folder(out)
     announce_compiling()
     screen = console()
     with Progress(
         SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=screen, transient=True
     ) as progress:
         task = progress.add_task("…", total=None)
-        report = write_report(loaded, out, progress=lambda text: progress.update(task, description=text))
+        report = write_report(
+            loaded, out, progress=lambda text: progress.update(task, description=text), pdf=pdf
+        )
     table = plain_table(("claim", "left"), ("kind", "left"), ("verdict", "left"), ("measured", "left"))
     for result in report.results:
         style = _STYLES[result.verdict]
@@ -52,8 +53,10 @@ def paper(
         f"[{style}]{report.count(verdict)} {verdict}[/{style}]" for verdict, style in _STYLES.items()
     )
     screen.print(f"\n{len(report.results)} claims: {counts}")
-    for path in report.files[-2:]:
+    whole = [path for path in report.files if path.parent == out]
+    for path in whole:
         screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
-    screen.print(f"[dim]wrote[/dim] {out / 'figures'}, {len(report.files) - 2} files", soft_wrap=True)
+    pictures = len(report.files) - len(whole)
+    screen.print(f"[dim]wrote[/dim] {out / 'figures'}, {pictures} files", soft_wrap=True)
     if strict and report.count("fails"):
         raise typer.Exit(1)

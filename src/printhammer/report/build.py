@@ -7,6 +7,7 @@ import tomllib
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.resources import files
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,7 +21,6 @@ from printhammer.report.publish import CLAIMS, PAGE, PDF, PICTURES, staged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
-    from pathlib import Path
 
     from matplotlib.figure import Figure
 
@@ -176,7 +176,7 @@ def write_report(
             write_pdf(report, folder / PDF)
             written.append(folder / PDF)
         places = [path.relative_to(folder) for path in written]
-    written[:] = [folder.parent / place for place in places]
+    written[:] = [Path(out) / place for place in places]
     return report
 
 
