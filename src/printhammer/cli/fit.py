@@ -29,6 +29,11 @@ def _result(flag: str, text: str) -> Any:
     return typer.Option(flag, metavar="FILE", help=text, rich_help_panel=_RESULTS)
 
 
+def _earlier(text: str) -> Any:
+    panel = "Tables of the parts, fitted first"
+    return typer.Option(metavar="FILE", help=f"Table of {text}.", rich_help_panel=panel)
+
+
 def _table(text: str) -> Any:
     return typer.Argument(metavar="FILE", help=text, show_default=False)
 
@@ -216,6 +221,10 @@ def motion(
     bandwidth: Annotated[
         str | None, typer.Option(metavar="FREQUENCY", help="Of the displacement sensor, such as '200 kHz'.")
     ] = None,
+    magnet: Annotated[Path | None, _earlier("magnet and spring")] = None,
+    spring: Annotated[Path | None, _earlier("the spring alone")] = None,
+    pack: Annotated[Path | None, _earlier("the pack")] = None,
+    backstop: Annotated[Path | None, _earlier("rebounds from the backstop")] = None,
     robust: RobustOption = True,
     out: OutOption = None,
     into: IntoOption = None,
@@ -223,8 +232,14 @@ def motion(
     covariance: CovarianceOption = None,
     strict: StrictOption = False,
 ) -> None:
-    """Find the mass, the damping of the backstop and what else single shots tell."""
-    results = _Results(out, into, plot, covariance, hammer, files)
+    """Find the mass, the damping of the backstop and what else single shots tell.
+
+    Constants of the hammer count as exact. Those found in tables given with --magnet, --spring, --pack and
+    --backstop count as known with their errors instead, and the shots may improve them.
+    """
+    tables = {"magnet": magnet, "spring": spring, "pack": pack, "backstop": backstop}
+    earlier = {kind: path for kind, path in tables.items() if path is not None}
+    results = _Results(out, into, plot, covariance, hammer, [*files, *earlier.values()])
 
     def found(known: Hammer | None) -> Fit:
         from printhammer.drive_input import read_number
@@ -235,9 +250,40 @@ def motion(
             raise InputError("the hammer is missing, expected --hammer with the constants known already")
         keys = [key.strip() for key in free.split(",")] if free is not None else None
         cutoff = None if bandwidth is None else read_number(bandwidth, "Hz", "--bandwidth")
-        return fit_motion(files, known, free=keys, robust=robust, bandwidth=cutoff)
+        fits = _earlier_fits(earlier, known, robust=robust)
+        for fit in fits:
+            known = fit.into(known)
+        return fit_motion(files, known, free=keys, robust=robust, bandwidth=cutoff, earlier=fits)
 
     results.make(found, strict=strict)
+
+
+def _earlier_fits(tables: dict[str, Path], known: Hammer, *, robust: bool) -> list[Fit]:
+    """Fit tables of the parts of a hammer, whose other constants are known."""
+    from printhammer.errors import InputError
+    from printhammer.identify.backstop import fit_backstop
+    from printhammer.identify.magnet import fit_magnet
+    from printhammer.identify.pack import fit_pack
+    from printhammer.identify.spring import fit_spring
+
+    found, spring = [], tables.get("spring")
+    if "magnet" in tables:
+        if spring is None:
+            raise InputError("--magnet: expected --spring too, or F0 and Bs cannot be told apart")
+        found.append(fit_magnet(tables["magnet"], position=known.position, spring=spring, robust=robust))
+    elif spring is not None:
+        found.append(fit_spring(spring, position=known.origin, robust=robust))
+    if "pack" in tables:
+        thickness = known.constants.get("pack.thickness")
+        if thickness is None:
+            raise InputError(f"{known.path}: pack.thickness is missing, expected it with --pack")
+        found.append(fit_pack(tables["pack"], thickness=thickness.si, robust=robust))
+    if "backstop" in tables:
+        stiffness = getattr(known.backstop, "k", None)
+        if stiffness is None:
+            raise InputError(f"{known.path}: backstop.stiffness is missing, expected it with --backstop")
+        found.append(fit_backstop(tables["backstop"], stiffness=stiffness, robust=robust))
+    return found
 
 
 class _Results:

@@ -10,6 +10,9 @@ if TYPE_CHECKING:
 
     from printhammer.identify.result import Fit, FittedConstant
 
+_SHOWN_IN: Final = {"m": "um", "kg": "g", "s": "us"}
+"""Units that make handy numbers of what a hammer has."""
+
 _LINES: Final = 20
 """Largest number of outliers whose lines are listed."""
 
@@ -30,7 +33,7 @@ def show(fit: Fit, screen: Console) -> None:
         ("unit", "left"),
     )
     for constant in fit.constants.values():
-        table.add_row(escape(constant.key), *_numbers(constant), constant.unit)
+        table.add_row(escape(constant.key), *_numbers(constant))
     screen.print(table)
     told = plain_table(("", "left"), ("", "left"))
     told.show_header = False
@@ -48,25 +51,32 @@ def show(fit: Fit, screen: Console) -> None:
         told.add_row("law", f"{verdict}, p = {fit.p_value:.2g}")
     if fit.rejected:
         told.add_row("because", escape(fit.rejected))
-    for name, value in fit.given.items():
-        told.add_row("taken as known", escape(f"{name} = {value}"))
-    for sentence in fit.indistinct:
-        told.add_row("not told apart", escape(sentence))
-    for sentence in fit.notes:
-        told.add_row("note", escape(sentence))
+    for heading, sentences in (
+        ("taken as known", [f"{name} = {value}" for name, value in fit.given.items()]),
+        ("not told apart", fit.indistinct),
+        ("notes", fit.notes),
+    ):
+        for row, sentence in enumerate(sentences):
+            told.add_row("" if row else heading, escape(sentence))
     screen.print()
     screen.print(told)
 
 
-def _numbers(constant: FittedConstant) -> tuple[str, str, str]:
-    """Return value, standard error and interval with as many digits as the error has meaning."""
-    error, (low, high) = constant.standard_error, constant.interval
+def _numbers(constant: FittedConstant) -> tuple[str, str, str, str]:
+    """Return value, standard error, interval and unit; as many digits as the error has meaning."""
+    from printhammer.units import from_si
+
+    unit = _SHOWN_IN.get(constant.unit, constant.unit)
+    value, error, low, high = (
+        from_si(number, constant.unit, unit) if math.isfinite(number) else number
+        for number in (constant.value, constant.standard_error, *constant.interval)
+    )
     digits = 6
-    if error > 1e-12 * abs(constant.value):
-        size = max(abs(constant.value), error)
+    if error > 1e-12 * abs(value):
+        size = max(abs(value), error)
         digits = math.floor(math.log10(size)) - math.floor(math.log10(error)) + 2
-    texts = [f"{part:.{digits}g}" for part in (constant.value, low, high)]
-    return texts[0], f"{error:.2g}", f"{texts[1]} to {texts[2]}"
+    texts = [f"{part:.{digits}g}" for part in (value, low, high)]
+    return texts[0], f"{error:.2g}", f"{texts[1]} to {texts[2]}", "" if unit == "1" else unit
 
 
 def _outliers(fit: Fit) -> str:

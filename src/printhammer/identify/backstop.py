@@ -234,15 +234,15 @@ def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
     damping = FittedConstant(
         "backstop.damping", value, error, (value - half, value + half), "N s/m^2.5", how=how
     )
-    # What is known of k and of l/k has nothing in common; l goes with both.
-    slopes = {RATIO: (1.0, 0.0), constant.key: (0.0, 1.0), damping.key: (k.value, ratio.value)}
+    # What is known of k and of l/k has nothing in common; l follows from both.
+    slopes = {constant.key: (0.0, 1.0), damping.key: (k.value, ratio.value)}
     found = {RATIO: ratio, constant.key: constant, damping.key: damping}
     given = dict(fit.given)
     if not k.how:
         del slopes[constant.key], found[constant.key]
         given[constant.key] = f"{k.value!r} N/m^1.5"
     rows = np.array(list(slopes.values())) * (ratio.standard_error, k.standard_error)
-    return replace(fit, constants=found, keys=tuple(found), covariance=rows @ rows.T, given=given)
+    return replace(fit, constants=found, keys=tuple(slopes), covariance=rows @ rows.T, given=given)
 
 
 def _constant(k: Stiffness) -> FittedConstant:

@@ -115,7 +115,7 @@ class Fit:
     constants : dict of str to FittedConstant
         By key.
     keys : tuple of str
-        Order of `covariance`; a constant computed without these data is not in it.
+        Order of `covariance`; a constant from which another one was computed may be missing.
     covariance : array, shape (n, n)
         Of the constants in `keys`, SI.
     abscissa, data, fitted, residuals : array, shape (m,)
