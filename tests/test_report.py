@@ -5,12 +5,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from tests import results
 
 from printhammer.claims import claims
 from printhammer.errors import InputError
+from printhammer.reconstruction.results import Results, results_in
 from printhammer.report import build, write_report
 from printhammer.report.citations import cited_figures
-from printhammer.report.quantities import band_text, split_name, typeset, value_text
+from printhammer.report.misses import distance, misses_of
+from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text
+from printhammer.report.sheet import Words
 
 if TYPE_CHECKING:
     import printhammer as ph
@@ -63,10 +67,18 @@ class Page(HTMLParser):
         return re.sub(r"[ \n]+", " ", " ".join(self.words))
 
 
+def found_of(hammer: "ph.Hammer", folder: Path, **changes: object) -> Results:
+    """Return made-up results of a reconstruction of a hammer."""
+    place = folder / "results"
+    place.mkdir(parents=True)
+    search = {**results.SAMPLE["search"], "shipped": hammer.fingerprint}
+    return results_in(results.write(place, **{"search": search, **changes}))
+
+
 @pytest.fixture(scope="module")
 def folder(hammer: "ph.Hammer", tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("paper") / "new" / "folder"
-    report = write_report(hammer, out, claims=CLAIMS, figures=[2, 3])
+    report = write_report(hammer, out, claims=CLAIMS, figures=[2, 3], found=found_of(hammer, out.parent))
     assert all(path.is_file() for path in report.files)
     assert {path for path in out.rglob("*") if path.is_file()} == set(report.files)
     return out
@@ -86,6 +98,21 @@ def test_the_page_needs_nothing_else(folder: Path, page: Page) -> None:
     assert "url(" not in style
     assert "@import" not in style
     assert "default-src 'none'" in text
+
+
+def test_every_section_is_listed(page: Page) -> None:
+    for name in ("hammer", "claims", "failing", "rates", "reconstruction", "family", "provenance"):
+        assert name in page.ids
+        # In the bar and in the contents.
+        assert page.links.count(f"#{name}") >= 2
+
+
+def test_claims_and_figures_lead_to_each_other(page: Page) -> None:
+    # Figure 3 names settle_out, and the source of settle_out names figure 3.
+    assert page.links.count("#settle_out") >= 2
+    assert page.links.count("#figure-3") > 2
+    # Not drawn, so not linked.
+    assert "#figure-6" not in page.links
 
 
 def test_links_lead_somewhere(page: Page) -> None:
@@ -111,7 +138,64 @@ def test_the_claims_for_machines(folder: Path) -> None:
     entries = json.loads((folder / "claims.json").read_text("utf-8"))
     assert [entry["name"] for entry in entries] == list(CLAIMS)
     for entry in entries:
-        assert {"name", "kind", "value", "band", "verdict"} <= set(entry)
+        assert {"name", "kind", "value", "band", "verdict", "base_rate"} <= set(entry)
+    rates = {entry["name"]: entry["base_rate"] for entry in entries}
+    assert rates["geometry"] is None
+    assert (rates["settle_out"]["measured"], rates["settle_out"]["holds"]) == (900, 9)
+    assert rates["settle_out"]["low"] < rates["settle_out"]["rate"] == 0.01 < rates["settle_out"]["high"]
+
+
+def test_what_the_reconstruction_found_is_told(page: Page) -> None:
+    for told in (
+        "1 %",  # of random hammers settle_out holds for
+        "15 % 3 of 20",  # and of those found on the stated claims alone
+        "9 000 on all",
+        "4.5 hours of one core",
+        "the print force",
+        "The best hammer for it satisfies it",
+        "600 Hz",
+    ):
+        assert told in page.text.replace("\xa0", " ")
+
+
+def test_a_claim_that_fails_is_told_by_how_much(page: Page, folder: Path) -> None:
+    entries = {entry["name"]: entry for entry in json.loads((folder / "claims.json").read_text("utf-8"))}
+    value = entries["release_margin"]["value"]["net_over_magnet_force"]
+    limit = entries["release_margin"]["band"]["net_over_magnet_force"]["at_most"]
+    assert value > limit
+    assert f"too large by {100 * (value / limit - 1):.3g} %" in page.text
+
+
+def test_results_about_another_hammer_are_left_out(hammer: "ph.Hammer", tmp_path: Path) -> None:
+    found = found_of(hammer.replace("mass", "0.5 g"), tmp_path)
+    report = write_report(hammer, tmp_path / "out", claims=CLAIMS, figures=[], found=found)
+    assert not report.reconstructed
+    text = Page((tmp_path / "out" / "index.html").read_text("utf-8")).text
+    assert "is about another hammer" in text
+    assert "says nothing about this one" in text
+    assert "Predictions of" not in text
+    assert "satisfies it" not in text
+    # Base rates are about the claims, whatever the hammer.
+    assert "how hard-won each verdict is" in text
+
+
+def test_without_results_the_report_says_so(hammer: "ph.Hammer", tmp_path: Path) -> None:
+    empty = tmp_path / "results"
+    empty.mkdir()
+    write_report(hammer, tmp_path / "out", claims=CLAIMS, figures=[], found=results_in(empty), pdf=True)
+    shown = Page((tmp_path / "out" / "index.html").read_text("utf-8"))
+    assert "No results of a search for the constants ship with this version." in shown.text
+    assert "No family of hammers ships with this version." in shown.text
+    assert "rates" not in shown.ids
+    entries = json.loads((tmp_path / "out" / "claims.json").read_text("utf-8"))
+    assert {entry["base_rate"] for entry in entries} == {None}
+
+
+def test_corrupt_results_are_told_before_anything_is_done(hammer: "ph.Hammer", tmp_path: Path) -> None:
+    found = found_of(hammer, tmp_path, **results.changed("family", "hammers", to=[]))
+    with pytest.raises(InputError, match=r"family\.json: hammers: expected"):
+        write_report(hammer, tmp_path / "out", found=found)
+    assert not (tmp_path / "out").exists()
 
 
 def test_figures_are_written_and_shown(folder: Path, page: Page) -> None:
@@ -131,9 +215,10 @@ def test_claims_are_shown_beside_the_figures_they_cite() -> None:
 
 
 def test_the_same_again_is_the_same(hammer: "ph.Hammer", folder: Path, tmp_path: Path) -> None:
-    write_report(hammer, tmp_path, claims=CLAIMS, figures=[2])
+    again = tmp_path / "again"
+    write_report(hammer, again, claims=CLAIMS, figures=[2], found=found_of(hammer, tmp_path))
     for name in ("claims.json", "figures/figure02.svg"):
-        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+        assert (again / name).read_bytes() == (folder / name).read_bytes()
 
 
 def test_a_hammer_that_lacks_what_a_figure_shows(hammer: "ph.Hammer", tmp_path: Path) -> None:
@@ -173,6 +258,115 @@ def test_a_failure_midway_keeps_the_report_before(
     with pytest.raises(InputError, match="disk full"):
         write_report(hammer, tmp_path, claims=["geometry"], figures=[])
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
+@pytest.mark.parametrize("step", ["figure 2", "page", "PDF"])
+def test_an_interrupted_report_leaves_the_one_before(hammer: "ph.Hammer", tmp_path: Path, step: str) -> None:
+    def stop(at: str) -> None:
+        if at == step:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_report(hammer, tmp_path / "new", claims=["geometry"], figures=[2], progress=stop, pdf=True)
+    assert list((tmp_path / "new").iterdir()) == []
+    write_report(hammer, tmp_path / "old", claims=["geometry"], figures=[2, 3])
+    before = {path: path.read_bytes() for path in (tmp_path / "old").rglob("*") if path.is_file()}
+    with pytest.raises(KeyboardInterrupt):
+        write_report(hammer, tmp_path / "old", claims=["geometry"], figures=[2], progress=stop, pdf=True)
+    assert {path: path.read_bytes() for path in (tmp_path / "old").rglob("*") if path.is_file()} == before
+
+
+def test_files_of_an_earlier_report_do_not_pass_for_those_of_this_one(
+    hammer: "ph.Hammer", tmp_path: Path
+) -> None:
+    write_report(hammer, tmp_path, claims=["geometry"], figures=[2, 3], pdf=True)
+    mine = tmp_path / "figures" / "mine.svg"
+    mine.write_text("kept")
+    report = write_report(hammer, tmp_path, claims=["geometry"], figures=[3])
+    assert {path for path in tmp_path.rglob("*") if path.is_file()} == {mine, *report.files}
+
+
+def test_a_page_that_is_there_stands_for_a_complete_report(
+    hammer: "ph.Hammer", tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_report(hammer, tmp_path, claims=["geometry"], figures=[2])
+    move = Path.replace
+
+    def stop(self: Path, target: Path) -> Path:
+        if self.parent.name == "figures" and target.parent.parent == tmp_path:
+            raise OSError(28, "No space left on device", str(target))
+        return move(self, target)
+
+    monkeypatch.setattr(Path, "replace", stop)
+    with pytest.raises(InputError, match="cannot be replaced"):
+        write_report(hammer, tmp_path, claims=["geometry"], figures=[2])
+    assert not (tmp_path / "index.html").exists()
+
+
+def test_the_pdf_has_a_page_for_each_figure(hammer: "ph.Hammer", tmp_path: Path) -> None:
+    found, out = found_of(hammer, tmp_path), tmp_path / "out"
+    report = write_report(hammer, out, claims=CLAIMS, figures=[2, 11], found=found, pdf=True)
+    assert out / "report.pdf" in report.files
+    text = (out / "report.pdf").read_bytes()
+    assert text.startswith(b"%PDF-")
+    assert b"hendriks-1983" in text
+    assert b"CreationDate" not in text
+    # The front, two figures, and at least two pages of claims and results.
+    (count,) = re.findall(rb"/Count (\d+)", text)
+    assert int(count) >= 5
+
+
+def test_a_figure_that_cannot_be_drawn_has_its_page(hammer: "ph.Hammer", tmp_path: Path) -> None:
+    report = write_report(hammer.replace("waveform", None), tmp_path, claims=[], figures=[3], pdf=True)
+    assert [drawing.figure for drawing in report.drawings] == [None]
+    assert (tmp_path / "report.pdf").is_file()
+
+
+def test_long_words_and_long_texts_fit_their_lines() -> None:
+    words = Words("a " * 30 + "x" * 200, size=8.0)
+    lines = words.lines(100.0)
+    assert "".join(lines).replace(" ", "") == "a" * 30 + "x" * 200
+    assert all(words._width(line) <= 100.0 for line in lines)
+    assert words.height(100.0) == pytest.approx(len(lines) * words.leading)
+    assert Words("").lines(10.0) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "band", "unit", "told"),
+    [
+        (0.44, {"at_most": 0.4}, "", "too large by 10 %"),
+        (3, {"at_least": 6}, "", "too small by 3"),
+        (1.4, {"at_most": 0.4}, "", "too large by 2.5 times the limit"),
+        (-0.986, {"above": 0.0}, "m/s", "too small by 0.986 m/s"),
+        (0.0, {"above": 0.0}, "m/s", "exactly at the limit"),
+        (0.9, [1.0, 2.0], "", "too small by 10 %"),
+        (2.2, [1.0, 2.0], "", "too large by 10 %"),
+        (2.2, 2.0, "", "too large by 10 %"),
+        (False, True, "", ""),
+        (None, {"above": 0.0}, "N", ""),
+    ],
+)
+def test_how_far_a_value_is_from_its_band(value: object, band: object, unit: str, told: str) -> None:
+    assert distance(value, band, unit) == told
+
+
+def test_words_that_differ_are_counted() -> None:
+    claim = claims()["poincare"]
+    (miss,) = misses_of(claim, {"verdicts": ["strange"] * 12})
+    # Eight of the twelve panels are printed as strange.
+    assert miss.value == "8 of 12 as printed"
+
+
+@pytest.mark.parametrize("part", [1e-6, 0.03142, 0.5, 0.99, 0.9996, 1 - 1e-6])
+def test_percentages_are_neither_none_nor_all(part: float) -> None:
+    shown = float(percent(part).removesuffix("\xa0%"))
+    assert 0.0 < shown < 100.0
+    assert shown == pytest.approx(100.0 * part, rel=0.05)
+    assert "e" not in percent(part)
+
+
+def test_none_and_all_in_percent() -> None:
+    assert (percent(0.0), percent(1.0)) == ("0\xa0%", "100\xa0%")
 
 
 @pytest.mark.parametrize(
