@@ -8,6 +8,7 @@ from printhammer import report
 from printhammer.claims import claims
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.figures import PaperFigure
+from printhammer.reconstruction.results import results_in
 from printhammer.report import build
 
 
@@ -41,6 +42,32 @@ def test_strict_ends_with_status_1_where_a_claim_fails(cli, hammer, tmp_path: Pa
     assert cli("paper", moved, "--out", tmp_path / "paper").status == 0
     assert cli("paper", moved, "--out", tmp_path / "paper", "--strict").status == 1
     assert (tmp_path / "paper" / "index.html").is_file()
+
+
+@pytest.mark.usefixtures("quick_report")
+def test_pdf(cli, tmp_path: Path) -> None:
+    outcome = cli("paper", "--out", tmp_path, "--pdf")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "index.html",
+        "claims.json",
+        "report.pdf",
+        "figures",
+    }
+    for name in ("index.html", "claims.json", "report.pdf"):
+        assert f"wrote {tmp_path / name}" in outcome.out
+    assert f"wrote {tmp_path / 'figures'}, 3 files" in outcome.out
+
+
+def test_corrupt_results_end_with_status_2(cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "base_rates.json").write_text('{"format": 2}')
+    monkeypatch.setattr(build, "shipped_results", lambda: results_in(tmp_path / "data"))
+    outcome = cli("paper", "--out", tmp_path / "paper")
+    assert outcome.status == 2
+    assert outcome.err.startswith("printhammer: ")
+    assert "base_rates.json: format = 2: expected 1" in outcome.err
+    assert not (tmp_path / "paper").exists()
 
 
 def test_figure_11_is_told_what_the_paper_says(cli, hammer, tmp_path: Path, monkeypatch) -> None:
