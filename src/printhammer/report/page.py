@@ -7,15 +7,17 @@ import json
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.report.misses import misses
-from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text
-from printhammer.report.views import (
+from printhammer.report.family_views import (
     claims_of_family,
     conclusions_view,
     constants_of_family,
+    members_view,
+)
+from printhammer.report.misses import misses
+from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text
+from printhammer.report.views import (
     failing_view,
     linked_source,
-    members_view,
     panels_view,
     predictions_view,
     rates_view,
