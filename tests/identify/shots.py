@@ -31,7 +31,8 @@ def write(
 ) -> Path:
     """Write the record of a shot: low-pass by a fine recursion, noise, outliers, resolution."""
     rng = np.random.default_rng(seed)
-    waveform = hammer.waveform if waveform is None else waveform
+    waveform = waveform or hammer.waveform
+    assert waveform is not None
     fine = np.arange(0.0, end, FINE)
     motion = ph.simulate(hammer, ph.PulseTrain(waveform), times=fine, duration=end)
     assert motion.ok

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.identify.approach import Approach
 from printhammer.identify.residuals import (
-    huber_cost,
-    huber_weights,
     memory_factor,
     outliers_of,
-    robust_scale,
+    spikes_of,
 )
 
 if TYPE_CHECKING:
@@ -120,6 +119,10 @@ class GaussNewton:
         self.priors = list(priors)
         self.robust = robust
         self.data = [shot.x for shot in shooting.shots]
+        self.spikes = [
+            spikes_of(shot.x, shot.noise) if robust else np.zeros(len(shot.x), bool)
+            for shot in shooting.shots
+        ]
         self.floor = _FLOOR * shooting.stroke
         scales = shooting.parameters.scales
         self.whitening = []
@@ -173,6 +176,9 @@ class GaussNewton:
             There is none near.
         """
         scales = self.shooting.parameters.scales
+        if noise is None:
+            pairs = list(zip(self.priors, self.whitening, strict=True))
+            values, states = Approach(self.shooting, pairs, self.spikes).run(values, states)
         free = np.ones(len(values), bool) if held is None else ~held
         values, states = values.copy(), [state.copy() for state in states]
         chains = self.shooting.chains(values, states, derivatives=True)
@@ -236,8 +242,10 @@ class GaussNewton:
                 weight = np.where(out, 0.0, 1.0)
                 memory = memory_factor(np.where(out, 0.0, left)) if near else 1.0
             else:
-                scale, memory = max(robust_scale(left), _LEAST), 1.0
-                weight = huber_weights(left, scale)
+                # A stretch that is not met yet is no outlier: only what stands out of the record itself is left out.
+                out, memory = self.spikes[shot], 1.0
+                scale = max(float(np.sqrt(np.mean(left[~out] ** 2))), _LEAST)
+                weight = np.where(out, 0.0, 1.0)
             size = scale * np.sqrt(memory)
             rows.append(jacobian * (np.sqrt(weight) / size)[:, np.newaxis])
             residuals.append(left * np.sqrt(weight) / size)
@@ -265,11 +273,8 @@ class GaussNewton:
         total = 0.0
         for shot, chain in enumerate(chains):
             left = self.data[shot] - self.shooting.shown(shot, chain.motion)
-            total += (
-                huber_cost(left, here.scales[shot])
-                if self.robust
-                else float(left @ left) / here.scales[shot] ** 2
-            )
+            left = left[~self.spikes[shot]]
+            total += float(left @ left) / here.scales[shot] ** 2
         for prior, white in zip(self.priors, self.whitening, strict=True):
             off = white @ ((prior.mean - values[prior.which]) / self.shooting.parameters.scales[prior.which])
             total += float(off @ off)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 _MAD: Final = 1.482602218505602
 """Standard deviation of a normal distribution over its median absolute deviation."""
-_HUBER: Final = 1.345
+_SPIKE: Final = 10.0
 _FAR: Final = 4.5
 """Residuals of more standard deviations are outliers: of 100 000 normal ones, less than one."""
 _LONGEST_MEMORY: Final = 8
@@ -34,16 +34,27 @@ def noise_of_record(values: FloatArray) -> float:
     return robust_scale(np.diff(values, 3)) / float(np.sqrt(20.0))
 
 
-def huber_weights(residuals: FloatArray, scale: float) -> FloatArray:
-    """Return the weights of P. J. Huber (Ann. Math. Statist. 35 (1964) 73) for residuals of a given scale."""
-    size = np.abs(residuals) / scale
-    return np.where(size <= _HUBER, 1.0, _HUBER / np.maximum(size, _HUBER))
+def running_median(values: FloatArray, width: int) -> FloatArray:
+    """Return the running median over an odd number of samples, at the ends that of the first and the last ones."""
+    half = width // 2
+    windows = np.lib.stride_tricks.sliding_window_view(values, width)
+    first, last = np.median(values[:width]), np.median(values[-width:])
+    return np.concatenate([np.full(half, first), np.median(windows, axis=1), np.full(half, last)])
 
 
-def huber_cost(residuals: FloatArray, scale: float) -> float:
-    """Return the sum of Huber's loss, in units of half the variance."""
-    size = np.abs(residuals) / scale
-    return float(np.where(size <= _HUBER, size * size, _HUBER * (2.0 * size - _HUBER)).sum())
+def spikes_of(values: FloatArray, noise: float) -> npt.NDArray[np.bool_]:
+    """Return which samples stand out of their neighbours, by more than noise and slope explain.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        A record.
+    noise : float
+        Its standard deviation.
+    """
+    middle = running_median(values, 5)
+    padded = np.pad(middle, 2, mode="edge")
+    return np.abs(values - middle) > _SPIKE * noise + np.abs(padded[4:] - padded[:-4])
 
 
 def outliers_of(residuals: FloatArray, floor: float) -> npt.NDArray[np.bool_]:

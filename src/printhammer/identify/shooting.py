@@ -300,6 +300,30 @@ class Shooting:
         rows = np.maximum(plan.samples, 0)
         return out[rows].reshape(len(rows), *motion.shape[2:])
 
+    def opened(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray]:
+        """Return what the sensor shows of a shot whose stretches are independent, and how that changes.
+
+        Returns
+        -------
+        shown : array, shape (n,)
+            At the samples.
+        derivatives : array, shape (n, p + 2 j)
+            With respect to the parameters, counted in their scales, and to the states at the joints, in `units`.
+        """
+        plan = self.plans[shot]
+        count = chain.by_parameter.shape[2]
+        joints = len(plan.begins) - 1
+        table = np.zeros((len(plan.grid), 2, 1 + count + 2 * joints))
+        table[:, :, 0] = chain.motion
+        table[:, :, 1 : 1 + count] = chain.by_parameter
+        rows = [*plan.begins.tolist(), len(plan.grid)]
+        for joint in range(joints):
+            span = slice(rows[joint + 1], rows[joint + 2])
+            first = 1 + count + 2 * joint
+            table[span, :, first : first + 2] = chain.by_state[span] * self.units
+        out = self.shown(shot, table)
+        return out[:, 0], out[:, 1:]
+
     def condensed(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Eliminate the states at the joints: the linear model of a shot in which no gap is left.
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.residuals import noise_of_record
+from printhammer.identify.residuals import noise_of_record, running_median
 from printhammer.identify.tables import read_table
 from printhammer.units import from_si, parse
 
@@ -137,12 +137,10 @@ def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) 
     noise = noise_of_record(x)
     touches, smooth, clear = find_touches(t, x, noise, hammer)
     _check(name, t, smooth, clear, touches, hammer)
-    joints = [(a.last + b.first) // 2 for a, b in pairwise(touches) if a.first > 0]
-    reach = [
-        min(row - a.last, b.first - row)
-        for row, a, b in zip(joints, touches[-len(joints) - 1 :], touches[-len(joints) :], strict=False)
-    ]
-    local = [_state(t, x, row, max(2, near), noise) for row, near in zip(joints, reach, strict=True)]
+    between = list(pairwise(touches))
+    joints = [(a.last + b.first) // 2 for a, b in between]
+    reach = [max(2, (b.first - a.last) // 2) for a, b in between]
+    local = [_state(t, x, row, near, noise) for row, near in zip(joints, reach, strict=True)]
     return Shot(
         name=name,
         t=t,
@@ -168,7 +166,7 @@ def find_touches(
     stroke = stroke_of(hammer, x)
     wanted = (noise / (0.25 * _CLEAR * stroke)) ** 2
     width = int(min(max(wanted, 1.0), max(_WINDOW / float(np.median(np.diff(t))), 1.0)))
-    smooth = _smoothed(_median(x, 5 if 5 * float(np.median(np.diff(t))) < _WINDOW else 3), width | 1)
+    smooth = _smoothed(running_median(x, 5 if 5 * float(np.median(np.diff(t))) < _WINDOW else 3), width | 1)
     clear = max(4.0 * noise / np.sqrt(width | 1), _CLEAR * stroke)
     levels: list[tuple[Surface, FloatArray]] = []
     if hammer.position is not None:
@@ -264,14 +262,6 @@ def stroke_of(hammer: Hammer, x: FloatArray) -> float:
     if hammer.position is not None and hammer.front is not None:
         return hammer.front - hammer.position
     return float(np.ptp(x)) or 1e-4
-
-
-def _median(x: FloatArray, width: int) -> FloatArray:
-    """Return the running median, which takes away single outliers."""
-    half = width // 2
-    windows = np.lib.stride_tricks.sliding_window_view(x, width)
-    ends = np.full(half, np.median(x[:width])), np.full(half, np.median(x[-width:]))
-    return np.concatenate([ends[0], np.median(windows, axis=1), ends[1]])
 
 
 def _smoothed(x: FloatArray, width: int) -> FloatArray:
