@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.checks import together, whiteness
+from printhammer.identify.checks import together
 from printhammer.identify.result import Fit, FittedConstant, Profile, student
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def assemble(
     Returns
     -------
     Fit
-        Also with intervals, profiles of weak constants, and what the residuals say.
+        Also with intervals, and profiles of weak constants.
     """
     kept = [k for k, (key, _unit, _in_file) in enumerate(parameters) if key]
     errors = solution.standard_errors
@@ -131,7 +131,7 @@ def assemble(
         profiles=profiles,
         rejected=rejected,
         p_value=p_value,
-        notes=(*notes, *weak, *whiteness(solution, data.abscissa, data.series)),
+        notes=(*notes, *weak),
     )
 
 

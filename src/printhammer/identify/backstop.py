@@ -17,7 +17,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.assemble import Data, assemble, enough, positive
-from printhammer.identify.checks import LEVEL, law_p_value
+from printhammer.identify.checks import judge
 from printhammer.identify.least_squares import solve
 from printhammer.identify.restitution import RestitutionLaw
 from printhammer.identify.result import Fit, FittedConstant, student
@@ -174,7 +174,7 @@ def fit_backstop(
     law = RestitutionLaw(speed)
     start = np.array([_ratio(middle, float(np.median(speed)))])
     solution = solve(law, back, start, robust=robust)
-    p_value = law_p_value(solution, np.column_stack([speed, speed**3]))
+    p_value, why = judge(solution, {"slow": speed, "fast": speed**3}, speed, zeros)
     fit = assemble(
         data,
         law,
@@ -182,7 +182,7 @@ def fit_backstop(
         [(RATIO, "s/m", False)],
         given={},
         indistinct=[] if k else [f"speeds give {RATIO} alone, neither of both: the stiffness is missing"],
-        rejected=_why(solution, speed, back) if p_value < LEVEL else "",
+        rejected=_why(solution, speed, back) if why else "",
         p_value=p_value,
     )
     positive(fit, table.path, {RATIO: "more rebounds at higher impact speeds"})

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.identify.least_squares import sandwich
+
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import numpy.typing as npt
 
@@ -18,44 +20,70 @@ if TYPE_CHECKING:
 LEVEL: Final = 0.01
 """A law is said to be rejected where its data have less than this probability."""
 
+_RUNS: Final = (
+    "residuals of neighbours go together: the data bend another way than the law, or the sensor is slow"
+)
+
 _HARD_TO_TELL: Final = 30.0
 """Condition number from which on it is said which constants go together."""
 
 
-def law_p_value(solution: Solution, richer: FloatArray) -> float:
-    """Test a law against one with more terms.
+def judge(
+    solution: Solution,
+    terms: Mapping[str, FloatArray],
+    abscissa: FloatArray,
+    series: npt.NDArray[np.int64],
+) -> tuple[float, str]:
+    """Test a law against ones with one more term each, and its residuals for runs.
 
-    The terms are added to the linearised, weighted fit; an F test tells whether they are needed.
+    A term is added to the linearised, weighted fit, and Student's t tells whether it is needed, with errors
+    and degrees of freedom as those of the fit. The runs test looks at residuals in the order of the abscissa,
+    series by series. The least probability counts once for each test (Bonferroni).
 
     Parameters
     ----------
     solution : Solution
         Fit of the law.
-    richer : array, shape (m, q)
-        The terms, in the unit of the data.
+    terms : mapping of str to array, shape (m,)
+        What the law lacks, in the unit of the data, by what its need would mean.
+    abscissa : array, shape (m,)
+        Where each datum was measured.
+    series : array of int, shape (m,)
+        To which series each datum belongs.
 
     Returns
     -------
-    float
-        Probability of terms at least as large if the law holds; NaN where the data are exact or too few.
+    p_value : float
+        Probability of so much against the law if it holds; NaN where the data are exact or too few.
+    why : str
+        What speaks most against the law; empty unless it is rejected.
     """
-    from scipy.stats import f
+    if solution.exact or solution.degrees_of_freedom < 3:
+        return math.nan, ""
+    found = {why: _need(solution, term) for why, term in terms.items()}
+    order = np.lexsort((abscissa, series))
+    found[_RUNS] = runs_p_value(solution.residuals[order][solution.used[order]])
+    known = {why: p for why, p in found.items() if not math.isnan(p)}
+    if not known:
+        return math.nan, ""
+    why = min(known, key=lambda name: known[name])
+    p_value = min(1.0, len(known) * known[why])
+    return p_value, why if p_value < LEVEL else ""
 
-    used, q = solution.used, richer.shape[1]
-    freedom = solution.degrees_of_freedom - q
-    if solution.exact or freedom < 2:
+
+def _need(solution: Solution, term: FloatArray) -> float:
+    """Return the probability that a law in need of no term asks for as much of it; NaN for a copy."""
+    from scipy.stats import t
+
+    root = np.sqrt(solution.variance[solution.used])
+    errors = solution.residuals[solution.used] / root
+    rows = np.column_stack([solution.jacobian, term])[solution.used] / root[:, None]
+    rows = rows / np.linalg.norm(rows, axis=0)
+    if np.linalg.matrix_rank(rows, tol=1e-9) < rows.shape[1]:
         return math.nan
-    root = np.sqrt(solution.variance[used])
-    rows = solution.jacobian[used] / root[:, None]
-    both = np.hstack([rows, richer[used] / root[:, None]])
-    both = both / np.linalg.norm(both, axis=0)
-    if np.linalg.matrix_rank(both, tol=1e-9) < both.shape[1]:
-        return math.nan
-    errors = solution.residuals[used] / root
-    left = errors - both @ np.linalg.lstsq(both, errors, rcond=None)[0]
-    after = float(left @ left)
-    ratio = (float(errors @ errors) - after) / q / (after / freedom)
-    return float(f.sf(ratio, q, freedom))
+    need = np.linalg.lstsq(rows, errors, rcond=None)[0]
+    covariance, freedoms = sandwich(rows, errors - rows @ need)
+    return 2.0 * float(t.sf(abs(need[-1]) / math.sqrt(covariance[-1, -1]), freedoms[-1]))
 
 
 def runs_p_value(values: FloatArray) -> float:
@@ -85,25 +113,6 @@ def runs_p_value(values: FloatArray) -> float:
     pairs = 2.0 * above * below
     mean, variance = pairs / n + 1.0, pairs * (pairs - n) / (n * n * (n - 1.0))
     return float(2.0 * norm.sf(abs(runs - mean) / math.sqrt(variance)))
-
-
-def whiteness(solution: Solution, abscissa: FloatArray, series: npt.NDArray[np.int64]) -> list[str]:
-    """Say whether residuals depend on each other, taken in the order of the abscissa, series by series.
-
-    Returns
-    -------
-    list of str
-        A sentence where the runs test has a probability below 1 %; else nothing.
-    """
-    if solution.exact:
-        return []
-    order = np.lexsort((abscissa, series))
-    p = runs_p_value(solution.residuals[order][solution.used[order]])
-    if not p < LEVEL:
-        return []
-    why = "the law bends another way than the data, or the sensor is slow"
-    what = f"neighbouring residuals depend on each other (runs test, p = {p:.2g})"
-    return [f"{what}: {why}, and the standard errors are too small"]
 
 
 def together(solution: Solution, names: Sequence[str]) -> list[str]:

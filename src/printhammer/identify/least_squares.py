@@ -152,7 +152,7 @@ def solve(law: Law, data: FloatArray, start: FloatArray, *, robust: bool = True)
         if exact:
             variance = np.ones(m)
         else:
-            variance = _variance(law.spread(p), residuals, used, n, clipped=robust and step == 0)
+            variance = variance_of(law.spread(p), residuals, used, n, clipped=robust and step == 0)
         if robust and not exact:
             found = _inside(law.jacobian(p), residuals, variance, used)
             if found.tobytes() in seen:
@@ -296,18 +296,36 @@ def _mad(residuals: FloatArray) -> float:
     return 1.482602218505602 * float(np.median(np.abs(residuals)))
 
 
-def _variance(
+def variance_of(
     spread: FloatArray,
     residuals: FloatArray,
     used: npt.NDArray[np.bool_],
     parameters: int,
     *,
-    clipped: bool,
+    clipped: bool = False,
 ) -> FloatArray:
     """Return the variance of each row by maximum likelihood of its components.
 
-    Each step multiplies every component by the ratio of what the residuals ask for to what they have; a
-    component that is not needed goes to zero.
+    Each step multiplies every component by the root of the ratio of what the residuals ask for to what they
+    have; a component that is not needed goes to zero.
+
+    Parameters
+    ----------
+    spread : array, shape (m, q)
+        How much each component has in each row.
+    residuals : array, shape (m,)
+        Data less law.
+    used : array of bool, shape (m,)
+        Rows that count.
+    parameters : int
+        Number of parameters of the law, which take up as many residuals.
+    clipped : bool, optional
+        Whether large residuals count as smaller ones, while the outliers are not known.
+
+    Returns
+    -------
+    array, shape (m,)
+        Also of the rows that do not count.
     """
     from scipy.stats import chi2
 

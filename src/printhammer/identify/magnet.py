@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.assemble import Data, assemble, enough, positive
-from printhammer.identify.checks import LEVEL, law_p_value
+from printhammer.identify.checks import judge
 from printhammer.identify.least_squares import solve
 from printhammer.identify.magnet_law import TotalLaw, start_of
 from printhammer.identify.spring import start_of as spring_start
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.identify.least_squares import Solution
     from printhammer.identify.result import Fit
     from printhammer.identify.tables import Table
     from printhammer.segments import FloatArray
@@ -96,7 +95,7 @@ def fit_magnet(
         start = np.append(start, 0.0)
     solution = solve(law, data.values, start, robust=robust)
     _releases(table, law, solution.p, zero, position)
-    p_value, why = _judge(solution, law, levels)
+    p_value, why = judge(solution, law.richer(solution.p, by_current=levels != 2), x, data.series)
     fit = assemble(
         data,
         law,
@@ -189,19 +188,6 @@ def _releases(table: Table, law: TotalLaw, p: FloatArray, zero: float | None, po
     best = float(law.at(p, np.full(len(currents), place), currents).max())
     if best <= 0.0:
         raise InputError(_never(table, place, best))
-
-
-def _judge(solution: Solution, law: TotalLaw, levels: int) -> tuple[float, str]:
-    """Test equation (3) against richer laws; return the probability, and why it is rejected."""
-    terms = law.richer(solution.p)
-    if levels == 2:
-        # Two currents cannot show how the pull depends on the current.
-        terms = {why: term for why, term in terms.items() if "current" not in why}
-    p_value = law_p_value(solution, np.column_stack(list(terms.values())))
-    if not p_value < LEVEL:
-        return p_value, ""
-    alone = {why: law_p_value(solution, term[:, None]) for why, term in terms.items()}
-    return p_value, min(alone, key=lambda why: alone[why])
 
 
 def _names(with_spring: bool, with_zero: bool) -> list[tuple[str, str, bool]]:

@@ -75,15 +75,15 @@ class TotalLaw:
         """Return the force at displacements in m, from x = 0, and currents."""
         return TotalLaw(x, current, self.position, 0.0).value(p)
 
-    def richer(self, p: FloatArray) -> dict[str, FloatArray]:
+    def richer(self, p: FloatArray, *, by_current: bool) -> dict[str, FloatArray]:
         """Return terms that equation (3) lacks, by what they would mean."""
-        x, one = self._place(p), self.magnet.astype(np.float64)
-        return {
-            "the pull does not follow the inverse root of the displacement": one / x,
-            "the pull does not fall with the square of Am - Bm I, as the current rises": (
-                self.current**2 / np.sqrt(x)
-            ),
-        }
+        x, one, current = self._place(p), self.magnet.astype(np.float64), self.current
+        place = "the pull does not follow the inverse root of the displacement"
+        square = "the pull does not follow the square of Am - Bm I"
+        terms = {place: one / x}
+        if by_current:
+            terms |= {square: current**2 / np.sqrt(x), f"{place} at larger currents": current**2 / x}
+        return terms
 
     def _place(self, p: FloatArray) -> FloatArray:
         zero = p[-1] if self.zero is None else self.zero

@@ -17,7 +17,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.assemble import Data, assemble, enough, positive
-from printhammer.identify.checks import LEVEL, law_p_value
+from printhammer.identify.checks import judge
 from printhammer.identify.least_squares import solve
 from printhammer.identify.pack_cycles import Cycles, check_loading, cycles_of
 from printhammer.identify.tables import read_table
@@ -152,7 +152,7 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
             f"{table.path}: no rows of unloading, expected some, or their exponent cannot be found"
         )
     solution = solve(law, force, _start(law, table), robust=robust)
-    p_value, why = (float("nan"), "") if exponents else _judge(law, table, solution)
+    p_value, why = (float("nan"), "") if exponents else _judge(law, data, solution)
     free = [("exponent of loading", "1", False), ("exponent of unloading", "1", False)] if exponents else []
     turns = [("", "", False)] * len(law.turns)
     fit = assemble(
@@ -195,19 +195,19 @@ def _start(law: PackLaw, table: Table) -> FloatArray:
     return np.array([stiffness, *turns, *([LOADING, UNLOADING] if law.free else [])])
 
 
-def _judge(law: PackLaw, table: Table, solution: Solution) -> tuple[float, str]:
+def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
     """Test the exponents of equation (5); return the probability, and why they are rejected."""
     out = bool(len(law.turns))
-    richer = law.by_exponents(solution.p)[: 1 + out]
-    p_value = law_p_value(solution, np.column_stack(richer))
-    if not p_value < LEVEL:
-        return p_value, ""
+    terms = dict(zip("pq", law.by_exponents(solution.p)[: 1 + out], strict=False))
+    p_value, why = judge(solution, terms, data.abscissa, data.series)
+    if why not in terms:
+        return p_value, why
     told = "its force does not grow with the power 2.7 of the indentation"
     if out:
-        r = table.values["indentation"] / law.thickness
+        r = data.abscissa / law.thickness
         free = PackLaw(r, law.cycles, True, law.thickness)
         start = np.array([*solution.p, LOADING, UNLOADING])
-        low, high = free.exponents(solve(free, table.values["force"], start).p)
+        low, high = free.exponents(solve(free, data.values, start).p)
         told = f"exponents of {low:.3g} and {high:.3g} describe it better than {LOADING:g} and {UNLOADING:g}"
     return p_value, told
 

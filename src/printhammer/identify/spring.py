@@ -13,7 +13,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.assemble import Data, assemble, enough, positive
-from printhammer.identify.checks import LEVEL, law_p_value
+from printhammer.identify.checks import judge
 from printhammer.identify.least_squares import solve
 from printhammer.identify.tables import read_table
 
@@ -95,14 +95,15 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit
     solution = solve(law, force, start_of(table.path, x - position, force), robust=robust)
     middle, half = 0.5 * (x.min() + x.max()), 0.5 * (x.max() - x.min())
     u = (x - middle) / half
-    p_value = law_p_value(solution, np.column_stack([u * u, u**3]))
+    bent = "the force is no straight line over the displacement"
+    p_value, why = judge(solution, {bent: u * u, f"{bent}, it swings about one": u**3}, x, data.series)
     fit = assemble(
         data,
         law,
         solution,
         [("spring.Bs", "N", True), ("spring.As", "m", True)],
         given={"backstop.position": f"{position!r} m"},
-        rejected="the force is no straight line over the displacement" if p_value < LEVEL else "",
+        rejected=why,
         p_value=p_value,
     )
     wider = "more rows over a wider span of displacement"
