@@ -61,7 +61,7 @@ def cycles_of(table: Table) -> Cycles:
     deepest = depth[0]
     for k in range(1, len(depth)):
         # A run of loading alone that starts over is a cycle too.
-        over = not unloading[k] and depth[k] < 0.5 * deepest
+        over = not unloading[k] and depth[k] < depth[k - 1] - 0.5 * deepest
         new = (unloading[k - 1] and not unloading[k]) or (over and not unloading[k - 1])
         cycle[k] = cycle[k - 1] + new
         deepest = depth[k] if new else max(deepest, depth[k])
