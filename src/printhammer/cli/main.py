@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Final, NoReturn
 import typer
 
 from printhammer import __version__
-from printhammer.cli import bench, figure, fit, hammer, measure, paper, run, strobe, sweep
+from printhammer.cli import bench, figure, fit, hammer, measure, paper, reconstruct, run, strobe, sweep
 from printhammer.cli import map as frequency_map
 from printhammer.cli.terminal import complain
 from printhammer.errors import PrinthammerError
@@ -45,6 +45,7 @@ app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)
 app.command("measure", epilog=measure.EXAMPLE)(measure.measure)
 app.add_typer(hammer.app, name="hammer")
 app.add_typer(fit.app, name="fit")
+app.add_typer(reconstruct.app, name="reconstruct")
 
 
 def _version(wanted: bool) -> None:

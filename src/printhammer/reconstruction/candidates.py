@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
+    from printhammer.waveforms import Waveform
 
 TOLERANCE: Final = 2e-10
 """Tolerance of the search; what it finds is judged at the default one."""
@@ -60,6 +61,13 @@ class Candidate:
     constants: dict[str, float]
     hammer: Hammer
     rest: float
+
+    @property
+    def waveform(self) -> Waveform:
+        """The current of one firing."""
+        waveform = self.hammer.waveform
+        assert waveform is not None
+        return waveform
 
     @property
     def state(self) -> tuple[float, float]:
@@ -106,7 +114,7 @@ def _stiffnesses(values: Sequence[dict[str, float]], rests: dict[int, float]) ->
         if not open_:
             break
         hammers = [hammer_of(constants_at(values[i], _MASS, math.exp(guess[i]))) for i in open_]
-        drives = [PulseTrain(hammer.waveform) for hammer in hammers]
+        drives = [PulseTrain(hammer.waveform) for hammer in hammers if hammer.waveform is not None]
         dots = (
             Ensemble(hammers, drives, SINGLE, states=[(rests[i], 0.0) for i in open_], tolerance=TOLERANCE)
             .run(dots=True, threads=1)

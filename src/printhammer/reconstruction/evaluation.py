@@ -20,9 +20,9 @@ Aim = Literal["stated", "all"]
 STATED: Final = {
     "return_from_everywhere": 2.0,
     "single_pulse_stroke": 1.0,
-    "two_pulses_660us": 1.0,
-    "two_pulses_700us": 1.0,
-    "second_dot_lost": 1.0,
+    "two_pulses_660us": 2.0,
+    "two_pulses_700us": 2.0,
+    "second_dot_lost": 2.0,
     "poincare": 4.0,
 }
 SHAPE: Final = {
@@ -38,8 +38,8 @@ WEIGHTS: Final[dict[str, dict[str, float]]] = {"stated": STATED, "all": {**STATE
 PIECE: Final = 64
 """Points that one process looks at together."""
 
-_WORST_SINGLE: Final = 1.2
-_WORST_PAIRS: Final = 1.0
+_WORST_SINGLE: Final = 0.8
+_WORST_PAIRS: Final = 0.6
 
 
 def evaluate(points: Sequence[FloatArray], aim: Aim) -> list[tuple[Candidate | None, Score]]:

@@ -7,6 +7,7 @@ default tolerance: a loss only leads the search.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
@@ -37,6 +38,15 @@ Losses = dict[str, float]
 _GRID: Final = 1e-6
 _SETTLED: Final = 3.5e-3
 _COARSE: Final = 4e-6
+_STEP: Final = 10e-6
+"""Step of the times between two pulses, s."""
+
+_REACH: Final = 200e-6
+"""How far from its place, in time between pulses, a quench still counts for something, s."""
+
+_CLEARLY: Final = 0.002
+"""Part of the way to the pack by which a quenched pulse stays short of it."""
+
 _TAIL: Final = 1e-3
 """Time after the second of two pulses within which its peak lies, s."""
 
@@ -103,7 +113,7 @@ def single_pulse(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
     """Look at the single pulse: contacts with the pack, settle-out."""
     for start in range(0, len(chosen), _CHUNK):
         some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
-        drives = [PulseTrain(candidate.hammer.waveform) for candidate in some]
+        drives = [PulseTrain(candidate.waveform) for candidate in some]
         times = np.arange(0.0, _SETTLED, _GRID)
         result = _run(some, drives, [_SETTLED] * len(some), 1, times=times, dots=True)
         assert result.x is not None
@@ -132,7 +142,7 @@ def _settling(x: npt.NDArray[np.float32], score: Score) -> None:
     down = np.flatnonzero(np.diff(above[touch:].astype(np.int8)) == -1) + 1
     count = min(len(up), len(down))
     heights = [float(later[up[k] : down[k]].max() - b) for k in range(count)]
-    falls = all(after < before for before, after in zip(heights, heights[1:], strict=False))
+    falls = all(after < before for before, after in itertools.pairwise(heights))
     wanted = band["rebounds"]["at_least"]
     score.measured |= {"first_touch": touch * _GRID, "highest": highest, "rebounds": count}
     score.losses["settle_out"] = min(
@@ -143,23 +153,22 @@ def _settling(x: npt.NDArray[np.float32], score: Score) -> None:
     )
 
 
-def _pair_gaps() -> FloatArray:
-    """Return the times between two pulses at which the second is looked at, s: quenched, then all others."""
+def _pair_gaps() -> tuple[FloatArray, int, int]:
+    """Return ascending times between two pulses, s, and the places of the quenched and the caught one."""
     quenched = claims()["two_pulses_660us"].settings["interval_s"]
     caught = claims()["two_pulses_700us"].settings["interval_s"]
     slowest = 1.0 / claims()["second_dot_lost"].settings["first_rate_Hz"]
-    close = np.arange(caught, 1.3e-3, 20e-6)
-    return np.concatenate([[quenched], close, np.arange(1.3e-3, slowest, 50e-6)])
+    early = quenched + np.arange(-16, round((caught - quenched) / _STEP)) * _STEP
+    close = np.arange(caught, 1.3e-3, 2.0 * _STEP)
+    return np.concatenate([early, close, np.arange(1.3e-3, slowest, 5.0 * _STEP)]), 16, len(early)
 
 
 def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
     """Look at two pulses: quench, catch on the rise, and no loss of the second dot at longer times."""
-    gaps = _pair_gaps()
+    gaps, quenched, caught = _pair_gaps()
     for start in range(0, len(chosen), _CHUNK):
         some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
-        drives = [
-            PulseTrain(candidate.hammer.waveform, at=[0.0, gap]) for candidate in some for gap in gaps
-        ]
+        drives = [PulseTrain(candidate.waveform, at=[0.0, gap]) for candidate in some for gap in gaps]
         ends = np.tile(gaps + _TAIL, len(some))
         half = half_times(some)
         moments = [np.array([gap + half[k]]) for k in range(len(some)) for gap in gaps]
@@ -171,22 +180,19 @@ def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
         shape = (len(some), len(gaps))
         x = result.x.reshape(*shape, len(times))
         force = result.dots.peak_force[:, 1].reshape(shape)
-        struck = result.dots.struck[:, 1].reshape(shape)
         flight = result.dots.flight_time.reshape(*shape, 2)
         speed = result.strobes.v[:, 0].reshape(shape)
         for k, score in enumerate(own):
             peaks = np.array([_peak_after(x[k, j], times, gap) for j, gap in enumerate(gaps)])
-            _judge_pairs(score, gaps, peaks, force[k], struck[k], flight[k], speed[k])
+            _judge_quench(score, gaps, peaks, quenched)
+            _judge_later(
+                score, peaks[caught:], float(force[k, caught]), flight[k, caught], float(speed[k, caught])
+            )
 
 
 def half_times(some: Sequence[Candidate]) -> list[float]:
     """Return the times after the firing at which the currents first reach half their peaks, s."""
-    found = []
-    for candidate in some:
-        waveform = candidate.hammer.waveform
-        assert waveform is not None
-        found.append(half_rise(waveform))
-    return found
+    return [half_rise(candidate.waveform) for candidate in some]
 
 
 def _peak_after(x: npt.NDArray[np.float32], times: FloatArray, gap: float) -> float:
@@ -199,43 +205,50 @@ def _peak_after(x: npt.NDArray[np.float32], times: FloatArray, gap: float) -> fl
     return float(tops.max()) if tops.size else geometry()["b"]
 
 
-def _judge_pairs(
-    score: Score,
-    gaps: FloatArray,
-    peaks: FloatArray,
-    force: FloatArray,
-    struck: npt.NDArray[np.bool_],
-    flight: FloatArray,
-    speed: FloatArray,
-) -> None:
+def _judge_quench(score: Score, gaps: FloatArray, peaks: FloatArray, place: int) -> None:
+    """Take as loss how far in time the nearest quenched second pulse is from the printed one."""
     front, way = geometry()["xp"], geometry()["xp"] - geometry()["b"]
     miss = (peaks - front) / way
-    score.losses["two_pulses_660us"] = hinge(float(miss[0]) + 0.002, 0.5)
+    score.measured["quench"] = float(miss[place])
+    if miss[place] < -_CLEARLY:
+        score.losses["two_pulses_660us"] = 0.0
+        return
+    lost = np.flatnonzero(miss < -_CLEARLY)
+    nearest = float(np.abs(gaps[lost] - gaps[place]).min()) if lost.size else 2.0 * _REACH
+    depth = hinge(float(miss.min()) + _CLEARLY, 1.0)
+    score.losses["two_pulses_660us"] = 0.2 + 0.4 * hinge(nearest, _REACH) + 0.2 * depth
+    score.losses["two_pulses_660us"] += 0.2 * hinge(float(miss[place]) + _CLEARLY, 0.5)
+
+
+def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArray, speed: float) -> None:
+    """Look at the pulse that is caught on the rise, and at all later ones."""
+    front, way = geometry()["xp"], geometry()["xp"] - geometry()["b"]
+    miss = (peaks - front) / way
     band = claims()["two_pulses_700us"].band
     low, high = band["second_over_first_peak_force"]
-    ratio = float(force[1] / score.measured["force"]) if struck[1] else 0.0
-    gain = float(flight[1, 0] - flight[1, 1]) if struck[1] else 0.0
+    ratio = 0.0 if math.isnan(force) else float(force / score.measured["force"])
+    gain = -math.inf if math.isnan(flight[1]) else float(flight[0] - flight[1])
     wanted = band["flight_time_gain_s"]["at_least"]
+    # Falling at 700 us is another branch of solutions, not a small miss.
     score.losses["two_pulses_700us"] = (
-        0.5 * hinge(max(low - ratio, ratio - high), 1.0)
-        + 0.25 * hinge(-float(speed[1]), 1.0)
-        + 0.25 * hinge(wanted - gain, 100e-6)
+        0.2 * hinge(max(low - ratio, ratio - high), 1.0)
+        + (0.3 + 0.4 * hinge(-speed, 1.0) if speed <= 0.0 else 0.0)
+        + 0.1 * hinge(wanted - gain, 100e-6)
     )
-    lost = np.maximum(-miss[1:], 0.0)
+    share = float(np.mean(miss <= 0.0))
     # Gently, so that every gap at which the dot is lost counts, not the worst alone.
-    share = float(np.mean(miss[1:] <= 0.0))
-    score.losses["second_dot_lost"] = min(1.0, 0.5 * float(lost.max()) + 0.5 * share**0.5)
+    lost = 0.5 * float(np.maximum(-miss, 0.0).max()) + 0.5 * share**0.5
+    score.losses["second_dot_lost"] = min(1.0, lost)
     score.measured |= {
-        "quench": float(miss[0]),
         "ratio": ratio,
-        "rise_speed": float(speed[1]),
-        "gain": gain,
-        "gaps_lost": int(np.sum(miss[1:] <= 0.0)),
+        "rise_speed": speed,
+        "gain": None if math.isinf(gain) else gain,
+        "gaps_lost": int(np.sum(miss <= 0.0)),
     }
 
 
 def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
-    """Look at fast bursts: does the armature stay off the backstop, are the impacts weak?"""
+    """Look at fast bursts: whether the armature stays off the backstop, and how weak the impacts are."""
     settings = claims()["hang_up_at_high_rate"].settings
     top = claims()["weak_prints_when_hung_up"].band["largest_force_over_single"]["at_most"]
     must = claims()["hang_up_at_high_rate"].band["hang_up_rate_Hz"]["at_most"]
@@ -244,15 +257,14 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
         some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
         plan = []
         for candidate in some:
-            waveform = candidate.hammer.waveform
-            assert waveform is not None
+            waveform = candidate.waveform
             limit = settings["current_limit_A"]
             fast = settings["last_rate_Hz"]
             while fast > must and _highest(PulseTrain(waveform, rate=fast, pulses=_PULSES)) > limit:
                 fast -= 100.0
             plan.append(np.linspace(2000.0, fast, _BURST_RATES * 2))
         drives = [
-            PulseTrain(candidate.hammer.waveform, rate=float(rate), pulses=_PULSES)
+            PulseTrain(candidate.waveform, rate=float(rate), pulses=_PULSES)
             for candidate, rates in zip(some, plan, strict=True)
             for rate in rates
         ]
@@ -271,7 +283,9 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
                 out = np.flatnonzero(x[inside[0] :] < xp) if inside.size else inside
                 left = times[inside[0] + out[0]] if out.size else math.inf
                 between = (times > left) & (times < last)
-                free.append(bool(between.any() and (x[between] > b).all()) or (left >= last and inside.size > 0))
+                free.append(
+                    bool(between.any() and (x[between] > b).all()) or (left >= last and inside.size > 0)
+                )
                 depth = np.nanmax(x[times > left]) - xp if (times > left).any() else 0.0
                 strong.append(max(float(depth) / (geometry()["top"] - xp), 0.0) ** 2.7)
             # From the fastest down, as long as all hang up.
@@ -283,7 +297,7 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
             score.losses["hang_up_at_high_rate"] = hinge(lowest - must, must)
             worst = max(strong[reach:], default=math.nan)
             score.losses["weak_prints_when_hung_up"] = hinge(worst - top + 0.03, 0.6)
-            score.measured |= {"hang_up": lowest, "weak": worst}
+            score.measured |= {"hang_up": lowest, "weak": None if math.isnan(worst) else worst}
 
 
 def _highest(drive: PulseTrain) -> float:
@@ -302,7 +316,7 @@ def panels(chosen: Sequence[Candidate], scores: Sequence[Score], firings: int = 
     for start in range(0, len(chosen), _CHUNK):
         some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
         drives = [
-            PulseTrain(candidate.hammer.waveform, period=period, pulses=firings + 1)
+            PulseTrain(candidate.waveform, period=period, pulses=firings + 1)
             for candidate in some
             for period in periods
         ]
@@ -317,9 +331,7 @@ def panels(chosen: Sequence[Candidate], scores: Sequence[Score], firings: int = 
                 states = np.column_stack([table.x[row], table.v[row], table.memory[row]])[:firings]
                 branch = np.where(states[:, 0] > geometry()["xp"], table.branch[row, :firings], 0)
                 x, v = states[: settings["points"], 0], states[: settings["points"], 1]
-                inside = (
-                    (x >= window_x[0]) & (x <= window_x[1]) & (v >= window_v[0]) & (v <= window_v[1])
-                )
+                inside = (x >= window_x[0]) & (x <= window_x[1]) & (v >= window_v[0]) & (v <= window_v[1])
                 shares.append(float(inside.mean()))
                 loss, name = _panel(states, branch, scales, printed[period])
                 losses.append(loss)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from printhammer.segments import FloatArray
 
 FORMAT: Final = 1
-SAMPLE: Final = 4096
+SAMPLE: Final = 16384
 """Points of the wide sample."""
 
 ISLANDS: Final = 8
@@ -36,7 +36,6 @@ SIGMA: Final = 0.08
 PATIENCE: Final = 30
 """Generations without gain after which an island begins anew."""
 
-_NARROWEST: Final = 2e-4
 _SEEDS: Final = 200
 """Best points of the sample from which islands begin."""
 
@@ -116,7 +115,9 @@ class Log:
         with self.path.open("a", encoding="utf-8") as file:
             file.write("".join(json.dumps(row) + "\n" for row in rows))
 
-    def take(self, points: list[FloatArray], aim: Aim, pool: Executor | None, place: int) -> list[dict[str, Any]]:
+    def take(
+        self, points: list[FloatArray], aim: Aim, pool: Executor | None, place: int
+    ) -> list[dict[str, Any]]:
         """Return the rows of points from `place` on, computing and noting those that are not there yet."""
         there = self.known[place : place + len(points)]
         for row, point in zip(there, points, strict=False):
@@ -182,7 +183,7 @@ def search(
             start.append(row)
             yield row
     start.sort(key=lambda row: row["total"])
-    islands = [_Island(plan, number, start, rng) for number in range(ISLANDS)]
+    islands = [_Island(start, rng) for _ in range(ISLANDS)]
     while True:
         asked = [island.ask() for island in islands]
         found = batch([point for points in asked for point in points])
@@ -190,7 +191,7 @@ def search(
         for number, island in enumerate(islands):
             island.tell(found[number * POPULATION : (number + 1) * POPULATION])
             if island.done:
-                islands[number] = _Island(plan, number, start, rng)
+                islands[number] = _Island(start, rng)
 
 
 def _wide(plan: Plan, rng: np.random.Generator) -> list[FloatArray]:
@@ -203,7 +204,7 @@ def _wide(plan: Plan, rng: np.random.Generator) -> list[FloatArray]:
 class _Island:
     """One evolution strategy, from one of the best points known."""
 
-    def __init__(self, plan: Plan, number: int, start: list[dict[str, Any]], rng: np.random.Generator) -> None:
+    def __init__(self, start: list[dict[str, Any]], rng: np.random.Generator) -> None:
         try:
             from cmaes import CMA
         except ImportError:
@@ -211,7 +212,6 @@ class _Island:
                 "the search needs cmaes, which is not installed: pip install 'printhammer[identify]'"
             ) from None
         pick = int(rng.integers(min(_SEEDS, len(start))))
-        self._start = start
         self._strategy = CMA(
             mean=np.clip(np.array(start[pick]["point"]), 0.02, 0.98),
             sigma=SIGMA,
@@ -233,4 +233,4 @@ class _Island:
     @property
     def done(self) -> bool:
         """Whether it gains no more."""
-        return self._since > PATIENCE or self._strategy.should_stop() or self._strategy._sigma < _NARROWEST  # noqa: SLF001
+        return self._since > PATIENCE or self._strategy.should_stop()

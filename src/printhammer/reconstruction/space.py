@@ -96,7 +96,7 @@ def point_of(values: Mapping[str, float]) -> FloatArray:
 def values_at(point: FloatArray) -> dict[str, float]:
     """Return the values of the variables at a point given in shares of the ranges."""
     return {
-        variable.name: float(variable.value(np.float64(share)))
+        variable.name: float(variable.value(np.asarray(share)))
         for variable, share in zip(VARIABLES, point, strict=True)
     }
 
@@ -175,17 +175,18 @@ def printing_stiffness() -> float:
     Equation (5) at the turning point: force = AiEp ((top - xp) / d)^2.7.
     """
     place = geometry()
-    return PRINT_FORCE / ((place["top"] - place["xp"]) / place["d"]) ** LOADING_EXPONENT
+    indentation: float = (place["top"] - place["xp"]) / place["d"]
+    return float(PRINT_FORCE / indentation**LOADING_EXPONENT)
 
 
 @cache
 def template() -> Hammer:
     """Return a hammer with the geometry of the paper, its other constants to be replaced."""
     base = load("hendriks-1983")
-    wave = {"shape": "rectangle", **dict.fromkeys(("amplitude", "width", "rise", "decay"))}
     units = {"amplitude": "A", "width": "s", "rise": "s", "decay": "s"}
+    wave: dict[str, Any] = {"shape": "rectangle"}
     for name, unit in units.items():
-        wave[name] = {"value": 1.0, "unit": unit, "status": "reconstructed", "source": _SOURCE}  # type: ignore[assignment]
+        wave[name] = {"value": 1.0, "unit": unit, "status": "reconstructed", "source": _SOURCE}
     return base.replace({"waveform": wave})
 
 

@@ -1,0 +1,250 @@
+"""The verb `reconstruct`: the search for the hammer of the paper, and what is made of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+EXAMPLE: Final = "Example: printhammer reconstruct search all.jsonl --minutes 1"
+
+app = typer.Typer(
+    help="Search for hammers that do what the paper tells, judge them, and make tables of what was found.",
+    epilog=EXAMPLE,
+    no_args_is_help=True,
+)
+
+WorkersOption = Annotated[int, typer.Option(min=1, metavar="N", help="Processes to compute in.")]
+SeedOption = Annotated[int, typer.Option(min=0, help="Decides on everything random.")]
+LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help="Log of a search.", show_default=False)]
+JudgedArgument = Annotated[
+    Path, typer.Argument(metavar="JUDGED", help="Log of judged candidates.", show_default=False)
+]
+
+
+@app.command("search", epilog=EXAMPLE)
+def search(
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG",
+            help="JSON lines, one for each candidate; a search begun there goes on.",
+            show_default=False,
+        ),
+    ],
+    aim: Annotated[
+        str, typer.Option(metavar="stated|all", help="Claims that lead: stated ones alone, or shapes too.")
+    ] = "all",
+    seed: SeedOption = 1,
+    minutes: Annotated[float, typer.Option(min=0.0, help="How long to search; 0: until interrupted.")] = 60.0,
+    workers: WorkersOption = 2,
+) -> None:
+    """Try candidates, led by the claims, and note every one of them; Ctrl-C loses nothing."""
+    from time import monotonic
+
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.errors import InputError
+    from printhammer.reconstruction.search import Plan
+    from printhammer.reconstruction.search import search as candidates
+
+    if aim not in ("stated", "all"):
+        raise InputError(f"--aim = {aim!r}, expected stated or all")
+    announce_compiling()
+    start = monotonic()
+    screen = console()
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=screen, transient=True
+    ) as progress:
+        task = progress.add_task("compiling and sampling", total=None)
+
+        def tell(count: int, least: float, row: dict[str, Any]) -> None:
+            panels = row["measured"].get("panels")
+            told = "" if panels is None else f", {panels} panels of Fig. 11 as printed"
+            progress.update(task, description=f"{count} candidates, least loss {least:.3f}{told}")
+
+        count, best = 0, None
+        with _pool(workers) as pool:
+            for row in candidates(
+                Plan("stated" if aim == "stated" else "all", seed), log, pool=pool, tell=tell
+            ):
+                count += 1
+                if best is None or row["total"] < best["total"]:
+                    best = row
+                if minutes and monotonic() - start > 60.0 * minutes:
+                    break
+    if best is not None:
+        left = ", ".join(f"{name} {loss:.3f}" for name, loss in best["losses"].items() if loss)
+        screen.print(f"{count} candidates; least loss {best['total']:.4f}: {left or 'none left'}")
+    screen.print(f"[dim]wrote[/dim] {log}", soft_wrap=True)
+
+
+def _pool(workers: int) -> Any:
+    """Return processes, or for one worker nothing: this process does it."""
+    from concurrent.futures import ProcessPoolExecutor
+    from contextlib import nullcontext
+    from multiprocessing import get_context
+
+    if workers == 1:
+        return nullcontext(None)
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+
+
+@app.command("judge", epilog="Example: printhammer reconstruct judge all.jsonl judged.jsonl --best 20")
+def judge(
+    log: LogArgument,
+    judged: JudgedArgument,
+    best: Annotated[int, typer.Option(min=1, help="Number of candidates to judge.")] = 100,
+    every_claim: Annotated[
+        bool, typer.Option("--every-claim", help="Judge all claims, not the stated ones alone.")
+    ] = False,
+    workers: WorkersOption = 2,
+) -> None:
+    """Judge the best candidates of a search by the claims themselves, at the default tolerance."""
+    from printhammer.claims import claims
+    from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.reconstruction.judged import STATED
+    from printhammer.reconstruction.shortlist import judge_candidates, read_search, rounded, shortlist
+
+    _heading, rows = read_search(log)
+    chosen = [rounded(row["constants"]) for row in shortlist(rows, best)]
+    announce_compiling()
+    screen = console()
+    names = list(claims()) if every_claim else list(STATED)
+    with _progress() as progress, _pool(workers) as pool:
+        task = progress.add_task("judging", total=len(chosen))
+
+        def tell(done: int, of: int, _row: dict[str, Any]) -> None:
+            progress.update(task, completed=len(chosen) - of + done)
+
+        found = judge_candidates(chosen, judged, names=names, pool=pool, tell=tell)
+    whole = sum(all(row["verdicts"].get(name) for name in STATED) for row in found)
+    panels = max((row["panels"] or 0 for row in found), default=0)
+    screen.print(
+        f"{len(found)} candidates judged: {whole} meet all stated claims outside Fig. 11; up to {panels}"
+        " panels of Fig. 11 as printed"
+    )
+    screen.print(f"[dim]wrote[/dim] {judged}", soft_wrap=True)
+
+
+def _progress() -> Any:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from printhammer.cli.terminal import console
+
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console(),
+        transient=True,
+    )
+
+
+@app.command("base-rates", epilog="Example: printhammer reconstruct base-rates base_rates.json --hammers 10")
+def base_rates(
+    out: Annotated[Path, typer.Argument(metavar="FILE", help="JSON file to write.", show_default=False)],
+    hammers: Annotated[int, typer.Option(min=1, help="Number of random hammers.")] = 200,
+    slow: Annotated[int, typer.Option(min=0, help="For how many of them slow claims are judged too.")] = 50,
+    seed: SeedOption = 1,
+    workers: WorkersOption = 2,
+) -> None:
+    """Count for how many random plausible hammers each claim holds."""
+    from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.reconstruction.base_rates import base_rates as count
+
+    announce_compiling()
+    with _progress() as progress, _pool(workers) as pool:
+        task = progress.add_task("random hammers", total=hammers)
+        table = count(
+            hammers, seed, slow=slow, pool=pool, tell=lambda done, _of: progress.update(task, completed=done)
+        )
+    _write_json(out, table)
+    for name, entry in table["claims"].items():
+        console().print(f"{name}: {entry['holds']} of {entry['measured']}")
+
+
+def _write_json(out: Path, table: dict[str, Any]) -> None:
+    import json
+
+    from printhammer.cli.terminal import console
+    from printhammer.outputs import write_file
+
+    write_file(out, json.dumps(table, indent=1, allow_nan=False) + "\n")
+    console().print(f"[dim]wrote[/dim] {out}", soft_wrap=True)
+
+
+@app.command(
+    "predictions",
+    epilog="Example: printhammer reconstruct predictions stated.jsonl judged.jsonl predictions.json",
+)
+def predictions(
+    log: LogArgument,
+    judged: JudgedArgument,
+    out: Annotated[Path, typer.Argument(metavar="FILE", help="JSON file to write.", show_default=False)],
+) -> None:
+    """Tell what hammers found on the stated claims alone say about the claims that did not lead."""
+    from printhammer.errors import InputError
+    from printhammer.reconstruction.predictions import predictions as count
+    from printhammer.reconstruction.shortlist import read_judged, read_search
+
+    heading, rows = read_search(log)
+    if heading["aim"] != "stated":
+        raise InputError(f"{log}: aim = {heading['aim']!r}, expected the log of a search on stated claims")
+    _write_json(out, count(read_judged(judged), heading["seed"], len(rows)))
+
+
+@app.command("family", epilog="Example: printhammer reconstruct family judged.jsonl --out family")
+def family(
+    judged: Annotated[
+        list[Path], typer.Argument(metavar="JUDGED...", help="Logs of judged candidates.", show_default=False)
+    ],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write.")] = Path("build/family"),
+) -> None:
+    """Choose clearly different hammers that do equally well, and tell which conclusions hold for all."""
+    from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.reconstruction.family import write_family
+
+    announce_compiling()
+    members = write_family(judged, out, lambda text: console().print(f"[dim]{text}[/dim]", soft_wrap=True))
+    console().print(f"{len(members)} hammers; [dim]wrote[/dim] {out}", soft_wrap=True)
+
+
+@app.command("ship", epilog="Example: printhammer reconstruct ship judged.jsonl all.jsonl --out build/hammer")
+def ship(
+    judged: JudgedArgument,
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Logs of the searches.", show_default=False)
+    ],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write.")] = Path("build/hammer"),
+    name: Annotated[str, typer.Option(help="Name of the hammer.")] = "hendriks-1983",
+    core_hours: Annotated[float, typer.Option(min=0.0, help="Time that the searches took.")] = 0.0,
+) -> None:
+    """Write the best judged candidate as a hammer file, and for each claim that fails the best for it."""
+    from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.outputs import make_folder
+    from printhammer.reconstruction.shipping import best_of, search_json, shipped_hammer
+    from printhammer.reconstruction.shortlist import read_judged, read_search
+
+    rows = read_judged(judged)
+    if not rows:
+        from printhammer.errors import InputError
+
+        raise InputError(f"{judged}: expected judged candidates, and there are none")
+    announce_compiling()
+    counts: dict[str, int] = {}
+    seed = 0
+    for heading, tried in map(read_search, logs):
+        counts[heading["aim"]] = counts.get(heading["aim"], 0) + len(tried)
+        seed = int(heading["seed"])
+    hammer = shipped_hammer(best_of(rows)["constants"], name)
+    folder = make_folder(out)
+    hammer.save(folder / f"{name}.toml")
+    table = search_json(hammer, rows, seed=seed, candidates=counts, core_hours=core_hours)
+    _write_json(folder / "search.json", table)
+    console().print(
+        f"[dim]wrote[/dim] {folder / name}.toml; failing: {', '.join(table['failing']) or 'none'}"
+    )

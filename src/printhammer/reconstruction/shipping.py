@@ -1,0 +1,111 @@
+"""From the judged candidates to what ships: the hammer file, and what the report tells of the search."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.claims import claims, judge_all
+from printhammer.problem import TOLERANCE
+from printhammer.reconstruction.shortlist import standing
+from printhammer.reconstruction.space import CURRENT, PRINT_FORCE, hammer_of
+from printhammer.units import from_si
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from printhammer.claims import Result
+    from printhammer.hammer import Hammer
+
+TITLE: Final = "The stored-energy print hammer of Hendriks (1983), reconstructed"
+NOTE: Final = """
+The paper prints no constants; only its geometry is stated, in the captions of its figures. Everything else here
+is a reconstruction: found by a search for constants with which the model behaves as the paper tells, claim by
+claim. Other constants do about as well, see the family. A reconstructed constant is not a measurement.
+"""
+
+
+def gauge() -> str:
+    """Return in a sentence how the scales were set that no motion tells."""
+    pounds = from_si(PRINT_FORCE, "N", "lbf")
+    return (
+        "Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm:"
+        f" the dot of a single pulse is given the {pounds:.0f} lb that the paper calls typical, and the"
+        f" current {CURRENT:g} A, the middle of the range of its Fig. 2. No claim but the typical ones depends on the"
+        " first, and of the second only how fast a burst the limit of 2 A allows."
+    )
+
+
+def best_of(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the candidate that ships: most stated claims, then panels of Fig. 11, then other claims."""
+    return max(rows, key=standing)
+
+
+def shipped_hammer(constants: Mapping[str, float], name: str) -> Hammer:
+    """Return the hammer that ships, with title and note."""
+    return hammer_of(constants, name=name, title=TITLE, note=NOTE)
+
+
+def search_json(
+    hammer: Hammer,
+    rows: Sequence[dict[str, Any]],
+    *,
+    seed: int,
+    candidates: Mapping[str, int],
+    core_hours: float,
+) -> dict[str, Any]:
+    """Return what `search.json` holds: the search, and for each claim that fails the best hammer for it.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The one that ships.
+    rows : sequence of dict
+        Judged candidates.
+    seed : int
+        Of the searches.
+    candidates : mapping
+        Numbers tried, by aim.
+    core_hours : float
+        Time of one core that the searches took, h.
+    """
+    results = judge_all(hammer)
+    held = {result.claim.name for result in results if result.verdict == "holds"}
+    return {
+        "format": 1,
+        "shipped": hammer.fingerprint,
+        "seed": seed,
+        "candidates": {"stated": candidates.get("stated", 0), "all": candidates.get("all", 0)},
+        "core_hours": round(core_hours, 2),
+        "tolerance": TOLERANCE,
+        "waveform": "" if hammer.waveform is None else hammer.waveform.shape,
+        "gauge": gauge(),
+        "failing": {
+            result.claim.name: _failing(result, rows, held) for result in results if result.verdict != "holds"
+        },
+    }
+
+
+def _failing(result: Result, rows: Sequence[dict[str, Any]], held: set[str]) -> dict[str, Any]:
+    name = result.claim.name
+    there = [row for row in rows if row["verdicts"].get(name)]
+    found: dict[str, Any] = {
+        "value": {key: (result.value or {}).get(key) for key in result.claim.band},
+        "why": result.detail,
+        "best": None,
+    }
+    if name == "poincare":
+        there = [row for row in rows if row["panels"] is not None]
+        there = sorted(there, key=lambda row: -row["panels"])[:1]
+    if there:
+        best = max(there, key=standing)
+        costs = [other for other in claims() if other in held and best["verdicts"].get(other) is False]
+        value = best["values"].get(name) or {}
+        if name == "poincare":
+            value = {"panels_as_printed": best["panels"], "verdicts": list(best["panel_verdicts"].values())}
+        found["best"] = {
+            "value": value,
+            "holds": bool(best["verdicts"].get(name)),
+            "constants": best["constants"],
+            "costs": costs,
+        }
+    return found

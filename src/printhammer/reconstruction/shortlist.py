@@ -1,0 +1,152 @@
+"""The best candidates of searches, judged by the claims: a log of its own, from which all else is made."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.claims import claims
+from printhammer.errors import InputError
+from printhammer.reconstruction.judged import FIGURE_11, STATED, row_of, text_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from concurrent.futures import Executor
+    from pathlib import Path
+
+APART: Final = 0.01
+"""Least distance of two candidates of a shortlist in one variable, in shares of its range."""
+
+DIGITS: Final = 6
+"""Digits of the constants that are judged and shipped."""
+
+_TOGETHER: Final = 8
+
+
+def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return the heading and the candidates of the log of a search.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no such log.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")[:-1]
+        rows = [json.loads(line) for line in lines]
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: expected the log of a search ({error})") from None
+    if not rows or "aim" not in rows[0]:
+        raise InputError(f"{path}: expected the log of a search, whose first line has an aim")
+    return rows[0], rows[1:]
+
+
+def shortlist(rows: Sequence[dict[str, Any]], count: int, apart: float = APART) -> list[dict[str, Any]]:
+    """Return the best candidates of a log that are not next to each other.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        Candidates.
+    count : int
+        How many at most.
+    apart : float, optional
+        Any two differ by so much in one variable at least, in shares of its range.
+    """
+    chosen: list[dict[str, Any]] = []
+    points = np.empty((0, 0))
+    for row in sorted((row for row in rows if row["constants"]), key=lambda row: float(row["total"])):
+        point = np.array(row["point"])
+        if not chosen or bool((np.abs(points - point).max(axis=1) >= apart).all()):
+            chosen.append(row)
+            points = np.vstack([points, point]) if points.size else point[np.newaxis]
+            if len(chosen) == count:
+                break
+    return chosen
+
+
+def rounded(constants: Mapping[str, float]) -> dict[str, float]:
+    """Return constants with as many digits as a hammer file should have."""
+    return {key: float(f"{value:.{DIGITS}g}") for key, value in constants.items()}
+
+
+def read_judged(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a log of judged candidates; none where there is no file.
+
+    Raises
+    ------
+    InputError
+        The file is no such log.
+    """
+    if not path.exists():
+        return []
+    try:
+        return [json.loads(line) for line in path.read_text(encoding="utf-8").split("\n")[:-1]]
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: expected a log of judged candidates ({error})") from None
+
+
+def _judge(task: tuple[dict[str, float], tuple[str, ...]]) -> dict[str, Any]:
+    constants, names = task
+    return row_of(constants, names)
+
+
+def judge_candidates(
+    every: Iterable[dict[str, float]],
+    path: Path,
+    *,
+    names: Sequence[str] = STATED,
+    pool: Executor | None = None,
+    tell: Callable[[int, int, dict[str, Any]], None] | None = None,
+) -> list[dict[str, Any]]:
+    """Judge candidates and add them to a log; those that are in it already are not judged again.
+
+    Parameters
+    ----------
+    every : iterable of dict
+        Constants of hammer files, SI.
+    path : Path
+        The log, JSON lines.
+    names : sequence of str, optional
+        Claims to judge beside Fig. 11; by default the stated ones.
+    pool : Executor, optional
+        Processes.
+    tell : callable, optional
+        Called with the number done, of all, and the row.
+
+    Returns
+    -------
+    list of dict
+        The rows of these candidates, see `printhammer.reconstruction.judged.row_of`.
+    """
+    wanted = [dict(constants) for constants in every]
+    known = {_key(row["constants"]): row for row in read_judged(path)}
+    there = {key for key, row in known.items() if set(names) - {FIGURE_11} <= set(row["verdicts"])}
+    fresh = [constants for constants in wanted if _key(constants) not in there]
+    tasks = [(constants, tuple(names)) for constants in fresh]
+    for start in range(0, len(tasks), _TOGETHER):
+        some = tasks[start : start + _TOGETHER]
+        found = map(_judge, some) if pool is None else pool.map(_judge, some)
+        for done, row in enumerate(found, start + 1):
+            known[_key(row["constants"])] = row
+            with path.open("a", encoding="utf-8") as file:
+                file.write(text_of(row))
+            if tell is not None:
+                tell(done, len(tasks), row)
+    return [known[_key(constants)] for constants in wanted]
+
+
+def _key(constants: dict[str, float]) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(constants.items()))
+
+
+def standing(row: dict[str, Any]) -> tuple[int, int, int]:
+    """Return how good a judged candidate is: stated claims, panels of Fig. 11, other claims that hold."""
+    kinds = {name: claim.kind for name, claim in claims().items()}
+    verdicts = row["verdicts"]
+    stated = sum(bool(verdicts.get(name)) for name in STATED)
+    # Claims that are "typical" have no say.
+    shape = sum(holds for name, holds in verdicts.items() if kinds[name] == "shape")
+    return stated, int(row["panels"] or 0), shape
