@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 TITLE: Final = "The stored-energy print hammer of Hendriks (1983), reconstructed"
 NOTE: Final = """
 The paper prints no constants; only its geometry is stated, in the captions of its figures. Everything else
-here is a reconstruction: found by a search for constants with which the model behaves as the paper tells, claim
-by claim. Other constants do about as well, see the family. A reconstructed constant is not a measurement.
+here is a reconstruction: found by a search for constants with which the model behaves as the paper tells,
+claim by claim. Other constants do about as well, see the family. A reconstructed constant is no measurement.
 """
 
 
@@ -30,8 +30,8 @@ def gauge() -> str:
     return (
         "Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm:"
         f" the dot of a single pulse is given the {pounds:.0f} lb that the paper calls typical, and the"
-        f" current {CURRENT:g} A, the middle of the range of its Fig. 2. No claim but the typical ones depends on"
-        " the first, and on the second only how fast a burst the limit of 2 A allows."
+        f" current {CURRENT:g} A, the middle of the range of its Fig. 2. No claim but the typical ones depends"
+        " on the first, and on the second only how fast a burst the limit of 2 A allows."
     )
 
 
