@@ -67,9 +67,7 @@ def test_what_is_written_is_read(
 
 
 @given(text=st.text(max_size=200))
-def test_any_text_that_is_no_table_is_told_in_one_sentence(
-    tmp_path_factory: pytest.TempPathFactory, text: str
-) -> None:
+def test_any_text_is_told_in_one_sentence(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
     path = tmp_path_factory.mktemp("tables") / "table.csv"
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
     with pytest.raises(InputError) as caught:
