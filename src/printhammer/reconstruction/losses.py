@@ -56,6 +56,9 @@ _PULSES: Final = 9
 FIRINGS: Final = 200
 """Firings of each panel of Fig. 11 in the search; the claim itself is about many more."""
 
+_AGREE: Final = 1e-8
+"""Distance, in half-widths of the window, from which on a train counts as settled."""
+
 _LAST: Final = 40
 _LONGEST: Final = 16
 
@@ -356,9 +359,17 @@ def _panel(
     if name == printed:
         return 0.0, name
     if printed == "strange":
-        # The nearer to repeating, the farther from strange.
-        return 0.4 + 0.6 * min(1.0, -math.log10(float(finite[near[0]])) / 9.0), name
+        # The faster it settles, the farther from strange.
+        return 0.4 + 0.6 * _haste(states, scales, int(near[0]) + 1), name
     period = int(printed.rpartition("-")[2])
     # Log distance of states that far apart: 0 is as far as the window, -6 agrees.
     distance = 0.5 + 0.5 * min(max((math.log10(float(finite[period - 1])) + 3.0) / 3.0, 0.0), 1.0)
     return distance, name
+
+
+def _haste(states: FloatArray, scales: FloatArray, period: int) -> float:
+    """Return how soon states that far apart agree: 1 for at once, 0 for not before the end."""
+    apart = np.abs((states[period:] - states[:-period]) / scales).max(axis=1)
+    agree = np.flatnonzero(apart < _AGREE)
+    count = int(agree[0]) + 1 if agree.size else len(states)
+    return 1.0 - math.log(count) / math.log(len(states))
