@@ -1,0 +1,75 @@
+"""Measure what the intervals of fitted constants are worth: how often they hold in synthetic laboratories.
+
+Run it with ``.venv/bin/python docs/measure/recovery.py``; it takes several minutes. ``--labs N`` for another
+number of laboratories, ``--random`` for hammers of their own, every constant within 20 % of the shipped one.
+"""
+
+import argparse
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+import printhammer as ph
+from printhammer.identify.recovery import Recovery, recover
+
+SPREAD = 0.2
+"""Range of the constants of random hammers about the shipped one, both ways."""
+
+
+def hammers(labs: int, random: bool) -> Iterator[ph.Hammer]:
+    """Return a hammer for each laboratory; one that does not rest or would not return is drawn again."""
+    shipped = ph.load("hendriks-1983")
+    rng = np.random.default_rng(1983)
+    low, high = math.log(1.0 - SPREAD), math.log(1.0 + SPREAD)
+    made = 0
+    while made < labs:
+        hammer = shipped
+        if random:
+            factors = np.exp(rng.uniform(low, high, len(shipped.constants)))
+            changes = {key: c.si * f for (key, c), f in zip(shipped.constants.items(), factors, strict=True)}
+            try:
+                hammer = shipped.replace(changes)
+                if hammer.warnings():
+                    continue
+            except ph.InputError:
+                continue
+        made += 1
+        yield hammer
+
+
+def table(found: list[Recovery]) -> None:
+    """Print one line for each constant: in a fit of its own, and in the end, from all measurements."""
+    print("| constant | from | intervals that hold | median error | mean error in standard errors |")
+    print("|---|---|---|---|---|")
+    for kind in found[0].fits:
+        for key, constant in found[0].fits[kind].constants.items():
+            if not constant.in_file:
+                continue
+            pairs = [(lab.fits[kind].constants.get(key), lab.true(key)) for lab in found]
+            known = [(one, true) for one, true in pairs if one is not None]
+            held = sum(one.interval[0] <= true <= one.interval[1] for one, true in known)
+            error = np.median([abs(one.value / true - 1.0) for one, true in known])
+            bias = np.mean([(one.value - true) / one.standard_error for one, true in known])
+            where = "all" if kind == "motion" else kind
+            print(f"| `{key}` | {where} | {held} of {len(known)} | {100.0 * error:.2g} % | {bias:+.2f} |")
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--labs", type=int, default=100)
+    parser.add_argument("--random", action="store_true")
+    options = parser.parse_args()
+    found, failed = [], []
+    for seed, hammer in enumerate(hammers(options.labs, options.random)):
+        try:
+            found.append(recover(hammer, seed))
+        except ph.InputError as error:
+            failed.append(f"laboratory {seed}: {error}")
+    table(found)
+    print("\n".join(["", f"{len(failed)} of {options.labs} laboratories without a result", *failed]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,166 @@
+"""Hammer, measurements, constants, hammer: what is found is what was measured, as well as it says.
+
+The measurements are those of an ordinary bench, `printhammer.identify.laboratory.SENSORS`.
+"""
+
+import functools
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2
+from tests import hammers
+
+import printhammer as ph
+from printhammer.identify.backstop import fit_backstop
+from printhammer.identify.magnet import fit_magnet
+from printhammer.identify.pack import fit_pack
+from printhammer.identify.recovery import Recovery, measured_stiffness, recover, true_value
+from printhammer.identify.result import Fit
+
+HAMMER = hammers.shipped()
+CONSTANTS = {
+    "magnet": ("magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs", "spring.As"),
+    "pack": ("pack.stiffness",),
+    "backstop": ("backstop.stiffness", "backstop.damping"),
+    "motion": (
+        *("mass", "backstop.damping", "magnet.F0", "magnet.Am", "magnet.Bm"),
+        *("spring.Bs", "spring.As", "pack.stiffness", "backstop.stiffness"),
+    ),
+}
+CHANCE = 1e-4
+"""Probability that honest intervals fail a test of few laboratories."""
+
+
+@functools.cache
+def laboratory(seed: int) -> Recovery:
+    return recover(HAMMER, seed)
+
+
+def held(fits: list[Fit], key: str, truths: list[float]) -> int:
+    """How many intervals contain the truth."""
+    ends = [fit[key].interval for fit in fits]
+    return sum(low <= true <= high for (low, high), true in zip(ends, truths, strict=True))
+
+
+def mahalanobis(fit: Fit, hammer: ph.Hammer) -> float:
+    """Squared distance of all constants from the truth, in terms of their covariance."""
+    apart = np.array([fit[key].value - true_value(hammer, key) for key in fit.keys])
+    scale = np.sqrt(np.diag(fit.covariance))
+    return float((apart / scale) @ np.linalg.solve(fit.correlation, apart / scale))
+
+
+def test_static_constants_of_a_few_laboratories(tmp_path: Path) -> None:
+    """Of 8 intervals, honest ones miss more than these at most once in 10 000."""
+    count = 8
+    found: dict[str, list[Fit]] = {"magnet": [], "pack": [], "backstop": []}
+    for seed in range(200, 200 + count):
+        for kind in ("magnet", "spring", "pack", "backstop"):
+            ph.measure(kind, HAMMER, seed=seed).write(tmp_path / f"{kind}.csv")
+        magnet = fit_magnet(tmp_path / "magnet.csv", position=HAMMER.origin, spring=tmp_path / "spring.csv")
+        pack = fit_pack(tmp_path / "pack.csv", thickness=true_value(HAMMER, "pack.thickness"))
+        stiffness = measured_stiffness(HAMMER, np.random.default_rng(seed))
+        backstop = fit_backstop(tmp_path / "backstop.csv", stiffness=stiffness)
+        for fit in (magnet, pack, backstop):
+            found[fit.kind].append(fit)
+    allowed = binom.isf(CHANCE, count, 0.05)
+    for kind, fits in found.items():
+        for key in CONSTANTS[kind]:
+            assert count - held(fits, key, [true_value(HAMMER, key)] * count) <= allowed, key
+
+
+def test_one_laboratory_from_end_to_end() -> None:
+    found = laboratory(0)
+    assert set(found.constants) == {key for keys in CONSTANTS.values() for key in keys}
+    assert mahalanobis(found.fits["motion"], HAMMER) < chi2.isf(CHANCE, len(CONSTANTS["motion"]))
+    for key, constant in found.constants.items():
+        assert true_value(found.hammer, key) == constant.value
+        assert constant.value == pytest.approx(true_value(HAMMER, key), abs=6.0 * constant.standard_error)
+        assert constant.standard_error < 0.02 * constant.value
+        entry = found.hammer.constants[key]
+        assert entry.status == "derived"
+        assert ".csv" in entry.source
+    # Written and read again it is the same hammer.
+    again = ph.Hammer.from_toml(found.hammer.to_toml())
+    assert again.fingerprint == found.hammer.fingerprint
+
+
+def test_the_hammer_that_is_built_moves_like_the_one_that_was_measured() -> None:
+    """The displacements differ by no more than the covariance of the constants has them.
+
+    By Cauchy and Schwarz (g . d)^2 <= (g C g) (d C^-1 d) for the change d of the constants, their covariance
+    C and the gradient g of a displacement; d C^-1 d follows chi squared.
+    """
+    found = laboratory(0)
+    fit = found.fits["motion"]
+    times = np.linspace(0.0, 2.5e-3, 501)
+
+    def moved(hammer: ph.Hammer) -> np.ndarray:
+        return ph.simulate(hammer, ph.PulseTrain(HAMMER.waveform), duration=2.5e-3, times=times).x
+
+    truth, built = moved(HAMMER), moved(found.hammer)
+    values, vectors = np.linalg.eigh(fit.correlation)
+    errors = np.sqrt(np.diag(fit.covariance))
+    variance = np.zeros(len(times))
+    for value, vector in zip(values, vectors.T, strict=True):
+        step = dict(zip(fit.keys, errors * vector * np.sqrt(max(value, 0.0)), strict=True))
+        ends = [
+            moved(found.hammer.replace({key: fit[key].value + sign * d for key, d in step.items()}))
+            for sign in (1.0, -1.0)
+        ]
+        variance += (0.5 * (ends[0] - ends[1])) ** 2
+    stroke = hammers.STROKE
+    # Between contacts the constants act linearly; a touch that comes earlier does not, to second order.
+    bound = np.sqrt(chi2.isf(CHANCE, len(fit.keys)) * variance) + 1e-4 * stroke
+    assert (np.abs(built - truth) < bound).all()
+    # And that is little: a small part of the stroke.
+    assert np.abs(built - truth).max() < 0.02 * stroke
+    flights = [
+        ph.simulate(one, ph.PulseTrain(HAMMER.waveform)).dots[0].flight_time for one in (HAMMER, found.hammer)
+    ]
+    assert flights[1] == pytest.approx(flights[0], rel=2e-3)
+
+
+def test_exact_measurements_give_the_hammer_back() -> None:
+    """Without errors of the sensors nothing is left but rounding, and the steps of the kernel."""
+    with tempfile.TemporaryDirectory() as folder:
+        for kind in ("magnet", "spring", "pack", "backstop"):
+            ph.measure(kind, HAMMER, sensor={"exact": True}).write(Path(folder) / f"{kind}.csv")
+        place = Path(folder)
+        fits = [
+            fit_magnet(place / "magnet.csv", position=HAMMER.origin, spring=place / "spring.csv"),
+            fit_pack(place / "pack.csv", thickness=true_value(HAMMER, "pack.thickness")),
+            fit_backstop(place / "backstop.csv", stiffness=true_value(HAMMER, "backstop.stiffness")),
+        ]
+    for fit in fits:
+        for key, constant in fit.constants.items():
+            if constant.in_file:
+                assert constant.value == pytest.approx(true_value(HAMMER, key), rel=1e-8), key
+
+
+def count_all(found: list[Recovery]) -> dict[str, int]:
+    """Count the intervals that hold, for each constant in each fit."""
+    counts = {}
+    for kind, keys in CONSTANTS.items():
+        for key in keys:
+            truths = [lab.true(key) for lab in found]
+            counts[f"{kind}: {key}"] = held([lab.fits[kind] for lab in found], key, truths)
+    return counts
+
+
+@pytest.mark.slow
+def test_a_hundred_laboratories() -> None:
+    """Each constant lies in its 95 % interval in 89 to 99 of 100 laboratories."""
+    counts = count_all([recover(HAMMER, seed) for seed in range(100)])
+    print(counts)
+    assert {key: n for key, n in counts.items() if not 89 <= n <= 99} == {}
+
+
+@pytest.mark.slow
+def test_laboratories_with_hammers_of_their_own() -> None:
+    """So it is for other hammers, each constant up to 20 % from the shipped one."""
+    draw = hammers.Draw(np.random.default_rng(1983))
+    counts = count_all([recover(draw(), seed) for seed in range(100)])
+    print(counts)
+    assert {key: n for key, n in counts.items() if not 89 <= n <= 99} == {}
