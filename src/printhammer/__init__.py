@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
     from printhammer.errors import InputError, PrinthammerError
     from printhammer.hammer import Hammer, load
+    from printhammer.identify.fitting import fit
     from printhammer.identify.laboratory import measure
     from printhammer.maps import frequency_map
     from printhammer.motion import Motion
@@ -40,6 +41,7 @@ __all__ = [
     "Waveform",
     "__version__",
     "equilibria",
+    "fit",
     "frequency_map",
     "holding_margin",
     "load",
@@ -63,6 +65,7 @@ _HOME = {
     "SineForce": "drive",
     "Waveform": "waveforms",
     "equilibria": "equilibrium",
+    "fit": "identify.fitting",
     "frequency_map": "maps",
     "holding_margin": "equilibrium",
     "load": "hammer",

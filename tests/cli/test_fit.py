@@ -108,12 +108,12 @@ def test_a_law_that_is_rejected(cli: Callable, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("spring {spring}", ("position of the backstop is missing", "--backstop")),
+        ("spring {spring}", ("position of the backstop is missing",)),
         ("spring {spring} --backstop 2", ("--backstop", "'2' has no unit")),
         ("spring {spring} --backstop '2 s'", ("--backstop", "a length")),
         ("spring none.csv --backstop '2 mil'", ("none.csv", "no such file")),
         ("spring {pack} --backstop '2 mil'", ("pack.csv", "not known")),
-        ("pack {pack}", ("thickness of the pack is missing", "--thickness")),
+        ("pack {pack}", ("thickness of the pack is missing",)),
         ("pack {pack} --thickness '-1 mm'", ("thickness", "-0.001 m")),
         ("pack {pack} --thickness '7 mil' --into new.toml", ("--into new.toml", "--hammer")),
         ("pack {pack} --thickness '6 mil' --hammer hendriks-1983 --into {out}", ("pack.thickness",)),

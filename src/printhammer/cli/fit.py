@@ -85,11 +85,11 @@ def magnet(
     results = _Results(out, into, plot, covariance, hammer, [file, *([spring] if spring else [])])
 
     def found(known: Hammer | None) -> Fit:
-        from printhammer.identify.magnet import fit_magnet
+        from printhammer.identify.fitting import fit
 
-        position = _length(backstop, "--backstop", known.position if known else None)
-        offset = None if zero == "fit" else _length(zero, "--zero", None)
-        return fit_magnet(file, position=position, spring=spring, zero=offset, robust=robust)
+        offset = None if zero == "fit" else _length(zero, "--zero")
+        position = _length(backstop, "--backstop")
+        return fit("magnet", file, hammer=known, position=position, spring=spring, zero=offset, robust=robust)
 
     results.make(found, strict=strict)
 
@@ -110,13 +110,10 @@ def spring(
     results = _Results(out, into, plot, covariance, hammer, [file])
 
     def found(known: Hammer | None) -> Fit:
-        from printhammer.errors import InputError
-        from printhammer.identify.spring import fit_spring
+        from printhammer.identify.fitting import fit
 
-        position = _length(backstop, "--backstop", known.position if known else None)
-        if position is None:
-            raise InputError("the position of the backstop is missing, expected --backstop or --hammer")
-        return fit_spring(file, position=position, robust=robust)
+        position = _length(backstop, "--backstop")
+        return fit("spring", file, hammer=known, position=position, robust=robust)
 
     results.make(found, strict=strict)
 
@@ -142,15 +139,10 @@ def pack(
     results = _Results(out, into, plot, covariance, hammer, [file])
 
     def found(known: Hammer | None) -> Fit:
-        from printhammer.errors import InputError
-        from printhammer.identify.pack import fit_pack
+        from printhammer.identify.fitting import fit
 
-        constant = known.constants.get("pack.thickness") if known else None
-        value = _length(thickness, "--thickness", constant.si if constant else None)
-        if value is None or value <= 0.0:
-            what = "is missing" if value is None else f"is {value:g} m"
-            raise InputError(f"the thickness of the pack {what}, expected --thickness or --hammer with one")
-        return fit_pack(file, thickness=value, exponents=exponents, robust=robust)
+        value = _length(thickness, "--thickness")
+        return fit("pack", file, hammer=known, thickness=value, exponents=exponents, robust=robust)
 
     results.make(found, strict=strict)
 
@@ -189,9 +181,10 @@ def backstop(
 
     def found(known: Hammer | None) -> Fit:
         from printhammer.identify.backstop import Stiffness, fit_backstop
+        from printhammer.identify.fitting import fit
 
         bodies = (radius or [], modulus or [], poisson or [])
-        stiffness: Stiffness | float | None = getattr(known.backstop, "k", None) if known else None
+        stiffness = None
         if any(bodies):
             flags = ("radius", "m"), ("modulus", "Pa"), ("poisson", "1")
             pairs = [
@@ -199,9 +192,9 @@ def backstop(
                 for texts, (flag, si) in zip(bodies, flags, strict=True)
             ]
             stiffness = Stiffness.from_bodies(*pairs)
-        elif file is None:
-            stiffness = None
-        return fit_backstop(file, stiffness=stiffness, robust=robust)
+        if file is None:
+            return fit_backstop(stiffness=stiffness, robust=robust)
+        return fit("backstop", file, hammer=known, stiffness=stiffness, robust=robust)
 
     results.make(found, strict=strict)
 
@@ -261,29 +254,16 @@ def motion(
 def _earlier_fits(tables: dict[str, Path], known: Hammer, *, robust: bool) -> list[Fit]:
     """Fit tables of the parts of a hammer, whose other constants are known."""
     from printhammer.errors import InputError
-    from printhammer.identify.backstop import fit_backstop
-    from printhammer.identify.magnet import fit_magnet
-    from printhammer.identify.pack import fit_pack
-    from printhammer.identify.spring import fit_spring
+    from printhammer.identify.fitting import fit
 
-    found, spring = [], tables.get("spring")
-    if "magnet" in tables:
-        if spring is None:
+    rest = dict(tables)
+    options: dict[str, Any] = {"hammer": known, "robust": robust}
+    found = []
+    if "magnet" in rest:
+        if "spring" not in rest:
             raise InputError("--magnet: expected --spring too, or F0 and Bs cannot be told apart")
-        found.append(fit_magnet(tables["magnet"], position=known.position, spring=spring, robust=robust))
-    elif spring is not None:
-        found.append(fit_spring(spring, position=known.origin, robust=robust))
-    if "pack" in tables:
-        thickness = known.constants.get("pack.thickness")
-        if thickness is None:
-            raise InputError(f"{known.path}: pack.thickness is missing, expected it with --pack")
-        found.append(fit_pack(tables["pack"], thickness=thickness.si, robust=robust))
-    if "backstop" in tables:
-        stiffness = getattr(known.backstop, "k", None)
-        if stiffness is None:
-            raise InputError(f"{known.path}: backstop.stiffness is missing, expected it with --backstop")
-        found.append(fit_backstop(tables["backstop"], stiffness=stiffness, robust=robust))
-    return found
+        found.append(fit("magnet", rest.pop("magnet"), spring=rest.pop("spring"), **options))
+    return [*found, *(fit(kind, path, **options) for kind, path in rest.items())]
 
 
 class _Results:
@@ -357,10 +337,10 @@ class _Results:
         return written
 
 
-def _length(text: str | None, flag: str, known: float | None) -> float | None:
+def _length(text: str | None, flag: str) -> float | None:
     from printhammer.drive_input import read_number
 
-    return known if text is None else read_number(text, "m", flag)
+    return None if text is None else read_number(text, "m", flag)
 
 
 def _with_error(text: str, flag: str, si: str) -> tuple[float, float]:

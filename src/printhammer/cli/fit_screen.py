@@ -38,6 +38,7 @@ def show(fit: Fit, screen: Console) -> None:
     told = plain_table(("", "left"), ("", "left"))
     told.show_header = False
     told.columns[0].style = "dim"
+    told.columns[0].vertical = "top"
     if len(fit.data):
         used = int((~fit.outliers).sum())
         told.add_row("data", f"{used} used, residual scale {fit.residual_scale:.3g} {fit.axes[1][1]}")

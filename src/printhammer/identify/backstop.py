@@ -201,10 +201,9 @@ def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
     used = solution.used
     share = (back / speed)[used]
     constant = float(np.median(share))
-    weights = 1.0 / solution.variance[used]
-    law_misses = float(np.sum(weights * solution.residuals[used] ** 2))
-    flat = float(np.sum(weights * speed[used] * back[used]) / np.sum(weights * speed[used] ** 2))
-    flat_misses = float(np.sum(weights * (back[used] - flat * speed[used]) ** 2))
+    law_misses, flat_misses = (
+        float(np.median(np.abs(misses))) for misses in ((solution.residuals / speed)[used], share - constant)
+    )
     slow, fast = (float(np.median(share[part])) for part in _halves(speed[used]))
     told = f"the restitution is {slow:.3g} at the slower impacts and {fast:.3g} at the faster ones"
     if flat_misses < law_misses:

@@ -131,6 +131,8 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
         The table cannot be used or is too small, a branch is missing, or the force falls on the loading
         branch.
     """
+    if not thickness > 0.0:
+        raise InputError(f"the thickness of the pack is {thickness:g} m, expected more than 0 m")
     table = read_table(path, {"indentation": "m", "force": "N"}, text={"branch": ("loading", "unloading")})
     cycles = cycles_of(table)
     check_loading(table, cycles)

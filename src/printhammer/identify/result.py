@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, Self
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
@@ -212,6 +213,11 @@ class Fit:
         from printhammer.identify.fragment import into
 
         return into(self, hammer)
+
+    def plot(self) -> Any:
+        """Draw data with the law, residuals and correlations (`printhammer.figures.fit.plot`)."""
+        # By name, so that no module of physics depends on a picture.
+        return import_module("printhammer.figures.fit").plot(self)
 
     @property
     def report(self) -> list[str]:

@@ -1,0 +1,104 @@
+"""The one entry to the fits: a kind of measurement, its tables, and a hammer that knows the rest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.drive_input import read_number
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from printhammer.hammer import Hammer
+    from printhammer.identify.result import Fit
+
+KINDS: Final = ("magnet", "spring", "pack", "backstop", "motion")
+
+
+def fit(
+    kind: str,
+    path: str | Path | Sequence[str | Path],
+    *,
+    hammer: Hammer | None = None,
+    **options: Any,
+) -> Fit:
+    """Find constants from a measurement.
+
+    Parameters
+    ----------
+    kind : str
+        "magnet": F0, Am, Bm (and Bs, As) from forces against displacement and current; "spring": Bs, As from
+        forces of the spring alone; "pack": the stiffness from load cycles; "backstop": l/k, and l, from
+        rebounds; "motion": mass, damping and others from records of single shots.
+    path : path, or sequence of path
+        The table, CSV with units in its heading; for "motion" several are allowed.
+    hammer : Hammer, optional
+        What is known already: position of the backstop, thickness of the pack, stiffness of the backstop; for
+        "motion", which needs one, all constants that are not fitted.
+    **options
+        Of the kind; lengths in m or with a unit. All: `robust` (true), whether rows that lie too far off are
+        left out. "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the
+        reading of the displacement sensor at x = 0, or None to fit it. "spring": `position`. "pack":
+        `thickness`; `exponents`, whether these are fitted too. "backstop": `stiffness`, N/m^1.5 or a
+        `printhammer.identify.backstop.Stiffness`. "motion": as `printhammer.identify.motion.fit_motion`.
+
+    Returns
+    -------
+    Fit
+        Constants with standard errors and 95 % intervals, their covariance, what the data cannot tell apart,
+        and whether they reject the law.
+
+    Raises
+    ------
+    InputError
+        There is no such kind, a table cannot be used, or too little was measured; the sentence says what is
+        missing.
+    """
+    if kind not in KINDS:
+        raise InputError(f"kind = {kind!r}, expected one of {', '.join(KINDS)}")
+    many = [path] if isinstance(path, str) or not hasattr(path, "__iter__") else list(path)
+    if kind == "motion":
+        from printhammer.identify.motion import fit_motion
+
+        if hammer is None:
+            raise InputError("the hammer is missing, expected one with the constants known already")
+        return fit_motion(many, hammer, **options)
+    if len(many) != 1:
+        raise InputError(f"{len(many)} tables, expected one of the kind {kind!r}")
+    for name in ("position", "thickness", "zero"):
+        if isinstance(options.get(name), str):
+            options[name] = read_number(options[name], "m", name)
+    return _static(kind, many[0], hammer, options)
+
+
+def _static(kind: str, table: Any, hammer: Hammer | None, options: dict[str, Any]) -> Fit:
+    if kind in ("magnet", "spring") and options.get("position") is None:
+        options["position"] = None if hammer is None else hammer.position
+    if kind == "magnet":
+        from printhammer.identify.magnet import fit_magnet
+
+        return fit_magnet(table, **options)
+    if kind == "spring":
+        from printhammer.identify.spring import fit_spring
+
+        if options["position"] is None:
+            raise InputError("the position of the backstop is missing, expected it, or a hammer that has one")
+        return fit_spring(table, **options)
+    if kind == "pack":
+        from printhammer.identify.pack import fit_pack
+
+        if options.get("thickness") is None:
+            constant = None if hammer is None else hammer.constants.get("pack.thickness")
+            if constant is None:
+                raise InputError(
+                    "the thickness of the pack is missing, expected it, or a hammer that has one"
+                )
+            options["thickness"] = constant.si
+        return fit_pack(table, **options)
+    from printhammer.identify.backstop import fit_backstop
+
+    if options.get("stiffness") is None:
+        options["stiffness"] = getattr(hammer.backstop, "k", None) if hammer is not None else None
+    return fit_backstop(table, **options)
