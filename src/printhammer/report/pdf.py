@@ -79,8 +79,10 @@ def _front(sheet: Sheet, report: Report) -> None:
         ),
         after=12.0,
     )
-    counts = ", ".join(f"{report.count(name)} {name}" for name in COLORS)
-    sheet.write(Words(f"{len(report.results)} claims: {counts}", 11.0, weight="bold"), after=6.0)
+    held, failed, pending = (report.count(name) for name in ("holds", "fails", "not yet"))
+    told = f"{held} of {len(report.results)} claims hold, {failed} fail"
+    told += f", {pending} cannot be judged yet." if pending else "."
+    sheet.write(Words(told, 11.0, weight="bold"), after=6.0)
     for kind, row in by_kind(report.results).items():
         x = MARGIN + 60.0
         sheet.put(Words(kind), MARGIN, sheet.y)

@@ -217,14 +217,14 @@ class Sheet:
                 self.y += 1.6 * size
                 first = False
             self.box(MARGIN, self.y, WIDTH, 0.5, LINE)
-            top = self.y + 4.0
+            top = self.y + 3.0
             for cell, place, way in zip(cells, places, ways, strict=True):
                 y = top
                 for words in cell:
                     for line in words.lines(way):
                         self.put(Words(line, words.size, words.color, words.family, words.weight), place, y)
                         y += words.leading
-            self.y = top + height + 3.0
+            self.y = top + height + 2.5
 
     def picture(self, figure: Figure, title: str) -> None:
         """Begin a page with a heading and a figure, which is given the size of the page."""
