@@ -16,6 +16,7 @@ ORDER = (
     "energy_ledger",
     "inch_pound_file",
     "measured_magnet",
+    "measured_constants",
     "bouncing_ball",
     "impact_oscillator",
     "own_part",

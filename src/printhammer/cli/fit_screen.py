@@ -13,15 +13,13 @@ if TYPE_CHECKING:
 _SHOWN_IN: Final = {"m": "um", "kg": "g", "s": "us"}
 """Units that make handy numbers of what a hammer has."""
 
-_LINES: Final = 20
-"""Largest number of outliers whose lines are listed."""
-
 
 def show(fit: Fit, screen: Console) -> None:
     """Print a fit."""
     from rich.markup import escape
 
     from printhammer.cli.terminal import plain_table
+    from printhammer.identify.fragment import outliers
 
     files = f"  [dim]{escape(' and '.join(fit.source))}[/dim]" if fit.source else ""
     screen.print(f"[bold]{fit.kind}[/bold]{files}", soft_wrap=True)
@@ -43,7 +41,7 @@ def show(fit: Fit, screen: Console) -> None:
         used = int((~fit.outliers).sum())
         told.add_row("data", f"{used} used, residual scale {fit.residual_scale:.3g} {fit.axes[1][1]}")
     if fit.outliers.any():
-        told.add_row("left out", escape(_outliers(fit)))
+        told.add_row("robust", escape(outliers(fit)))
     if len(fit.keys) > 1:
         told.add_row("correlation", escape(_largest_correlation(fit)))
         told.add_row("condition", f"{fit.condition_number:.3g}")
@@ -78,15 +76,6 @@ def _numbers(constant: FittedConstant) -> tuple[str, str, str, str]:
         digits = math.floor(math.log10(size)) - math.floor(math.log10(error)) + 2
     texts = [f"{part:.{digits}g}" for part in (value, low, high)]
     return texts[0], f"{error:.2g}", f"{texts[1]} to {texts[2]}", "" if unit == "1" else unit
-
-
-def _outliers(fit: Fit) -> str:
-    count = int(fit.outliers.sum())
-    if not len(fit.lines):
-        return f"{count} data that lie too far off"
-    rows = [int(line) for line in fit.lines[fit.outliers]]
-    listed = ", ".join(map(str, rows[:_LINES])) + (", …" if count > _LINES else "")
-    return f"{count} of the rows lie too far off: line{'s' if count > 1 else ''} {listed}"
 
 
 def _largest_correlation(fit: Fit) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -110,13 +112,27 @@ def report(fit: Fit) -> list[str]:
             f" {fit.residual_scale:.3g} {fit.axes[1][1]}, condition number {fit.condition_number:.3g}"
         )
     if fit.outliers.any():
-        which = ", ".join(str(line) for line in fit.lines[fit.outliers]) if len(fit.lines) else ""
-        lines.append(f"{int(fit.outliers.sum())} outliers left out" + (f": lines {which}" if which else ""))
+        lines.append(outliers(fit))
     if math.isfinite(fit.p_value):
         lines.append(f"test of the law: p = {fit.p_value:.3g}")
     if fit.rejected:
         lines.append(f"the data reject the law: {fit.rejected}")
     return [*lines, *fit.indistinct, *fit.notes]
+
+
+def outliers(fit: Fit, most: int = 20) -> str:
+    """Say which rows were left out; of several files, also to which series each belongs."""
+    rows = [int(row) for row in np.flatnonzero(fit.outliers)]
+    told = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
+    if not len(fit.lines):
+        return told
+    listed = [str(fit.lines[row]) for row in rows[:most]]
+    if len(fit.source) > 1:
+        listed = [
+            f"{line} ({fit.series_names[fit.series[row]]})" for line, row in zip(listed, rows, strict=False)
+        ]
+    more = ", …" if len(rows) > most else ""
+    return f"{told}: line{'s' if len(rows) > 1 else ''} {', '.join(listed)}{more}"
 
 
 def _agrees(hammer: Hammer, key: str, text: str) -> None:
