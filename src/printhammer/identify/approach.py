@@ -1,7 +1,7 @@
 """The way to constants that are far off: stretches that need not fit together yet.
 
-Gaps between the stretches are allowed, at a price that rises from step to step. So a wrong constant is corrected by
-what each stretch by itself shows, before errors can grow from contact to contact.
+Gaps between the stretches are allowed, at a price that rises from step to step. So a wrong constant is
+corrected by what each stretch by itself shows, before errors can grow from contact to contact.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class Approach:
     def _step(
         self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float
     ) -> FloatArray:
-        """Return the step of Gauss and Newton, in the scales of the parameters and the units of the states."""
+        """Return the step of Gauss and Newton, in scales of the parameters and units of the states."""
         count = len(values)
         size = count + sum(chain.gaps.size for chain in chains)
         units = self.shooting.units
@@ -156,5 +156,9 @@ class Approach:
             row[:, prior.which] = white
             rows.append(row)
             right.append(off)
-        step, *_rest = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=1e-10)
-        return np.asarray(step)
+        design, wanted = np.concatenate(rows), np.concatenate(right)
+        sizes = np.sqrt((design * design).sum(axis=0))
+        sizes[sizes == 0.0] = 1.0
+        design /= sizes
+        inverse = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True)
+        return inverse @ (design.T @ wanted) / sizes

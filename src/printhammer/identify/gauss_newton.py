@@ -15,6 +15,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.approach import Approach
+from printhammer.identify.identifiable import singular
 from printhammer.identify.residuals import (
     memory_factor,
     outliers_of,
@@ -43,6 +44,8 @@ _FLOOR: Final = 1e-7
 """Noise in strokes below which no sensor is, so that nothing lies too far off."""
 _LEAST: Final = 1e-16
 """Noise, m, by which exact data are weighted."""
+_LOST: Final = 1e-7
+"""Singular values over the largest that rounding has lost."""
 _NO_MOTION: Final = "the hammer does not move so that the records could be compared with it"
 
 
@@ -176,6 +179,7 @@ class GaussNewton:
             There is none near.
         """
         scales = self.shooting.parameters.scales
+        # A profile begins where all is near.
         if noise is None:
             pairs = list(zip(self.priors, self.whitening, strict=True))
             values, states = Approach(self.shooting, pairs, self.spikes).run(values, states)
@@ -242,7 +246,7 @@ class GaussNewton:
                 weight = np.where(out, 0.0, 1.0)
                 memory = memory_factor(np.where(out, 0.0, left)) if near else 1.0
             else:
-                # A stretch that is not met yet is no outlier: only what stands out of the record itself is left out.
+                # A stretch that is not met yet is no outlier, only what stands out of the record itself.
                 out, memory = self.spikes[shot], 1.0
                 scale = max(float(np.sqrt(np.mean(left[~out] ** 2))), _LEAST)
                 weight = np.where(out, 0.0, 1.0)
@@ -323,11 +327,11 @@ def _solved(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, Floa
     """Return the least-squares step and the standard errors, both in the scales of the parameters."""
     sizes = np.sqrt((design * design).sum(axis=0))
     sizes[sizes == 0.0] = 1.0
-    u, s, vt = np.linalg.svd(design / sizes, full_matrices=False)
-    keep = s > 1e-10 * s[0]
-    inverse = np.where(keep, 1.0 / np.where(keep, s, 1.0), 0.0)
-    step = vt.T @ (inverse * (u.T @ residuals)) / sizes
-    errors = np.sqrt(((vt.T * inverse) ** 2).sum(axis=1)) / sizes
+    values, vectors = singular(design / sizes)
+    keep = values > _LOST * values[-1]
+    inverse = vectors * np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
+    step = inverse @ (inverse.T @ ((design / sizes).T @ residuals)) / sizes
+    errors = np.sqrt((inverse * inverse).sum(axis=1)) / sizes
     return step, errors
 
 

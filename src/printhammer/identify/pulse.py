@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 _FLOOR: Final = 1e-9
 """Noise, in units of the amplitude, below which a record counts as exact."""
-_POOR: Final = 0.02
-"""Residuals, in units of the amplitude, with which a shape does not describe a current."""
+_POOR: Final = 1e-3
+"""Residuals, in units of the amplitude, that do not matter."""
+_LARGER: Final = 1.2
+"""Residuals, in units of the noise, with which a shape does not describe a current."""
 _INTERVALS: Final = 200
 """Most pieces of a waveform that is taken from the record."""
 
@@ -95,7 +97,7 @@ def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform
     if waveform is None or isinstance(waveform, Sampled):
         return _recorded(t, current, noise, "the current is taken from the record")
     pulse, rms = _fitted(t, current, waveform, tau, top)
-    if rms > max(_POOR * top, 3.0 * noise):
+    if rms > max(_POOR * top, _LARGER * noise):
         share = f"{100.0 * rms / top:.2g} %"
         note = (
             f"{where}: a {waveform.shape} does not describe the current (residuals of {share} of its height);"

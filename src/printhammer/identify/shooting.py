@@ -232,7 +232,8 @@ class Shooting:
             )
         except InputError:
             return None
-        result = ensemble.run(strobes=[run.times for run in runs])
+        # So few runs are not worth another kernel.
+        result = ensemble.run(strobes=[run.times for run in runs], engine="plain")
         if not result.ok.all() or result.strobes is None:
             return None
         table = np.stack([result.strobes.x, result.strobes.v], axis=2)
@@ -308,7 +309,7 @@ class Shooting:
         shown : array, shape (n,)
             At the samples.
         derivatives : array, shape (n, p + 2 j)
-            With respect to the parameters, counted in their scales, and to the states at the joints, in `units`.
+            With respect to the parameters, in their scales, and to the states at the joints, in `units`.
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]

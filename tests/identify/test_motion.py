@@ -1,0 +1,289 @@
+"""Fits of single shots: what comes back, what a user is told, and what is refused."""
+
+import itertools
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.identify import shots
+
+import printhammer as ph
+from printhammer.identify.motion import fit_motion
+from printhammer.waveforms import HalfSine, Rectangle
+
+HAMMER = ph.load("hendriks-1983")
+assert HAMMER.waveform is not None
+WAVEFORM = HAMMER.waveform
+MASS = HAMMER.mass
+DAMPING = HAMMER.constants["backstop.damping"].si
+FAR = HAMMER.replace({"mass": 1.3 * MASS, "backstop.damping": 0.7 * DAMPING})
+"""Both constants 30 % off."""
+
+
+def truth(key: str) -> float:
+    """The constant of the hammer from which records are made, SI."""
+    return HAMMER.constants[key].si
+
+
+@pytest.mark.parametrize(("mass", "damping"), [*itertools.product((0.7, 1.3), repeat=2)])
+def test_starts_30_percent_off_lead_to_the_same_constants(
+    tmp_path: Path, mass: float, damping: float
+) -> None:
+    """The fit does not depend on where it begins."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, seed=3)
+    start = HAMMER.replace({"mass": mass * MASS, "backstop.damping": damping * DAMPING})
+    near, far = fit_motion([path], HAMMER), fit_motion([path], start)
+    for key in ("mass", "backstop.damping"):
+        assert far[key].value == pytest.approx(near[key].value, abs=0.01 * near[key].standard_error)
+        assert far[key].standard_error == pytest.approx(near[key].standard_error, rel=1e-3)
+
+
+def test_two_fits_agree_to_the_bit(tmp_path: Path) -> None:
+    """The same records give the same numbers."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, current_noise=5e-3)
+    one, other = fit_motion([path], FAR), fit_motion([path], FAR)
+    assert np.array_equal(one.covariance, other.covariance)
+    assert [c.value for c in one.constants.values()] == [c.value for c in other.constants.values()]
+
+
+def test_the_result_belongs_to_the_records(tmp_path: Path) -> None:
+    """Series, lines and residuals are those of the samples; the fragment makes a hammer."""
+    paths = [
+        shots.write(tmp_path / f"shot{i}.csv", HAMMER, seed=i, end=(1.6 - 0.2 * i) * 1e-3) for i in range(2)
+    ]
+    fit = fit_motion(paths, FAR)
+    assert fit.kind == "motion"
+    assert fit.source == fit.series_names == ("shot0.csv", "shot1.csv")
+    assert np.array_equal(fit.residuals, fit.data - fit.fitted)
+    assert fit.residual_scale == pytest.approx(0.2e-6, rel=0.05)
+    for number, path in enumerate(paths):
+        rows = fit.series == number
+        first = path.read_text().splitlines()[fit.lines[rows][0] - 1].split(",")
+        assert [float(cell) for cell in first] == pytest.approx(
+            [1e6 * fit.abscissa[rows][0], 1e6 * fit.data[rows][0]], rel=1e-12
+        )
+    made = fit.into(FAR)
+    assert made.mass == fit["mass"].value
+    assert made.constants["mass"].status == "derived"
+    assert "fitted to shot0.csv and shot1.csv" in made.constants["mass"].source
+    one = fit_motion(paths[:1], FAR)
+    assert 0.65 < fit["mass"].standard_error / one["mass"].standard_error < 0.76
+
+
+def test_outliers_are_left_out(tmp_path: Path) -> None:
+    """Readings that are wrong altogether are listed and do not matter; without robustness they do."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, outliers=0.02, seed=5)
+    fit = fit_motion([path], FAR)
+    assert 15 < fit.outliers.sum() < 55
+    for key in ("mass", "backstop.damping"):
+        assert abs(fit[key].value - truth(key)) < 4.0 * fit[key].standard_error
+    assert fit_motion([path], HAMMER, robust=False).residual_scale > 5.0 * fit.residual_scale
+
+
+def test_the_bandwidth_counts(tmp_path: Path) -> None:
+    """A sensor's delay that is not told shifts the constants, and the records reject that."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, bandwidth=30e3, said=False)
+    told, untold = fit_motion([path], FAR, bandwidth=30e3), fit_motion([path], FAR)
+    assert abs(told["mass"].value - MASS) < 4.0 * told["mass"].standard_error
+    assert not told.rejected
+    assert abs(untold["mass"].value - MASS) > 10.0 * told["mass"].standard_error
+    assert "the residuals of" in untold.rejected
+    assert untold.p_value < 0.01
+
+
+def test_shots_with_other_currents_fit_together(tmp_path: Path) -> None:
+    """Each record with its own pulse, of the shape of the hammer's waveform."""
+    width = truth("waveform.width")
+    pulses = [Rectangle(**{**WAVEFORM.model_dump(), "width": factor * width}) for factor in (0.95, 1.0, 1.1)]
+    paths = [
+        shots.write(tmp_path / f"{i}.csv", HAMMER, waveform=pulse, current_noise=5e-3, seed=i)
+        for i, pulse in enumerate(pulses)
+    ]
+    fit = fit_motion(paths, FAR)
+    assert list(fit.constants) == ["mass", "backstop.damping"]
+    assert not fit.rejected
+    for key, constant in fit.constants.items():
+        assert abs(constant.value - truth(key)) < 4.0 * constant.standard_error
+
+
+def test_a_current_of_another_shape_is_taken_from_the_record(tmp_path: Path) -> None:
+    """And that is said."""
+    pulse = HalfSine(amplitude=1.5, width=450e-6)
+    path = shots.write(tmp_path / "shot.csv", HAMMER, waveform=pulse, current_noise=2e-3, bandwidth=None)
+    fit = fit_motion([path], FAR)
+    assert any("a rectangle does not describe the current" in note for note in fit.notes)
+    assert fit["mass"].value == pytest.approx(MASS, rel=2e-3)
+
+
+def test_earlier_fits_are_improved(tmp_path: Path) -> None:
+    """Their constants come back with smaller errors, and count in those of the mass."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, seed=11)
+    static = shots.static_fit(
+        HAMMER, {"magnet.Am": 1e-3, "pack.stiffness": 5e-3, "backstop.stiffness": 1e-2}, 4
+    )
+    fit = fit_motion([path], static.into(FAR), earlier=[static])
+    alone = fit_motion([path], static.into(FAR))
+    assert set(fit.constants) == {"mass", "backstop.damping", *static.keys}
+    for key in static.keys:
+        assert fit[key].standard_error < static[key].standard_error
+        assert abs(fit[key].value - truth(key)) < 4.0 * fit[key].standard_error
+    assert fit["mass"].standard_error > fit_motion([path], HAMMER)["mass"].standard_error
+    assert not fit.rejected
+    assert alone.rejected
+
+
+def test_waveform_constants_can_be_free(tmp_path: Path) -> None:
+    """With a recorded current as one more witness of them."""
+    keys = ["mass", "waveform.amplitude", "waveform.width"]
+    for noise in (None, 5e-3):
+        path = shots.write(tmp_path / "shot.csv", HAMMER, current_noise=noise)
+        fit = fit_motion([path], HAMMER.replace("waveform.amplitude", "0.95 A"), free=keys)
+        assert list(fit.constants) == keys
+        for key, constant in fit.constants.items():
+            assert abs(constant.value - truth(key)) < 4.0 * constant.standard_error
+
+
+def test_a_restitution_gives_way_to_the_damping(tmp_path: Path) -> None:
+    """A hammer that gives stiffness and damping otherwise is a start as good as another."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER)
+    start = HAMMER.replace(
+        {"backstop.damping": None, "backstop.restitution": 0.7, "backstop.restitution_speed": 1.0}
+    )
+    fit, plain = fit_motion([path], start), fit_motion([path], HAMMER)
+    assert fit["backstop.damping"].value == pytest.approx(plain["backstop.damping"].value, rel=1e-6)
+    undamped = fit_motion([path], HAMMER.replace("backstop.damping", 0.0))
+    assert undamped["backstop.damping"].value == pytest.approx(plain["backstop.damping"].value, rel=1e-6)
+
+
+def test_what_a_motion_cannot_tell_apart(tmp_path: Path) -> None:
+    """Mass and all forces scale together; stiffness and thickness of the pack are one number."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER)
+    forces = ["mass", "magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs"]
+    for free, named in (
+        (
+            [*forces, "pack.stiffness", "backstop.stiffness", "backstop.damping"],
+            ("mass", "magnet.F0", "spring.Bs"),
+        ),
+        (["pack.stiffness", "pack.thickness"], ("pack.stiffness and pack.thickness",)),
+        (["magnet.F0", "spring.Bs", "spring.As"], ("magnet.F0, spring.Bs and spring.As",)),
+    ):
+        with pytest.raises(ph.InputError, match="a motion cannot tell apart") as told:
+            fit_motion([path], FAR, free=free)
+        assert all(name in str(told.value) for name in named)
+
+
+def test_weak_constants_are_told_with_a_profile(tmp_path: Path) -> None:
+    """Constants that the noise covers: sentences, and how the cost rises about the best value."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, noise=4e-6, spacing=4e-6, end=0.8e-3, seed=2)
+    free = ["mass", "magnet.F0", "magnet.Am", "waveform.decay"]
+    fit = fit_motion([path], HAMMER, free=free)
+    assert any("only" in sentence or "hardly" in sentence for sentence in fit.indistinct)
+    assert fit.profiles
+    for key, profile in fit.profiles.items():
+        assert fit[key].standard_error > 0.1 * abs(fit[key].value)
+        assert (np.diff(profile.values) > 0.0).all()
+        assert profile.increase.min() == 0.0
+        assert profile.values[np.argmin(profile.increase)] == fit[key].value
+        low, high = profile.interval
+        assert low < fit[key].value < high
+
+
+def test_an_offset_is_noticed(tmp_path: Path) -> None:
+    """A record that rests elsewhere than the hammer."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, offset=3e-6)
+    fit = fit_motion([path], HAMMER)
+    assert any("rests" in note and "offset of the sensor" in note for note in fit.notes)
+    assert not any("rests" in note for note in fit_motion([shots.write(path, HAMMER)], HAMMER).notes)
+
+
+BAD: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
+    "misses": (
+        {"waveform": Rectangle(**{**WAVEFORM.model_dump(), "width": 150e-6})},
+        {},
+        r"the record misses the impact: its largest displacement is .* um, expected .*beyond the front",
+    ),
+    "ends early": ({"end": 0.4e-3}, {}, r"the record ends at .* us inside the pack"),
+    "begins late": ({"begin": 150e-6}, {}, r"the record begins at 150 us with the armature .* um off the"),
+    "coarse": ({"spacing": 50e-6}, {}, r"samples in the pack, one every 50 us, expected at least 5"),
+    "no rebound": (
+        {"end": 0.5e-3},
+        {"free": ["mass", "backstop.damping"]},
+        r"does not touch the backstop after the shot, expected one that does for backstop.damping",
+    ),
+    "unknown": ({}, {"free": ["weight"]}, r"free: 'weight' is no constant of hendriks-1983.toml"),
+    "platen": ({}, {"free": ["platen"]}, r"free: 'platen' is no constant .* that moves the armature"),
+    "twice": ({}, {"free": ["mass", "mass"]}, r"free: mass is given twice"),
+    "nothing": ({}, {"free": []}, r"free: no constants are given"),
+    "bandwidth": ({}, {"bandwidth": -1.0}, r"bandwidth = -1.0 Hz, expected a positive number"),
+    "short": ({"end": 0.0, "begin": -15e-6}, {}, r"samples, expected the record of a whole shot"),
+}
+
+
+@pytest.mark.parametrize("which", BAD)
+def test_bad_input_is_told_in_one_sentence(tmp_path: Path, which: str) -> None:
+    """With the file, what is wrong with it, and what was expected."""
+    record, options, sentence = BAD[which]
+    path = tmp_path / "shot.csv"
+    if which == "short":
+        path.write_text("time [us],displacement [um]\n0,50\n1,50\n2,50\n")
+    else:
+        shots.write(path, HAMMER, **record)
+    with pytest.raises(ph.InputError, match=sentence) as told:
+        fit_motion([path], HAMMER, **options)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("time [us]", "time", r"line 2: heading 'time' is expected to carry its unit"),
+        ("# bandwidth: 200000.0 Hz", "# bandwidth: 2 mm", r"the comment 'bandwidth': .*mm"),
+        (
+            "# bandwidth: 200000.0 Hz",
+            "# bandwidth: -2 Hz",
+            r"the comment 'bandwidth': -2 Hz, expected a positive",
+        ),
+    ],
+)
+def test_bad_headings_and_comments(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+    """Also of what the file says of the sensor."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER)
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(ph.InputError, match=sentence):
+        fit_motion([path], HAMMER)
+
+
+def test_times_must_ascend(tmp_path: Path) -> None:
+    """The sentence names the line."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER)
+    lines = path.read_text().splitlines()
+    lines[10], lines[11] = lines[11], lines[10]
+    path.write_text("\n".join(lines))
+    with pytest.raises(ph.InputError, match=r"line 12: time .* expected ascending times"):
+        fit_motion([path], HAMMER)
+
+
+def test_a_current_that_is_none(tmp_path: Path) -> None:
+    """And a hammer without a waveform, where the record has no current either."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, current_noise=1e-3)
+    flat = [
+        re.sub(r",[^,]*$", ",0.0", line) if line[0] in "-0123456789" else line
+        for line in path.read_text().splitlines()
+    ]
+    path.write_text("\n".join(flat))
+    with pytest.raises(ph.InputError, match="the column 'current' shows no pulse"):
+        fit_motion([path], HAMMER)
+    shots.write(path, HAMMER)
+    with pytest.raises(ph.InputError, match=r"neither the record has a column 'current \[A\]' nor"):
+        fit_motion([path], HAMMER.replace("waveform", None))
+
+
+def test_without_a_rebound_only_the_mass_is_found(tmp_path: Path) -> None:
+    """And it is said why."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, end=0.52e-3)
+    fit = fit_motion([path], HAMMER.replace("mass", 1.3 * MASS))
+    assert list(fit.constants) == ["mass"]
+    assert abs(fit["mass"].value - MASS) < 4.0 * fit["mass"].standard_error
+    assert any("its damping cannot be found" in note for note in fit.notes)

@@ -1,0 +1,134 @@
+"""The fit of single shots against what is known: exact records, and intervals that cover the truth."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+from tests.identify import shots
+
+import printhammer as ph
+from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform
+from printhammer.identify.motion import fit_motion
+from printhammer.identify.residuals import memory_factor, noise_of_record
+from printhammer.segments import evaluate
+
+HAMMER = ph.load("hendriks-1983")
+STATIC = {
+    "magnet.F0": 3e-3,
+    "magnet.Am": 1e-3,
+    "magnet.Bm": 2e-3,
+    "spring.Bs": 1e-3,
+    "spring.As": 2e-3,
+    "pack.stiffness": 5e-3,
+    "backstop.stiffness": 1e-2,
+}
+"""Relative standard errors of the static constants."""
+
+
+def truth(key: str) -> float:
+    """The constant of the hammer from which records are made, SI."""
+    return HAMMER.constants[key].si
+
+
+def test_exact_records_give_the_constants_back(tmp_path: Path) -> None:
+    """Without noise, resolution and delay, from 30 % off."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, noise=0.0, resolution=0.0, bandwidth=None)
+    keys = ["mass", "backstop.damping", "backstop.stiffness", "pack.stiffness"]
+    start = HAMMER.replace({key: 1.3 * truth(key) for key in keys[:2]})
+    fit = fit_motion([path], start, free=keys)
+    for key in keys:
+        # A multiple of 0.1 us on the fine grid of the record is a sample up to rounding.
+        assert fit[key].value == pytest.approx(truth(key), rel=1e-8)
+    assert not fit.outliers.any()
+
+
+def test_mass_and_forces_scale_together(tmp_path: Path) -> None:
+    """Twice the forces taken as known, twice the mass found: equations (1) and (2) are linear in both."""
+    path = shots.write(tmp_path / "shot.csv", HAMMER, seed=1)
+    twice = {
+        key: 2.0 * truth(key) for key in ("magnet.F0", "spring.Bs", "pack.stiffness", "backstop.stiffness")
+    }
+    twice |= {key: np.sqrt(2.0) * truth(key) for key in ("magnet.Am", "magnet.Bm")}
+    one, other = fit_motion([path], HAMMER), fit_motion([path], HAMMER.replace(twice))
+    for key in ("mass", "backstop.damping"):
+        assert other[key].value == pytest.approx(2.0 * one[key].value, rel=1e-6)
+        assert other[key].standard_error == pytest.approx(2.0 * one[key].standard_error, rel=1e-4)
+
+
+def covered(folder: Path, seeds: range, *, static: bool) -> dict[str, int]:
+    """How often the 95 % intervals of some laboratories contain the constants."""
+    count: dict[str, int] = {}
+    for seed in seeds:
+        path = shots.write(
+            folder / "shot.csv", HAMMER, seed=seed, end=1.2e-3, current_noise=5e-3 if static else None
+        )
+        earlier = [shots.static_fit(HAMMER, STATIC, 1000 + seed)] if static else []
+        start = earlier[0].into(HAMMER) if static else HAMMER
+        fit = fit_motion([path], start.replace("mass", 1.1 * HAMMER.mass), earlier=earlier)
+        for key, constant in fit.constants.items():
+            low, high = constant.interval
+            count[key] = count.get(key, 0) + (low <= truth(key) <= high)
+    return count
+
+
+def test_intervals_cover_the_truth_in_a_few_laboratories(tmp_path: Path) -> None:
+    """No constant more often outside than happens once in 10 000 tests with honest intervals."""
+    seeds = range(8)
+    least = stats.binom.ppf(1e-4, len(seeds), 0.95)
+    for key, count in covered(tmp_path, seeds, static=False).items():
+        assert count >= least, key
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("static", [False, True])
+def test_intervals_cover_the_truth_in_89_to_99_of_100(tmp_path: Path, *, static: bool) -> None:
+    """Also of the static constants, whose errors count in those of the mass."""
+    for key, count in covered(tmp_path, range(100), static=static).items():
+        assert 89 <= count <= 99, key
+
+
+def test_low_pass_of_a_motion() -> None:
+    """Of t^3 after rest the exact answer is t^3 - 3 tau t^2 + 6 tau^2 t - 6 tau^3 (1 - exp(-t / tau))."""
+    tau = 0.7
+    t = np.array([0.0, 0.1, 0.5, 0.6, 1.7, 3.0])
+    found = lowpass_motion(t, (t**3)[:, np.newaxis], (3.0 * t**2)[:, np.newaxis], tau)[:, 0]
+    exact = t**3 - 3.0 * tau * t**2 + 6.0 * tau**2 * t - 6.0 * tau**3 * (1.0 - np.exp(-t / tau))
+    assert np.abs(found - exact).max() < 1e-13
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "half-sine", "trapezoid", "sampled"])
+def test_low_pass_of_a_waveform(shape: str) -> None:
+    """Against the convolution with exp(-t / tau) / tau by quadrature between the edges."""
+    from scipy.integrate import quad
+    from tests.hammers import waveforms
+
+    tau = 20e-6
+    segments = waveforms(1.0, "current")[shape].segments()
+    times = np.linspace(5e-6, 600e-6, 13)
+    found = lowpass_waveform(segments, times, tau)
+    for t, shown in zip(times, found, strict=True):
+        edges = [0.0, *segments[(segments[:, 0] > 0.0) & (segments[:, 0] < t), 0].tolist(), t]
+        exact = sum(
+            quad(
+                lambda s, t=t: float(evaluate(segments, s)) * np.exp(-(t - s) / tau) / tau,
+                low,
+                high,
+                epsabs=1e-13,
+                epsrel=1e-12,
+                limit=200,
+            )[0]
+            for low, high in zip(edges, edges[1:], strict=False)
+        )
+        assert shown == pytest.approx(exact, abs=1e-10)
+
+
+def test_noise_and_its_memory() -> None:
+    """White noise has its size and no memory; of x_t = a x_{t-1} + e_t it is (1 + a) / (1 - a)."""
+    noise = np.random.default_rng(8).normal(0.0, 0.3, 40_000)
+    assert noise_of_record(noise + np.linspace(0.0, 1.0, len(noise))) == pytest.approx(0.3, rel=0.02)
+    assert memory_factor(noise) == pytest.approx(1.0, abs=0.05)
+    remembered = np.zeros(len(noise))
+    for k in range(1, len(noise)):
+        remembered[k] = 0.5 * remembered[k - 1] + noise[k]
+    assert memory_factor(remembered) == pytest.approx(3.0, rel=0.1)
