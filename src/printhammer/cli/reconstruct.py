@@ -47,9 +47,11 @@ def search(
 
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.errors import InputError
+    from printhammer.outputs import check_outputs
     from printhammer.reconstruction.search import Plan
     from printhammer.reconstruction.search import search as candidates
 
+    check_outputs([log])
     if aim not in ("stated", "all"):
         raise InputError(f"--aim = {aim!r}, expected stated or all")
     announce_compiling()
@@ -105,11 +107,16 @@ def judge(
     """Judge the best candidates of a search by the claims themselves, at the default tolerance."""
     from printhammer.claims import claims
     from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.errors import InputError
+    from printhammer.outputs import check_outputs
     from printhammer.reconstruction.judged import STATED
     from printhammer.reconstruction.shortlist import judge_candidates, read_search, rounded, shortlist
 
+    check_outputs([judged], [log])
     _heading, rows = read_search(log)
     chosen = [rounded(row["constants"]) for row in shortlist(rows, best)]
+    if not chosen:
+        raise InputError(f"{log}: expected candidates that print, and there are none")
     announce_compiling()
     screen = console()
     names = list(claims()) if every_claim else list(STATED)
@@ -154,8 +161,10 @@ def base_rates(
 ) -> None:
     """Count for how many random plausible hammers each claim holds."""
     from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.outputs import check_outputs
     from printhammer.reconstruction.base_rates import base_rates as count
 
+    check_outputs([out])
     announce_compiling()
     with _progress() as progress, _pool(workers) as pool:
         task = progress.add_task("random hammers", total=hammers)
@@ -188,13 +197,26 @@ def predictions(
 ) -> None:
     """Tell what hammers found on the stated claims alone say about the claims that did not lead."""
     from printhammer.errors import InputError
+    from printhammer.outputs import check_outputs
     from printhammer.reconstruction.predictions import predictions as count
-    from printhammer.reconstruction.shortlist import read_judged, read_search
+    from printhammer.reconstruction.shortlist import read_search
 
+    check_outputs([out], [log, judged])
     heading, rows = read_search(log)
     if heading["aim"] != "stated":
         raise InputError(f"{log}: aim = {heading['aim']!r}, expected the log of a search on stated claims")
-    _write_json(out, count(read_judged(judged), heading["seed"], len(rows)))
+    _write_json(out, count(_judged(judged), heading["seed"], len(rows)))
+
+
+def _judged(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a log of judged candidates, of which there must be some."""
+    from printhammer.errors import InputError
+    from printhammer.reconstruction.judged_log import read_judged
+
+    rows = read_judged(path)
+    if not rows:
+        raise InputError(f"{path}: expected judged candidates, and there are none")
+    return rows
 
 
 @app.command("family", epilog="Example: printhammer reconstruct family judged.jsonl --out family")
@@ -224,17 +246,19 @@ def ship(
     core_hours: Annotated[float, typer.Option(min=0.0, help="Time that the searches took.")] = 0.0,
 ) -> None:
     """Write the best judged candidate as a hammer file, and for each claim that fails the best for it."""
+    import math
+
     from printhammer.cli.terminal import announce_compiling, console
-    from printhammer.outputs import make_folder
+    from printhammer.errors import InputError
+    from printhammer.outputs import check_outputs, make_folder
     from printhammer.reconstruction.shipping import best_of, search_json, shipped_hammer
-    from printhammer.reconstruction.shortlist import read_judged, read_search
+    from printhammer.reconstruction.shortlist import read_search
 
-    rows = read_judged(judged)
-    if not rows:
-        from printhammer.errors import InputError
-
-        raise InputError(f"{judged}: expected judged candidates, and there are none")
-    announce_compiling()
+    if not math.isfinite(core_hours):
+        raise InputError(f"--core-hours = {core_hours}, expected a finite number")
+    if not name or Path(name).name != name:
+        raise InputError(f"--name = {name!r}, expected a short name of the hammer, which names its file too")
+    rows = _judged(judged)
     counts: dict[str, int] = {}
     seed = 0
     for heading, tried in map(read_search, logs):
@@ -242,6 +266,8 @@ def ship(
         seed = int(heading["seed"])
     hammer = shipped_hammer(best_of(rows)["constants"], name)
     folder = make_folder(out)
+    check_outputs([folder / f"{name}.toml", folder / "search.json"], [judged, *logs])
+    announce_compiling()
     hammer.save(folder / f"{name}.toml")
     table = search_json(hammer, rows, seed=seed, candidates=counts, core_hours=core_hours)
     _write_json(folder / "search.json", table)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
 
 TITLE: Final = "The stored-energy print hammer of Hendriks (1983), reconstructed"
-NOTE: Final = """
+NOTE: Final = """\
 The paper prints no constants; only its geometry is stated, in the captions of its figures. Everything else
 here is a reconstruction: found by a search for constants with which the model behaves as the paper tells,
 claim by claim. Other constants do about as well, see the family. A reconstructed constant is no measurement.

@@ -9,7 +9,8 @@ import numpy as np
 
 from printhammer.claims import claims
 from printhammer.errors import InputError
-from printhammer.reconstruction.judged import FIGURE_11, STATED, row_of, text_of
+from printhammer.reconstruction.judged import FIGURE_11, STATED, row_of
+from printhammer.reconstruction.judged_log import append, joined, key_of, mend, read_judged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,6 +24,8 @@ DIGITS: Final = 6
 """Digits of the constants that are judged and shipped."""
 
 _TOGETHER: Final = 8
+_HEADING: Final = {"aim", "seed"}
+_CANDIDATE: Final = {"point", "total", "constants"}
 
 
 def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
@@ -35,11 +38,24 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """
     try:
         lines = path.read_text(encoding="utf-8").split("\n")[:-1]
-        rows = [json.loads(line) for line in lines]
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"{path}: expected the log of a search ({error})") from None
-    if not rows or "aim" not in rows[0]:
-        raise InputError(f"{path}: expected the log of a search, whose first line has an aim")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8"
+        raise InputError(f"{path}: the log cannot be read ({reason})") from None
+    rows = []
+    for number, line in enumerate(lines, 1):
+        try:
+            row = json.loads(line)
+        except ValueError:
+            row = None
+        wanted = _HEADING if number == 1 else _CANDIDATE
+        if not isinstance(row, dict) or not wanted <= set(row):
+            what = "the heading" if number == 1 else "a candidate"
+            raise InputError(
+                f"{path}, line {number}: expected {what} of the log of a search, not {line[:40]!r}"
+            )
+        rows.append(row)
+    if not rows:
+        raise InputError(f"{path}: expected the log of a search, and there is nothing")
     return rows[0], rows[1:]
 
 
@@ -70,22 +86,6 @@ def shortlist(rows: Sequence[dict[str, Any]], count: int, apart: float = APART) 
 def rounded(constants: Mapping[str, float]) -> dict[str, float]:
     """Return constants with as many digits as a hammer file should have."""
     return {key: float(f"{value:.{DIGITS}g}") for key, value in constants.items()}
-
-
-def read_judged(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a log of judged candidates; none where there is no file.
-
-    Raises
-    ------
-    InputError
-        The file is no such log.
-    """
-    if not path.exists():
-        return []
-    try:
-        return [json.loads(line) for line in path.read_text(encoding="utf-8").split("\n")[:-1]]
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"{path}: expected a log of judged candidates ({error})") from None
 
 
 def _judge(task: tuple[dict[str, float], tuple[str, ...]]) -> dict[str, Any]:
@@ -122,24 +122,21 @@ def judge_candidates(
         The rows of these candidates, see `printhammer.reconstruction.judged.row_of`.
     """
     wanted = [dict(constants) for constants in every]
-    known = {_key(row["constants"]): row for row in read_judged(path)}
+    known = {key_of(row["constants"]): row for row in read_judged(path)}
+    mend(path)
     there = {key for key, row in known.items() if set(names) - {FIGURE_11} <= set(row["verdicts"])}
-    fresh = [constants for constants in wanted if _key(constants) not in there]
-    tasks = [(constants, tuple(names)) for constants in fresh]
+    fresh = {key: one for one in wanted if (key := key_of(one)) not in there}
+    tasks = [(constants, tuple(names)) for constants in fresh.values()]
     for start in range(0, len(tasks), _TOGETHER):
         some = tasks[start : start + _TOGETHER]
         found = map(_judge, some) if pool is None else pool.map(_judge, some)
         for done, row in enumerate(found, start + 1):
-            known[_key(row["constants"])] = row
-            with path.open("a", encoding="utf-8") as file:
-                file.write(text_of(row))
+            append(path, row)
+            key = key_of(row["constants"])
+            known[key] = joined(known.get(key), row)
             if tell is not None:
                 tell(done, len(tasks), row)
-    return [known[_key(constants)] for constants in wanted]
-
-
-def _key(constants: dict[str, float]) -> tuple[tuple[str, float], ...]:
-    return tuple(sorted(constants.items()))
+    return [known[key_of(constants)] for constants in wanted]
 
 
 def standing(row: dict[str, Any]) -> tuple[int, int, int]:
