@@ -1,5 +1,6 @@
 """The fit of single shots against what is known: exact records, and intervals that cover the truth."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -118,7 +119,7 @@ def test_low_pass_of_a_waveform(shape: str) -> None:
                 epsrel=1e-12,
                 limit=200,
             )[0]
-            for low, high in zip(edges, edges[1:], strict=False)
+            for low, high in pairwise(edges)
         )
         assert shown == pytest.approx(exact, abs=1e-10)
 
