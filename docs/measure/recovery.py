@@ -18,7 +18,7 @@ SPREAD = 0.2
 
 
 def hammers(labs: int, random: bool) -> Iterator[ph.Hammer]:
-    """Return a hammer for each laboratory; one that does not rest or would not return is drawn again."""
+    """Return a hammer for each laboratory; one that does not print its dot and come back is drawn again."""
     shipped = ph.load("hendriks-1983")
     rng = np.random.default_rng(1983)
     low, high = math.log(1.0 - SPREAD), math.log(1.0 + SPREAD)
@@ -30,12 +30,18 @@ def hammers(labs: int, random: bool) -> Iterator[ph.Hammer]:
             changes = {key: c.si * f for (key, c), f in zip(shipped.constants.items(), factors, strict=True)}
             try:
                 hammer = shipped.replace(changes)
-                if hammer.warnings():
+                if hammer.warnings() or not prints(hammer):
                     continue
             except ph.InputError:
                 continue
         made += 1
         yield hammer
+
+
+def prints(hammer: ph.Hammer) -> bool:
+    """Return whether a single pulse prints, and the armature then touches the backstop."""
+    motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
+    return motion.dots[0].struck and any(touch.surface == "backstop" for touch in motion.contacts[1:])
 
 
 def table(found: list[Recovery]) -> None:
