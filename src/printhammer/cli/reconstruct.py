@@ -37,6 +37,12 @@ def search(
         str, typer.Option(metavar="stated|all", help="Claims that lead: stated ones alone, or shapes too.")
     ] = "all",
     seed: SeedOption = 1,
+    start_from: Annotated[
+        Path | None,
+        typer.Option(
+            "--from", metavar="LOG", help="Another search, from whose best candidates to begin too."
+        ),
+    ] = None,
     minutes: Annotated[float, typer.Option(min=0.0, help="How long to search; 0: until interrupted.")] = 60.0,
     workers: WorkersOption = 2,
 ) -> None:
@@ -48,12 +54,14 @@ def search(
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
-    from printhammer.reconstruction.search import Plan
+    from printhammer.reconstruction.search import Plan, starts_of
     from printhammer.reconstruction.search import search as candidates
 
     check_outputs([log])
     if aim not in ("stated", "all"):
         raise InputError(f"--aim = {aim!r}, expected stated or all")
+    starts = () if start_from is None else starts_of(start_from)
+    plan = Plan("stated" if aim == "stated" else "all", seed, starts=starts)
     announce_compiling()
     start = monotonic()
     screen = console()
@@ -69,9 +77,7 @@ def search(
 
         count, best = 0, None
         with _pool(workers) as pool:
-            for row in candidates(
-                Plan("stated" if aim == "stated" else "all", seed), log, pool=pool, tell=tell
-            ):
+            for row in candidates(plan, log, pool=pool, tell=tell):
                 count += 1
                 if best is None or row["total"] < best["total"]:
                     best = row

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from printhammer.reconstruction.candidates import candidates
-from printhammer.reconstruction.losses import Score, hung, pairs, panels, single_pulse, statics
+from printhammer.reconstruction.losses import Score, hung, pairs, single_pulse, statics
+from printhammer.reconstruction.panel_losses import panels
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,10 +14,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.verdict import repeats
 from printhammer.claims.definition import claims
 from printhammer.claims.two_pulses import half_rise
-from printhammer.claims.verdicts import printed_verdicts
 from printhammer.drive import PulseTrain
 from printhammer.ensemble import Ensemble, EnsembleResult
 from printhammer.equilibrium import holding_margin
@@ -50,17 +48,9 @@ _CLEARLY: Final = 0.002
 _TAIL: Final = 1e-3
 """Time after the second of two pulses within which its peak lies, s."""
 
-_CHUNK: Final = 64
+CHUNK: Final = 64
 _BURST_RATES: Final = 8
 _PULSES: Final = 9
-FIRINGS: Final = 200
-"""Firings of each panel of Fig. 11 in the search; the claim itself is about many more."""
-
-_AGREE: Final = 1e-8
-"""Distance, in half-widths of the window, from which on a train counts as settled."""
-
-_LAST: Final = 40
-_LONGEST: Final = 16
 
 
 def hinge(excess: float, scale: float) -> float:
@@ -90,9 +80,10 @@ class Score:
         return sum(weight * self.losses.get(name, 1.0) for name, weight in weights.items())
 
 
-def _run(
+def run_all(
     chosen: Sequence[Candidate], drives: Sequence[Drive], ends: Sequence[float], repeat: int, **wanted: Any
 ) -> EnsembleResult:
+    """Run each candidate from rest under so many drives, in this thread."""
     hammers = [candidate.hammer for candidate in chosen for _ in range(repeat)]
     states = [candidate.state for candidate in chosen for _ in range(repeat)]
     return Ensemble(hammers, list(drives), ends, states=states, tolerance=TOLERANCE).run(threads=1, **wanted)
@@ -114,11 +105,11 @@ def statics(candidate: Candidate, score: Score) -> None:
 
 def single_pulse(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
     """Look at the single pulse: contacts with the pack, settle-out."""
-    for start in range(0, len(chosen), _CHUNK):
-        some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
+    for start in range(0, len(chosen), CHUNK):
+        some, own = chosen[start : start + CHUNK], scores[start : start + CHUNK]
         drives = [PulseTrain(candidate.waveform) for candidate in some]
         times = np.arange(0.0, _SETTLED, _GRID)
-        result = _run(some, drives, [_SETTLED] * len(some), 1, times=times, dots=True)
+        result = run_all(some, drives, [_SETTLED] * len(some), 1, times=times, dots=True)
         assert result.x is not None
         assert result.dots is not None
         for row, score in enumerate(own):
@@ -169,14 +160,14 @@ def _pair_gaps() -> tuple[FloatArray, int, int]:
 def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
     """Look at two pulses: quench, catch on the rise, and no loss of the second dot at longer times."""
     gaps, quenched, caught = _pair_gaps()
-    for start in range(0, len(chosen), _CHUNK):
-        some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
+    for start in range(0, len(chosen), CHUNK):
+        some, own = chosen[start : start + CHUNK], scores[start : start + CHUNK]
         drives = [PulseTrain(candidate.waveform, at=[0.0, gap]) for candidate in some for gap in gaps]
         ends = np.tile(gaps + _TAIL, len(some))
         half = half_times(some)
         moments = [np.array([gap + half[k]]) for k in range(len(some)) for gap in gaps]
         times = np.arange(0.0, float(ends.max()), _COARSE)
-        result = _run(some, drives, ends.tolist(), len(gaps), times=times, dots=True, strobes=moments)
+        result = run_all(some, drives, ends.tolist(), len(gaps), times=times, dots=True, strobes=moments)
         assert result.x is not None
         assert result.dots is not None
         assert result.strobes is not None
@@ -256,8 +247,8 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
     top = claims()["weak_prints_when_hung_up"].band["largest_force_over_single"]["at_most"]
     must = claims()["hang_up_at_high_rate"].band["hang_up_rate_Hz"]["at_most"]
     b, xp = geometry()["b"], geometry()["xp"]
-    for start in range(0, len(chosen), _CHUNK):
-        some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
+    for start in range(0, len(chosen), CHUNK):
+        some, own = chosen[start : start + CHUNK], scores[start : start + CHUNK]
         plan = []
         for candidate in some:
             waveform = candidate.waveform
@@ -273,7 +264,7 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
         ]
         ends = [float(drive.times[-1]) + 1e-3 for drive in drives]
         times = np.arange(0.0, max(ends), _COARSE)
-        result = _run(some, drives, ends, _BURST_RATES * 2, times=times, dots=True)
+        result = run_all(some, drives, ends, _BURST_RATES * 2, times=times, dots=True)
         assert result.x is not None
         assert result.dots is not None
         for k, score in enumerate(own):
@@ -306,70 +297,3 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
 def _highest(drive: PulseTrain) -> float:
     """Return about the largest current of a train, A."""
     return float(np.abs(drive.value(np.linspace(0.0, float(drive.times[-1]) + 1e-3, 400))).max())
-
-
-def panels(chosen: Sequence[Candidate], scores: Sequence[Score], firings: int = FIRINGS) -> None:
-    """Look at the twelve panels of Fig. 11: verdicts, as far as short trains tell, and the window."""
-    printed = printed_verdicts()
-    settings = claims()["poincare_window"].settings
-    window_x, window_v = settings["window_x_m"], settings["window_v_m_per_s"]
-    wanted_share = claims()["poincare_window"].band["least_share_inside"]["at_least"]
-    scales = np.array([np.ptp(window_x) / 2.0, np.ptp(window_v) / 2.0, np.ptp(window_x) / 2.0])
-    periods = list(printed)
-    for start in range(0, len(chosen), _CHUNK):
-        some, own = chosen[start : start + _CHUNK], scores[start : start + _CHUNK]
-        drives = [
-            PulseTrain(candidate.waveform, period=period, pulses=firings + 1)
-            for candidate in some
-            for period in periods
-        ]
-        ends = [period * firings for _ in some for period in periods]
-        result = _run(some, drives, ends, len(periods), strobes="firings")
-        table = result.strobes
-        assert table is not None
-        for k, score in enumerate(own):
-            losses, shares, found = [], [], []
-            for j, period in enumerate(periods):
-                row = k * len(periods) + j
-                states = np.column_stack([table.x[row], table.v[row], table.memory[row]])[:firings]
-                branch = np.where(states[:, 0] > geometry()["xp"], table.branch[row, :firings], 0)
-                x, v = states[: settings["points"], 0], states[: settings["points"], 1]
-                inside = (x >= window_x[0]) & (x <= window_x[1]) & (v >= window_v[0]) & (v <= window_v[1])
-                shares.append(float(inside.mean()))
-                loss, name = _panel(states, branch, scales, printed[period])
-                losses.append(loss)
-                found.append(name)
-            score.losses["poincare"] = float(np.mean(losses))
-            score.losses["poincare_window"] = hinge(wanted_share - min(shares), wanted_share)
-            right = sum(name == wanted for name, wanted in zip(found, printed.values(), strict=True))
-            score.measured |= {"panels": right, "verdicts": found, "least_share": min(shares)}
-
-
-def _panel(
-    states: FloatArray, branch: npt.NDArray[np.int64], scales: FloatArray, printed: str
-) -> tuple[float, str]:
-    """Return the loss of a panel and the verdict that a short train suggests."""
-    late = repeats(states[-_LAST:], branch[-_LAST:], scales, _LONGEST)
-    early = repeats(states[-2 * _LAST : -_LAST], branch[-2 * _LAST : -_LAST], scales, _LONGEST)
-    finite = np.where(np.isfinite(late), np.maximum(late, 1e-12), 10.0)
-    before = np.where(np.isfinite(early), np.maximum(early, 1e-12), 10.0)
-    closing = finite < 0.3 * before
-    near = np.flatnonzero((finite < 1e-6) | (closing & (finite < 1e-2)))
-    name = f"period-{near[0] + 1}" if near.size else "strange"
-    if name == printed:
-        return 0.0, name
-    if printed == "strange":
-        # The faster it settles, the farther from strange.
-        return 0.4 + 0.6 * _haste(states, scales, int(near[0]) + 1), name
-    period = int(printed.rpartition("-")[2])
-    # Log distance of states that far apart: 0 is as far as the window, -6 agrees.
-    distance = 0.5 + 0.5 * min(max((math.log10(float(finite[period - 1])) + 3.0) / 3.0, 0.0), 1.0)
-    return distance, name
-
-
-def _haste(states: FloatArray, scales: FloatArray, period: int) -> float:
-    """Return how soon states that far apart agree: 1 for at once, 0 for not before the end."""
-    apart = np.abs((states[period:] - states[:-period]) / scales).max(axis=1)
-    agree = np.flatnonzero(apart < _AGREE)
-    count = int(agree[0]) + 1 if agree.size else len(states)
-    return 1.0 - math.log(count) / math.log(len(states))

@@ -31,13 +31,19 @@ SAMPLE: Final = 16384
 ISLANDS: Final = 8
 POPULATION: Final = 16
 SIGMA: Final = 0.08
-"""First step length of an island, in shares of the ranges."""
+"""Largest first step length of an island, in shares of the ranges."""
 
 PATIENCE: Final = 30
 """Generations without gain after which an island begins anew."""
 
 _SEEDS: Final = 200
-"""Best points of the sample from which islands begin."""
+"""Best points known from which islands begin."""
+
+_FAVOUR: Final = 2.0
+_GAIN: Final = 1e-3
+_APART: Final = 0.03
+STARTS: Final = 64
+"""Points taken over from another search."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +58,14 @@ class Plan:
         Of everything random.
     sample : int
         Points of the wide sample.
+    starts : tuple of tuple of float
+        Further points from which islands may begin, such as the best of another search.
     """
 
     aim: Aim
     seed: int
     sample: int = SAMPLE
+    starts: tuple[tuple[float, ...], ...] = ()
 
     def heading(self) -> dict[str, Any]:
         """Return the first line of the log."""
@@ -65,11 +74,26 @@ class Plan:
             "aim": self.aim,
             "seed": self.seed,
             "sample": self.sample,
+            "starts": [list(point) for point in self.starts],
             "islands": ISLANDS,
             "population": POPULATION,
             "weights": WEIGHTS[self.aim],
             "variables": [[v.name, v.low, v.high, v.logarithmic] for v in VARIABLES],
         }
+
+
+def starts_of(path: Path, count: int = STARTS) -> tuple[tuple[float, ...], ...]:
+    """Return the best points of another search that are not next to each other.
+
+    Raises
+    ------
+    InputError
+        The file is not the log of a search.
+    """
+    from printhammer.reconstruction.shortlist import read_search, shortlist
+
+    _heading, rows = read_search(path)
+    return tuple(tuple(row["point"]) for row in shortlist(rows, count, _APART))
 
 
 class Log:
@@ -177,7 +201,7 @@ def search(
 
     rng = np.random.default_rng([plan.seed, len(plan.aim)])
     start: list[dict[str, Any]] = []
-    points = _wide(plan, rng)
+    points = [*(np.array(point) for point in plan.starts), *_wide(plan, rng)]
     for first in range(0, len(points), ISLANDS * POPULATION):
         for row in batch(points[first : first + ISLANDS * POPULATION]):
             start.append(row)
@@ -189,8 +213,12 @@ def search(
         found = batch([point for points in asked for point in points])
         yield from found
         for number, island in enumerate(islands):
-            island.tell(found[number * POPULATION : (number + 1) * POPULATION])
+            own = found[number * POPULATION : (number + 1) * POPULATION]
+            island.tell(own)
             if island.done:
+                # What it found may be where another begins.
+                start.append(island.best)
+                start.sort(key=lambda row: row["total"])
                 islands[number] = _Island(start, rng)
 
 
@@ -211,24 +239,27 @@ class _Island:
             raise InputError(
                 "the search needs cmaes, which is not installed: pip install 'printhammer[identify]'"
             ) from None
-        pick = int(rng.integers(min(_SEEDS, len(start))))
+        # Good ones are taken more often.
+        pick = int(min(_SEEDS, len(start)) * rng.random() ** _FAVOUR)
         self._strategy = CMA(
             mean=np.clip(np.array(start[pick]["point"]), 0.02, 0.98),
-            sigma=SIGMA,
+            sigma=SIGMA * 2.0 ** -rng.integers(4),
             bounds=np.array([[0.0, 1.0]] * len(VARIABLES)),
             seed=int(rng.integers(2**31)),
             population_size=POPULATION,
         )
-        self._best, self._since = np.inf, 0
+        self.best = start[pick]
+        self._least, self._since = np.inf, 0
 
     def ask(self) -> list[FloatArray]:
         return [self._strategy.ask() for _ in range(POPULATION)]
 
     def tell(self, found: list[dict[str, Any]]) -> None:
         self._strategy.tell([(np.array(row["point"]), row["total"]) for row in found])
-        least = min(row["total"] for row in found)
-        self._since = 0 if least < self._best - 1e-3 else self._since + 1
-        self._best = min(self._best, least)
+        best = min(found, key=lambda row: float(row["total"]))
+        self._since = 0 if best["total"] < self._least - _GAIN else self._since + 1
+        if best["total"] < self._least:
+            self._least, self.best = best["total"], best
 
     @property
     def done(self) -> bool:
