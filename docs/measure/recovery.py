@@ -46,7 +46,7 @@ def prints(hammer: ph.Hammer) -> bool:
 
 def table(found: list[Recovery]) -> None:
     """Print one line for each constant: in a fit of its own, and in the end, from all measurements."""
-    print("| constant | from | intervals that hold | median error | mean error in standard errors |")
+    print("| constant | from | intervals that hold | standard error | mean error in standard errors |")
     print("|---|---|---|---|---|")
     for kind in found[0].fits:
         for key, constant in found[0].fits[kind].constants.items():
@@ -55,7 +55,7 @@ def table(found: list[Recovery]) -> None:
             pairs = [(lab.fits[kind].constants.get(key), lab.true(key)) for lab in found]
             known = [(one, true) for one, true in pairs if one is not None]
             held = sum(one.interval[0] <= true <= one.interval[1] for one, true in known)
-            error = np.median([abs(one.value / true - 1.0) for one, true in known])
+            error = np.median([one.standard_error / true for one, true in known])
             bias = np.mean([(one.value - true) / one.standard_error for one, true in known])
             where = "all" if kind == "motion" else kind
             print(f"| `{key}` | {where} | {held} of {len(known)} | {100.0 * error:.2g} % | {bias:+.2f} |")
