@@ -31,9 +31,8 @@ found = ph.fit("motion", folder / "shot.csv", hammer=start)
 for key, constant in found.constants.items():
     true = hammer.constants[key].si
     off = (constant.value - true) / constant.standard_error
-    print(
-        f"{key}: {constant.value:.6g} {constant.unit}, {off:+.1f} standard errors from the truth"
-    )
+    value = f"{constant.value:.6g} {constant.unit}"
+    print(f"{key}: {value}, {off:+.1f} standard errors from the truth")
 
 # %%
 # What is left over is noise: no contact shows in it.
