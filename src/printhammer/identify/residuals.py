@@ -35,7 +35,7 @@ def noise_of_record(values: FloatArray) -> float:
 
 
 def running_median(values: FloatArray, width: int) -> FloatArray:
-    """Return the running median over an odd number of samples, at the ends that of the first and the last ones."""
+    """Return the running median over an odd number of samples; at the ends that of the outermost ones."""
     half = width // 2
     windows = np.lib.stride_tricks.sliding_window_view(values, width)
     first, last = np.median(values[:width]), np.median(values[-width:])
