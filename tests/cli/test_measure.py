@@ -49,12 +49,12 @@ def test_all_tables_go_into_a_folder(cli: Callable, here: Path) -> None:
 
 
 def test_what_the_hammer_lacks_is_left_out_and_said(cli: Callable, here: Path) -> None:
-    ph.load("hendriks-1983").replace({"pack": None}).save("open.toml")
-    done = cli("measure", "all", "open.toml", "--out", "lab", "--duration", "0.2 ms")
+    ph.load("hendriks-1983").replace({"waveform": None, "pack": None}).save("still.toml")
+    done = cli("measure", "all", "still.toml", "--out", "lab", "--currents", "0 A, 1 A")
     assert done.status == 0
-    assert "open.toml: the hammer has no pack, pack is left out" in done.err
-    assert not (here / "lab" / "pack.csv").exists()
-    assert (here / "lab" / "magnet.csv").exists()
+    assert "still.toml: the hammer has no pack, pack is left out" in done.err
+    assert "still.toml: the hammer has no waveform, motion is left out" in done.err
+    assert sorted(path.stem for path in (here / "lab").iterdir()) == ["backstop", "magnet", "spring"]
 
 
 def test_nothing_is_written_over_unless_asked(cli: Callable, here: Path) -> None:
