@@ -60,7 +60,10 @@ BackstopOption = Annotated[
 
 @app.command("magnet", epilog=EXAMPLE)
 def magnet(
-    file: Annotated[Path, _table("Columns displacement, current, force: magnet and spring together.")],
+    files: Annotated[
+        list[Path],
+        _table("Columns displacement, current, force: magnet and spring together; a second: as --spring."),
+    ],
     spring: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Columns displacement, force: the spring alone, without magnet."),
@@ -82,14 +85,16 @@ def magnet(
 
     Forces of magnet and spring together do not tell F0 from Bs: give the spring alone with --spring.
     """
-    results = _Results(out, into, plot, covariance, hammer, [file, *([spring] if spring else [])])
+    results = _Results(out, into, plot, covariance, hammer, [*files, *([spring] if spring else [])])
 
     def found(known: Hammer | None) -> Fit:
         from printhammer.identify.fitting import fit
 
         offset = None if zero == "fit" else _length(zero, "--zero")
         position = _length(backstop, "--backstop")
-        return fit("magnet", file, hammer=known, position=position, spring=spring, zero=offset, robust=robust)
+        return fit(
+            "magnet", files, hammer=known, position=position, spring=spring, zero=offset, robust=robust
+        )
 
     results.make(found, strict=strict)
 

@@ -33,7 +33,8 @@ def fit(
         forces of the spring alone; "pack": the stiffness from load cycles; "backstop": l/k, and l, from
         rebounds; "motion": mass, damping and others from records of single shots.
     path : path, or sequence of path
-        The table, CSV with units in its heading; for "motion" several are allowed.
+        The table, CSV with units in its heading; for "motion" several are allowed, for "magnet" a second one
+        without currents, that of the spring alone.
     hammer : Hammer, optional
         What is known already: position of the backstop, thickness of the pack, stiffness of the backstop; for
         "motion", which needs one, all constants that are not fitted.
@@ -65,12 +66,29 @@ def fit(
         if hammer is None:
             raise InputError("the hammer is missing, expected one with the constants known already")
         return fit_motion(many, hammer, **options)
+    if kind == "magnet" and len(many) == 2 and options.get("spring") is None:
+        many, options["spring"] = _magnet_and_spring(many)
     if len(many) != 1:
         raise InputError(f"{len(many)} tables, expected one of the kind {kind!r}")
     for name in ("position", "thickness", "zero"):
         if isinstance(options.get(name), str):
             options[name] = read_number(options[name], "m", name)
     return _static(kind, many[0], hammer, options)
+
+
+def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
+    """Tell which of two tables has no currents."""
+    from printhammer.identify.tables import read_table
+
+    columns = {"displacement": "m", "force": "N"}
+    with_current = [
+        "current" in read_table(path, columns, optional={"current": "A"}).values for path in paths
+    ]
+    if sum(with_current) != 1:
+        names = " and ".join(str(path) for path in paths)
+        raise InputError(f"{names}: expected one table with the column 'current' and one without")
+    first = with_current.index(True)
+    return [paths[first]], paths[1 - first]
 
 
 def _static(kind: str, table: Any, hammer: Hammer | None, options: dict[str, Any]) -> Fit:

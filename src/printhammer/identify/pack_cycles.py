@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.units import from_si
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -103,7 +104,8 @@ def check_loading(table: Table, cycles: Cycles) -> None:
         if depth[rows[-1]] <= depth[rows[0]]:
             raise InputError(
                 f"{table.path}: lines {first} to {last} are loading, but their indentation falls from"
-                f" {depth[rows[0]]:.4g} to {depth[rows[-1]]:.4g} m, expected one that grows"
+                f" {from_si(float(depth[rows[0]]), 'm', 'um'):.4g} to"
+                f" {from_si(float(depth[rows[-1]]), 'm', 'um'):.4g} um, expected one that grows"
             )
         order = rows[np.argsort(depth[rows], kind="stable")]
         smooth = _smooth(force[order])
@@ -111,11 +113,13 @@ def check_loading(table: Table, cycles: Cycles) -> None:
         k = int(np.argmax(peaks - smooth))
         fall = float(peaks[k] - smooth[k])
         if fall > max(_FALL * np.abs(force).max(), 4.0 * _noise(force[order])):
-            top = int(np.argmax(smooth[: k + 1]))
+            high, low = (
+                f"{force[row]:.4g} N at {from_si(float(depth[row]), 'm', 'um'):.4g} um (line {table.lines[row]})"
+                for row in (order[int(np.argmax(smooth[: k + 1]))], order[k])
+            )
             raise InputError(
-                f"{table.path}: the force of the loading branch falls from {smooth[top]:.4g} N at"
-                f" {depth[order[top]]:.4g} m (line {table.lines[order[top]]}) to {smooth[k]:.4g} N at"
-                f" {depth[order[k]]:.4g} m (line {table.lines[order[k]]}), expected one that grows"
+                f"{table.path}: the force of the loading branch falls from {high} to {low}, expected one that"
+                " grows"
             )
 
 
