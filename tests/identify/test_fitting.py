@@ -39,7 +39,7 @@ def test_what_it_refuses(tmp_path: Path, hammer: ph.Hammer) -> None:
         ph.fit("magnet", [forces, forces], hammer=hammer)
     with pytest.raises(InputError, match="the hammer is missing"):
         ph.fit("motion", forces)
-    with pytest.raises(InputError, match="position: .* a length"):
+    with pytest.raises(InputError, match=r"position: .* a length"):
         ph.fit("spring", forces, position="2 s")
     with pytest.raises(InputError, match="thickness of the pack is missing"):
         ph.fit("pack", forces, hammer=hammer.replace("pack", None))

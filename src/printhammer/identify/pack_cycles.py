@@ -114,8 +114,9 @@ def check_loading(table: Table, cycles: Cycles) -> None:
         fall = float(peaks[k] - smooth[k])
         if fall > max(_FALL * np.abs(force).max(), 4.0 * _noise(force[order])):
             high, low = (
-                f"{force[row]:.4g} N at {from_si(float(depth[row]), 'm', 'um'):.4g} um (line {table.lines[row]})"
+                f"{force[row]:.4g} N at {at:.4g} um (line {table.lines[row]})"
                 for row in (order[int(np.argmax(smooth[: k + 1]))], order[k])
+                for at in (from_si(float(depth[row]), "m", "um"),)
             )
             raise InputError(
                 f"{table.path}: the force of the loading branch falls from {high} to {low}, expected one that"
