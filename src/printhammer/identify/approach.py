@@ -161,4 +161,4 @@ class Approach:
         sizes[sizes == 0.0] = 1.0
         design /= sizes
         inverse = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True)
-        return inverse @ (design.T @ wanted) / sizes
+        return np.asarray(inverse @ (design.T @ wanted) / sizes)
