@@ -1,4 +1,4 @@
-"""The search: a wide sample, then evolution strategies from its best points, again and again.
+"""The search: a wide sample, then evolution strategies from its best points, and steps over what is feasible.
 
 Everything follows from the seed. Each candidate is a line of the log, so that a search that was stopped goes
 on where it was: what the log holds is not computed again.
@@ -14,6 +14,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.reconstruction.evaluation import WEIGHTS, scored
+from printhammer.reconstruction.explorer import Explorer
 from printhammer.reconstruction.space import VARIABLES
 
 if TYPE_CHECKING:
@@ -28,7 +29,10 @@ FORMAT: Final = 1
 SAMPLE: Final = 16384
 """Points of the wide sample."""
 
-ISLANDS: Final = 8
+ISLANDS: Final = 4
+EXPLORED: Final = 64
+"""Points of each round that explore, beside those of the islands."""
+
 POPULATION: Final = 16
 SIGMA: Final = 0.08
 """Largest first step length of an island, in shares of the ranges."""
@@ -40,6 +44,7 @@ _SEEDS: Final = 200
 """Best points known from which islands begin."""
 
 _FAVOUR: Final = 2.0
+_TOGETHER: Final = 128
 _GAIN: Final = 1e-3
 _APART: Final = 0.03
 STARTS: Final = 64
@@ -76,6 +81,7 @@ class Plan:
             "sample": self.sample,
             "starts": [list(point) for point in self.starts],
             "islands": ISLANDS,
+            "explored": EXPLORED,
             "population": POPULATION,
             "weights": WEIGHTS[self.aim],
             "variables": [[v.name, v.low, v.high, v.logarithmic] for v in VARIABLES],
@@ -202,16 +208,19 @@ def search(
     rng = np.random.default_rng([plan.seed, len(plan.aim)])
     start: list[dict[str, Any]] = []
     points = [*(np.array(point) for point in plan.starts), *_wide(plan, rng)]
-    for first in range(0, len(points), ISLANDS * POPULATION):
-        for row in batch(points[first : first + ISLANDS * POPULATION]):
+    for first in range(0, len(points), _TOGETHER):
+        for row in batch(points[first : first + _TOGETHER]):
             start.append(row)
             yield row
     start.sort(key=lambda row: row["total"])
+    explorer = Explorer(WEIGHTS[plan.aim], rng)
+    explorer.note(start)
     islands = [_Island(start, rng) for _ in range(ISLANDS)]
     while True:
-        asked = [island.ask() for island in islands]
-        found = batch([point for points in asked for point in points])
+        asked = [point for island in islands for point in island.ask()]
+        found = batch(asked + explorer.ask(EXPLORED))
         yield from found
+        explorer.note(found)
         for number, island in enumerate(islands):
             own = found[number * POPULATION : (number + 1) * POPULATION]
             island.tell(own)
