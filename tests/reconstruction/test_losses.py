@@ -1,0 +1,181 @@
+"""Losses of candidates against the verdicts of the claims themselves, which they lead to."""
+
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.candidates import near_points, random_points, some_candidates
+
+from printhammer.claims import Context, claims, judge
+from printhammer.reconstruction import losses
+from printhammer.reconstruction.candidates import Candidate
+from printhammer.reconstruction.evaluation import WEIGHTS, evaluate, rows
+from printhammer.reconstruction.losses import Score, hinge
+
+QUICK = (
+    "single_pulse_stroke",
+    "return_from_everywhere",
+    "release_margin",
+    "settle_out",
+    "two_pulses_660us",
+    "two_pulses_700us",
+)
+# Where a measured value is so near the end of its band that a coarser grid and tolerance may decide.
+NEAR = {
+    "return_from_everywhere": ("largest_net_force_N", 0.05),
+    "settle_out": ("largest_excursion_over_stroke", 0.002),
+    "two_pulses_660us": ("peak_minus_pack_front_m", 0.5e-6),
+    "two_pulses_700us": ("second_over_first_peak_force", 0.002),
+}
+
+
+def looked_at(chosen: tuple[Candidate, ...]) -> list[Score]:
+    scores = [Score() for _ in chosen]
+    for candidate, score in zip(chosen, scores, strict=True):
+        losses.statics(candidate, score)
+    losses.single_pulse(chosen, scores)
+    losses.pairs(chosen, scores)
+    return scores
+
+
+def close_call(name: str, value: dict[str, float]) -> bool:
+    """Whether a measured value is about at the end of its band."""
+    key, margin = NEAR.get(name, ("", 0.0))
+    band = claims()[name].band.get(key)
+    ends = band if isinstance(band, list) else (band or {}).values()
+    found = value.get(key)
+    return found is not None and any(abs(found - end) < margin for end in ends)
+
+
+@given(st.floats(-10.0, 10.0), st.floats(0.01, 5.0))
+def test_hinge_is_zero_without_excess_and_at_most_one(excess: float, scale: float) -> None:
+    loss = hinge(excess, scale)
+    assert 0.0 <= loss <= 1.0
+    assert (loss == 0.0) == (excess <= 0.0 or excess / scale == 0.0)
+    assert (loss == 1.0) == (excess >= scale)
+
+
+def test_what_is_not_known_counts_in_full() -> None:
+    assert hinge(math.nan, 1.0) == 1.0
+    score = Score({"settle_out": 0.25})
+    assert score.total({"settle_out": 2.0, "poincare": 4.0}) == 4.5
+
+
+def test_only_stated_claims_lead_one_search_and_typical_ones_neither() -> None:
+    kinds = {aim: {claims()[name].kind for name in weights} for aim, weights in WEIGHTS.items()}
+    assert kinds == {"stated": {"stated"}, "all": {"stated", "shape"}}
+    # What leads the first search leads the second too, with the same weight.
+    assert WEIGHTS["stated"].items() <= WEIGHTS["all"].items()
+
+
+def check(chosen: tuple[Candidate, ...], names: tuple[str, ...], scores: list[Score]) -> int:
+    """Compare losses with verdicts, close calls apart; return how many were compared."""
+    compared = 0
+    for candidate, score in zip(chosen, scores, strict=True):
+        context = Context(candidate.hammer)
+        for name in names:
+            result = judge(context, claims()[name])
+            if close_call(name, dict(result.value or {})):
+                continue
+            assert (score.losses[name] == 0.0) == (result.verdict == "holds"), (name, score, result.detail)
+            compared += 1
+    return compared
+
+
+def test_no_loss_where_the_claim_holds_and_some_where_it_fails() -> None:
+    chosen = some_candidates()
+    scores = looked_at(chosen)
+    assert check(chosen, QUICK, scores) > 0.8 * len(QUICK) * len(chosen)
+    for name in QUICK[1:3]:
+        # Either way, so that something was compared.
+        assert len({score.losses[name] == 0.0 for score in scores}) == 2
+
+
+@pytest.mark.slow
+def test_losses_and_verdicts_of_many_candidates() -> None:
+    chosen = some_candidates(64, 48, 5)
+    scores = looked_at(chosen)
+    assert check(chosen, QUICK, scores) > 0.8 * len(QUICK) * len(chosen)
+    for name in QUICK:
+        assert len({score.losses[name] == 0.0 for score in scores}) == 2
+
+
+def test_numbers_in_the_log_are_those_of_the_claims() -> None:
+    *_, candidate = some_candidates()
+    (score,) = looked_at((candidate,))
+    context = Context(candidate.hammer)
+    found = {name: judge(context, claims()[name]).value or {} for name in QUICK}
+    measured = score.measured
+    assert measured["force"] == pytest.approx(context.print_force, rel=1e-6)
+    assert measured["flight_time"] == pytest.approx(context.dot.flight_time, abs=1e-9)
+    margin = found["release_margin"]["net_over_magnet_force"]
+    assert measured["margin"] == pytest.approx(margin, rel=1e-9)
+    settled = found["settle_out"]["largest_excursion_over_stroke"]
+    # The motion is looked at every microsecond.
+    assert measured["highest"] == pytest.approx(settled, rel=1e-3, abs=1e-3)
+    speed = found["two_pulses_700us"]["velocity_at_half_current_m_per_s"]
+    assert measured["rise_speed"] == pytest.approx(speed, abs=1e-6)
+
+
+def test_losses_do_not_depend_on_the_candidates_beside() -> None:
+    chosen = some_candidates()[:4]
+    together = looked_at(chosen)
+    for candidate, score in zip(chosen, together, strict=True):
+        (alone,) = looked_at((candidate,))
+        assert alone.losses == score.losses
+        assert alone.measured == score.measured
+
+
+@pytest.mark.parametrize("aim", ["stated", "all"])
+def test_losses_are_between_zero_and_one_and_go_into_the_log(aim: str) -> None:
+    points = random_points(8, 2) + near_points(8, 2)
+    for (candidate, score), row in zip(evaluate(points, aim), rows(points, aim), strict=True):
+        assert (candidate is None) == (row["constants"] is None)
+        assert all(0.0 <= loss <= 1.0 for loss in score.losses.values())
+        assert 0.0 <= row["total"] <= sum(WEIGHTS[aim].values())
+        # Numbers that JSON has.
+        assert json.loads(json.dumps(row, allow_nan=False)) == row
+        if candidate is None:
+            assert row["total"] == sum(WEIGHTS[aim].values())
+
+
+@pytest.mark.slow
+def test_losses_that_follow_whole_scans_of_rates() -> None:
+    chosen = some_candidates(12, 12, 3)
+    scores = looked_at(chosen)
+    losses.hung(chosen, scores)
+    for candidate, score in zip(chosen, scores, strict=True):
+        context = Context(candidate.hammer)
+        lost = judge(context, claims()["second_dot_lost"])
+        # The claim looks at every hertz, the search at intervals of ten microseconds and more.
+        if lost.verdict == "holds":
+            assert score.losses["second_dot_lost"] < 0.5
+        hung = (judge(context, claims()["hang_up_at_high_rate"]).value or {}).get("hang_up_rate_Hz")
+        must = claims()["hang_up_at_high_rate"].band["hang_up_rate_Hz"]["at_most"]
+        if hung is not None:
+            # Every 250 Hz or so.
+            assert score.measured["hang_up"] <= hung + 600.0
+            if hung < must - 600.0:
+                assert score.losses["hang_up_at_high_rate"] == 0.0
+
+
+@pytest.mark.slow
+def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
+    from printhammer.reconstruction.judged import plain_panels
+
+    chosen = some_candidates(8, 8, 9)[-8:]
+    scores = [Score() for _ in chosen]
+    losses.panels(chosen, scores)
+    right = 0
+    for candidate, score in zip(chosen, scores, strict=True):
+        found = [name for name, _printed in plain_panels(candidate.hammer).values()]
+        right += sum(mine == name for mine, name in zip(score.measured["verdicts"], found, strict=True))
+        assert 0.0 <= score.losses["poincare"] <= 1.0
+        share = (judge(Context(candidate.hammer), claims()["poincare_window"]).value or {}).get(
+            "least_share_inside"
+        )
+        assert score.measured["least_share"] == pytest.approx(share, abs=0.1)
+    # A short train tells period from chaos in most panels; the claim alone decides.
+    assert right > 0.75 * 12 * len(chosen)

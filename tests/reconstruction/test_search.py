@@ -1,0 +1,242 @@
+"""The search: everything follows from the seed, and a log that was begun is gone on with."""
+
+import itertools
+import json
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from printhammer.errors import InputError
+from printhammer.reconstruction import evaluation
+from printhammer.reconstruction import search as module
+from printhammer.reconstruction.search import Plan, search
+from printhammer.reconstruction.space import VARIABLES
+
+PLAN = Plan("all", seed=3, sample=16)
+BATCHES = 8
+BATCH = 8
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {"ISLANDS": 2, "POPULATION": 4, "PATIENCE": 3}.items():
+        monkeypatch.setattr(module, name, value)
+
+
+@pytest.fixture
+def bowl(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Something cheap to minimise in place of hammers; the list tells how many points were computed."""
+    computed: list[int] = []
+
+    def scored(points: list[Any], aim: str, _pool: Any) -> list[dict[str, Any]]:
+        computed.append(len(points))
+        return [
+            {
+                "point": [float(share) for share in point],
+                "total": float(np.sum((point - 0.7) ** 2)),
+                "losses": {},
+                "measured": {"aim": aim},
+                "constants": {"mass": 1.0 + float(point[0])},
+            }
+            for point in points
+        ]
+
+    monkeypatch.setattr(module, "scored", scored)
+    return computed
+
+
+def run(path: Path, count: int, plan: Plan = PLAN, **options: Any) -> list[dict[str, Any]]:
+    return list(itertools.islice(search(plan, path, **options), count))
+
+
+def test_the_same_seed_writes_the_same_bytes(bowl: list[int], tmp_path: Path) -> None:
+    rows = run(tmp_path / "a.jsonl", BATCH * BATCHES)
+    run(tmp_path / "b.jsonl", BATCH * BATCHES)
+    run(tmp_path / "c.jsonl", BATCH * BATCHES, Plan("all", seed=4, sample=16))
+    first, same, other = ((tmp_path / f"{name}.jsonl").read_bytes() for name in "abc")
+    assert first == same != other
+    heading, *lines = first.decode().splitlines()
+    assert json.loads(heading)["seed"] == 3
+    assert [json.loads(line) for line in lines] == rows
+    assert sum(bowl) == 3 * BATCH * BATCHES
+
+
+def test_aims_have_searches_of_their_own(bowl: list[int], tmp_path: Path) -> None:
+    stated = run(tmp_path / "a.jsonl", 16, Plan("stated", seed=3, sample=16))
+    assert stated[0]["measured"] == {"aim": "stated"}
+    assert stated[0]["point"] != run(tmp_path / "b.jsonl", 16)[0]["point"]
+    assert bowl
+
+
+def test_it_finds_the_bottom(bowl: list[int], tmp_path: Path) -> None:
+    rows = run(tmp_path / "a.jsonl", 1200)
+    least = [min(row["total"] for row in rows[:count]) for count in (16, 1200)]
+    assert least[1] < 0.05 * least[0]
+    assert all(0.0 <= share <= 1.0 for row in rows for share in row["point"])
+    # Islands begin anew, so that no point comes for ever.
+    assert len({tuple(row["point"]) for row in rows}) == len(rows)
+    assert bowl
+
+
+def test_the_sample_is_spread_evenly(bowl: list[int], tmp_path: Path) -> None:
+    points = np.array([row["point"] for row in run(tmp_path / "a.jsonl", 16)])
+    assert points.shape == (16, len(VARIABLES))
+    # A scrambled Sobol sequence has one of 16 points in each sixteenth of each range.
+    assert (np.sort(np.floor(points * 16), axis=0) == np.arange(16)[:, np.newaxis]).all()
+    assert bowl
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.37, 0.5, 0.72, 0.9999])
+def test_a_search_goes_on_where_it_was_stopped(bowl: list[int], tmp_path: Path, share: float) -> None:
+    path = tmp_path / "a.jsonl"
+    run(path, BATCH * BATCHES)
+    whole = path.read_bytes()
+    heading = whole.index(b"\n") + 1
+    # Mostly in the middle of a line.
+    cut = whole[: heading + round(share * (len(whole) - heading))]
+    path.write_bytes(cut)
+    bowl.clear()
+    run(path, BATCH * BATCHES)
+    assert path.read_bytes() == whole
+    there = cut.count(b"\n") - 1
+    assert sum(bowl) == BATCH * BATCHES - there
+
+
+def test_going_on_beyond_a_whole_log(bowl: list[int], tmp_path: Path) -> None:
+    path = tmp_path / "a.jsonl"
+    short = run(path, BATCH * 3)
+    long = run(path, BATCH * 6)
+    assert long[: len(short)] == short
+    assert long == run(tmp_path / "b.jsonl", BATCH * 6)
+    assert path.read_bytes() == (tmp_path / "b.jsonl").read_bytes()
+    assert bowl
+
+
+def test_what_interrupts_leaves_the_log_as_far_as_it_was(
+    bowl: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.jsonl"
+    whole = run(path, BATCH * 5)
+    wanted = path.read_bytes()
+    path.unlink()
+    plain = module.scored
+    calls = iter(range(100))
+
+    def stopped(points: list[Any], aim: Any, pool: Any) -> list[dict[str, Any]]:
+        if next(calls) == 3:
+            raise KeyboardInterrupt
+        return plain(points, aim, pool)
+
+    monkeypatch.setattr(module, "scored", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run(path, BATCH * 5)
+    assert wanted.startswith(path.read_bytes())
+    assert path.read_bytes().count(b"\n") == 1 + 3 * BATCH
+    assert run(path, BATCH * 5) == whole
+    assert path.read_bytes() == wanted
+    assert bowl
+
+
+def test_progress_tells_the_best_so_far(bowl: list[int], tmp_path: Path) -> None:
+    told: list[tuple[int, float]] = []
+    rows = run(
+        tmp_path / "a.jsonl",
+        BATCH * 4,
+        tell=lambda count, least, row: told.append((count, least)) or row["total"],
+    )
+    assert [count for count, _ in told] == [BATCH, 2 * BATCH, 3 * BATCH, 4 * BATCH]
+    for count, least in told:
+        assert least == min(row["total"] for row in rows[:count])
+    assert bowl
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [Plan("all", seed=4, sample=16), Plan("stated", seed=3, sample=16), Plan("all", seed=3, sample=32)],
+)
+def test_the_log_of_another_search_is_refused(bowl: list[int], tmp_path: Path, plan: Plan) -> None:
+    path = tmp_path / "a.jsonl"
+    run(path, BATCH)
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=r"a\.jsonl: the log of another search") as error:
+        run(path, BATCH, plan)
+    assert "\n" not in str(error.value)
+    assert path.read_bytes() == before
+    assert bowl
+
+
+def test_other_weights_or_ranges_are_another_search(
+    bowl: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.jsonl"
+    run(path, BATCH)
+    monkeypatch.setitem(evaluation.WEIGHTS["all"], "settle_out", 3.0)
+    with pytest.raises(InputError, match="the log of another search"):
+        run(path, BATCH)
+    assert bowl
+
+
+def test_a_candidate_that_is_not_of_this_search_is_told(bowl: list[int], tmp_path: Path) -> None:
+    path = tmp_path / "a.jsonl"
+    run(path, BATCH * 2)
+    lines = path.read_text().splitlines(keepends=True)
+    lines[5], lines[6] = lines[6], lines[5]
+    path.write_text("".join(lines))
+    with pytest.raises(InputError, match=r"candidate \d+ is not the one of this search"):
+        run(path, BATCH * 2)
+    assert bowl
+
+
+def test_a_broken_line_in_the_middle_is_told(bowl: list[int], tmp_path: Path) -> None:
+    path = tmp_path / "a.jsonl"
+    run(path, BATCH)
+    path.write_text(path.read_text() + "{\n")
+    with pytest.raises(InputError, match="expected JSON lines of a search"):
+        run(path, BATCH)
+    assert bowl
+
+
+@pytest.fixture
+def threads() -> Iterator[ThreadPoolExecutor]:
+    with ThreadPoolExecutor(3) as pool:
+        yield pool
+
+
+def test_rows_come_in_the_order_of_the_points(
+    monkeypatch: pytest.MonkeyPatch, threads: ThreadPoolExecutor
+) -> None:
+    monkeypatch.setattr(evaluation, "PIECE", 3)
+    monkeypatch.setattr(evaluation, "rows", lambda points, aim: [{"point": p, "aim": aim} for p in points])
+    points = [np.array([float(number)]) for number in range(10)]
+    found = evaluation.scored(points, "all", threads)
+    assert [row["point"] for row in found] == points
+    assert found == evaluation.scored(points, "all", None)
+    assert evaluation.scored([], "all", None) == []
+
+
+def test_hammers_are_searched_stopped_and_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Cut where a piece that is computed together breaks in two.
+    monkeypatch.setattr(evaluation, "PIECE", 4)
+    path = tmp_path / "a.jsonl"
+    run(path, BATCH * 3)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    run(path, BATCH * 3)
+    assert path.read_bytes() == whole
+
+
+@pytest.mark.slow
+def test_one_process_and_two_write_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(evaluation, "PIECE", 4)
+    plan = Plan("stated", seed=2, sample=32)
+    run(tmp_path / "a.jsonl", 64, plan)
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        run(tmp_path / "b.jsonl", 64, plan, pool=pool)
+    assert (tmp_path / "a.jsonl").read_bytes() == (tmp_path / "b.jsonl").read_bytes()
