@@ -186,8 +186,7 @@ def _solution(
     freedom = int(used.sum()) - len(p)
     root = np.sqrt(variance[used])
     rows, errors = jacobian[used] / root[:, None], residuals[used] / root
-    length = np.linalg.norm(rows, axis=0)
-    length[length == 0.0] = 1.0
+    length = _lengths(rows)
     singular = np.linalg.svd(rows / length, compute_uv=False)
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else math.inf
     scale = math.sqrt(float(np.sum(residuals[used] ** 2)) / max(freedom, 1))
@@ -226,8 +225,7 @@ def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArr
         For the Student's t of each parameter, those of Bell and McCaffrey.
     """
     m, n = rows.shape
-    length = np.linalg.norm(rows, axis=0)
-    length[length == 0.0] = 1.0
+    length = _lengths(rows)
     inverse = np.linalg.pinv(rows / length) / length[:, None]
     # A row that alone determines a parameter has no residual of its own; it counts like one with 0.9.
     left = np.sqrt(np.maximum(1.0 - leverage(rows), 0.1))
@@ -246,9 +244,16 @@ def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArr
 
 def leverage(rows: FloatArray) -> FloatArray:
     """Return how much each row determines its own fitted value, 0 to 1, shape (m,)."""
-    basis, singular, _ = np.linalg.svd(rows, full_matrices=False)
+    basis, singular, _ = np.linalg.svd(rows / _lengths(rows), full_matrices=False)
     kept = basis[:, singular > 1e-12 * singular[0]] if singular.size else basis
     found: FloatArray = np.sum(kept * kept, axis=1)
+    return found
+
+
+def _lengths(rows: FloatArray) -> FloatArray:
+    """Return the lengths of the columns; 1 for a column of zeros."""
+    found: FloatArray = np.linalg.norm(rows, axis=0)
+    found[found == 0.0] = 1.0
     return found
 
 
