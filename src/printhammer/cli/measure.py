@@ -184,7 +184,7 @@ def _options(kinds: list[str], bench: dict[str, str | None]) -> dict[str, dict[s
 
     from printhammer.drive_input import read_number
     from printhammer.errors import InputError
-    from printhammer.identify.bench import BENCHES
+    from printhammer.identify.benches import BENCHES
 
     accepted = {kind: set(signature(BENCHES[kind]).parameters) for kind in kinds}
     found: dict[str, dict[str, Any]] = {kind: {} for kind in kinds}

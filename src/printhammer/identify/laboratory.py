@@ -1,6 +1,6 @@
 """The synthetic laboratory: measurements of a hammer, with the errors of real sensors and a seed.
 
-What a bench has to show is computed from the hammer (`printhammer.identify.bench`), goes through the sensors
+What a bench has to show is computed from the hammer (`printhammer.identify.benches`), goes through the sensors
 (`printhammer.identify.sensor`), and becomes a table like those that a laboratory hands in. Every kind of
 measurement and every column has its own random numbers, so that none disturbs another.
 """
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.bench import BENCHES
+from printhammer.identify.benches import BENCHES
 from printhammer.identify.sensor import FULL_SCALE, READING, Amount, Channel, Sensor, full_scale, wrong_rows
 from printhammer.identify.sensor_settings import adjusted
 
