@@ -13,6 +13,7 @@ from printhammer.reconstruction import losses
 from printhammer.reconstruction.candidates import Candidate
 from printhammer.reconstruction.evaluation import WEIGHTS, evaluate, rows
 from printhammer.reconstruction.losses import Score, hinge
+from printhammer.reconstruction.panel_losses import panels
 
 QUICK = (
     "single_pulse_stroke",
@@ -128,6 +129,22 @@ def test_losses_do_not_depend_on_the_candidates_beside() -> None:
         assert alone.measured == score.measured
 
 
+@pytest.mark.slow
+def test_losses_of_trains_do_not_depend_on_the_candidates_beside() -> None:
+    chosen = some_candidates(2, 4, 6)
+
+    def look(some: tuple[Candidate, ...]) -> list[Score]:
+        scores = looked_at(some)
+        panels(some, scores)
+        losses.hung(some, scores)
+        return scores
+
+    for candidate, score in zip(chosen, look(chosen), strict=True):
+        (alone,) = look((candidate,))
+        assert alone.losses == score.losses
+        assert alone.measured == score.measured
+
+
 @pytest.mark.parametrize("aim", ["stated", "all"])
 def test_losses_are_between_zero_and_one_and_go_into_the_log(aim: str) -> None:
     points = random_points(8, 2) + near_points(8, 2)
@@ -167,7 +184,7 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
 
     chosen = some_candidates(8, 8, 9)[-8:]
     scores = [Score() for _ in chosen]
-    losses.panels(chosen, scores)
+    panels(chosen, scores)
     right = 0
     for candidate, score in zip(chosen, scores, strict=True):
         found = [name for name, _printed in plain_panels(candidate.hammer).values()]

@@ -56,11 +56,17 @@ def search(
     from printhammer.outputs import check_outputs
     from printhammer.reconstruction.search import Plan, starts_of
     from printhammer.reconstruction.search import search as candidates
+    from printhammer.reconstruction.shortlist import aim_of
 
     check_outputs([log])
     if aim not in ("stated", "all"):
         raise InputError(f"--aim = {aim!r}, expected stated or all")
     starts = () if start_from is None else starts_of(start_from)
+    if start_from is not None and aim == "stated" and (led := aim_of(start_from)) != aim:
+        # What is found must be able to predict the other claims.
+        raise InputError(
+            f"--from {start_from}: its search was led by {led} claims, expected {aim} ones alone"
+        )
     plan = Plan("stated" if aim == "stated" else "all", seed, starts=starts)
     announce_compiling()
     start = monotonic()
