@@ -36,9 +36,6 @@ _EXACT: Final = 1e-11
 
 _ROUNDS: Final = 30
 
-_FEW: Final = 1000
-"""With more rows than this, the degrees of freedom are those of all residuals."""
-
 
 class Law(Protocol):
     """What is fitted: data as a function of parameters."""
@@ -227,26 +224,34 @@ def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArr
     m, n = rows.shape
     length = _lengths(rows)
     inverse = np.linalg.pinv(rows / length) / length[:, None]
+    basis = _basis(rows)
+    own = np.sum(basis * basis, axis=1)
     # A row that alone determines a parameter has no residual of its own; it counts like one with 0.9.
-    left = np.sqrt(np.maximum(1.0 - leverage(rows), 0.1))
-    half = inverse / left
+    half = inverse / np.sqrt(np.maximum(1.0 - own, 0.1))
     covariance: FloatArray = (half * errors) @ (half * errors).T
     freedoms = np.full(n, float(max(m - n, 1)))
-    if m > _FEW or m <= n:
+    if m <= n:
         return covariance, freedoms
-    rest = np.eye(m) - rows @ inverse
     for k in range(n):
-        # The estimated variance is a quadratic form of the noise; its mean and spread give the freedom.
-        form = rest * half[k] ** 2 @ rest
-        freedoms[k] = np.trace(form) ** 2 / np.sum(form * form)
+        # The estimated variance is the quadratic form (1 - H) D (1 - H) of the noise, H the projection on the
+        # rows, D diagonal; its mean and spread give the freedom.
+        d = half[k] ** 2
+        trace = float(d @ (1.0 - own))
+        inner = basis.T @ (d[:, None] * basis)
+        freedoms[k] = trace**2 / (float(d**2 @ (1.0 - 2.0 * own)) + float(np.sum(inner * inner)))
     return covariance, freedoms
 
 
 def leverage(rows: FloatArray) -> FloatArray:
     """Return how much each row determines its own fitted value, 0 to 1, shape (m,)."""
+    found: FloatArray = np.sum(_basis(rows) ** 2, axis=1)
+    return found
+
+
+def _basis(rows: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of what the columns span, shape (m, rank)."""
     basis, singular, _ = np.linalg.svd(rows / _lengths(rows), full_matrices=False)
-    kept = basis[:, singular > 1e-12 * singular[0]] if singular.size else basis
-    found: FloatArray = np.sum(kept * kept, axis=1)
+    found: FloatArray = basis[:, singular > 1e-12 * singular[0]] if singular.size else basis
     return found
 
 
