@@ -1,6 +1,6 @@
 """The synthetic laboratory: measurements of a hammer, with the errors of real sensors and a seed.
 
-What a bench has to show is computed from the hammer (`printhammer.identify.benches`), goes through the sensors
+What is there to be seen of a hammer is computed (`printhammer.identify.benches`), goes through the sensors
 (`printhammer.identify.sensor`), and becomes a table like those that a laboratory hands in. Every kind of
 measurement and every column has its own random numbers, so that none disturbs another.
 """
