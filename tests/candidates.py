@@ -30,9 +30,11 @@ def near_points(count: int, seed: int, apart: float = 0.05) -> Points:
 
 
 @cache
-def some_candidates(count: int = 12, near: int = 6, seed: int = 11) -> tuple[Candidate, ...]:
+def some_candidates(
+    count: int = 12, near: int = 6, seed: int = 11, apart: float = 0.05
+) -> tuple[Candidate, ...]:
     """Candidates of random points and of points about the shipped hammer."""
-    found = candidates(random_points(count, seed) + near_points(near, seed))
+    found = candidates(random_points(count, seed) + near_points(near, seed, apart))
     return tuple(candidate for candidate in found if candidate is not None)
 
 

@@ -6,7 +6,7 @@ from tests.candidates import near_points, random_points, some_candidates
 
 from printhammer.claims import Context, claims, judge
 from printhammer.claims.definition import within
-from printhammer.equilibrium import release_current, rest_state
+from printhammer.equilibrium import rest_state
 from printhammer.reconstruction.candidates import candidates
 from printhammer.reconstruction.space import PRINT_FORCE, geometry, hammer_of, point_of, values_at
 
@@ -69,18 +69,13 @@ def test_no_points_are_no_candidates() -> None:
 
 
 @pytest.mark.slow
-def test_most_points_that_release_print(subtests: pytest.Subtests) -> None:
+def test_many_random_points_print_the_stroke_of_the_paper() -> None:
     points = random_points(96, 21)
     found = candidates(points)
-    context = claims()["single_pulse_stroke"]
-    for number, candidate in enumerate(found):
-        with subtests.test(number=number):
-            if candidate is None:
-                continue
-            needed = release_current(candidate.hammer)
-            assert needed is not None
-            assert needed < candidate.waveform.peak
-            value = judge(Context(candidate.hammer), context).value
+    claim = claims()["single_pulse_stroke"]
+    for candidate in found:
+        if candidate is not None:
+            value = judge(Context(candidate.hammer), claim).value
             assert value is not None
-            assert within(value["max_displacement_m"], context.band["max_displacement_m"])
+            assert within(value["max_displacement_m"], claim.band["max_displacement_m"])
     assert sum(candidate is not None for candidate in found) > len(points) / 4

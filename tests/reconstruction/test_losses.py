@@ -3,6 +3,7 @@
 import json
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -96,7 +97,7 @@ def test_no_loss_where_the_claim_holds_and_some_where_it_fails() -> None:
 
 @pytest.mark.slow
 def test_losses_and_verdicts_of_many_candidates() -> None:
-    chosen = some_candidates(64, 48, 5)
+    chosen = some_candidates(96, 32, 5, 0.02)
     scores = looked_at(chosen)
     assert check(chosen, QUICK, scores) > 0.8 * len(QUICK) * len(chosen)
     for name in QUICK:
@@ -172,8 +173,8 @@ def test_losses_that_follow_whole_scans_of_rates() -> None:
         hung = (judge(context, claims()["hang_up_at_high_rate"]).value or {}).get("hang_up_rate_Hz")
         must = claims()["hang_up_at_high_rate"].band["hang_up_rate_Hz"]["at_most"]
         if hung is not None:
-            # Every 250 Hz or so.
-            assert score.measured["hang_up"] <= hung + 600.0
+            # From 2 kHz on, every 250 Hz or so.
+            assert score.measured["hang_up"] <= max(hung, 2000.0) + 600.0
             if hung < must - 600.0:
                 assert score.losses["hang_up_at_high_rate"] == 0.0
 
@@ -185,7 +186,7 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
     chosen = some_candidates(8, 8, 9)[-8:]
     scores = [Score() for _ in chosen]
     panels(chosen, scores)
-    right = 0
+    right, off = 0, []
     for candidate, score in zip(chosen, scores, strict=True):
         found = [name for name, _printed in plain_panels(candidate.hammer).values()]
         right += sum(mine == name for mine, name in zip(score.measured["verdicts"], found, strict=True))
@@ -193,6 +194,9 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
         share = (judge(Context(candidate.hammer), claims()["poincare_window"]).value or {}).get(
             "least_share_inside"
         )
-        assert score.measured["least_share"] == pytest.approx(share, abs=0.1)
+        assert share is not None
+        off.append(abs(score.measured["least_share"] - share))
+    # Where a strange train goes depends on the tolerance, and with it the share of a panel.
+    assert np.median(off) < 0.02
     # A short train tells period from chaos in most panels; the claim alone decides.
     assert right > 0.75 * 12 * len(chosen)

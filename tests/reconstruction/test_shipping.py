@@ -1,0 +1,119 @@
+"""From judged candidates to the hammer file and what the report tells of the search."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.candidates import shipped_constants
+
+import printhammer as ph
+from printhammer.claims import Result, claims
+from printhammer.problem import TOLERANCE
+from printhammer.reconstruction import shipping as module
+from printhammer.reconstruction.judged import FIGURE_11, STATED
+from printhammer.reconstruction.results import results_in
+from printhammer.reconstruction.shipping import NOTE, TITLE, best_of, gauge, search_json, shipped_hammer
+from printhammer.reconstruction.shortlist import rounded
+
+FAILING = ("settle_out", FIGURE_11, "release_margin")
+
+
+def row(mass: float, *, panels: int = 5, **verdicts: bool) -> dict[str, Any]:
+    return {
+        "constants": {"mass": mass},
+        "verdicts": {**dict.fromkeys(claims(), True), **dict.fromkeys(FAILING, False), **verdicts},
+        "values": {"settle_out": {"rebounds": 7}},
+        "panels": panels,
+        "panel_verdicts": dict.fromkeys(("1.35 ms", "1.30 ms"), "strange"),
+    }
+
+
+@pytest.fixture
+def some_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All claims hold for the shipped hammer but for some."""
+
+    def judge_all(_hammer: ph.Hammer) -> list[Result]:
+        return [
+            Result(claim, dict.fromkeys(claim.band, 0.5), "fails", "So it is.")
+            if name in FAILING
+            else Result(claim, {}, "holds", "")
+            for name, claim in claims().items()
+        ]
+
+    monkeypatch.setattr(module, "judge_all", judge_all)
+
+
+def test_stated_claims_come_first_then_panels_then_others() -> None:
+    lost = row(1.0, panels=12, settle_out=True, release_margin=True, **{STATED[1]: False})
+    few = row(2.0, panels=8, settle_out=True)
+    many = row(3.0, panels=9)
+    more = row(4.0, panels=9, settle_out=True)
+    assert best_of([lost, few, many, more]) is more
+    assert best_of([lost, few, many]) is many
+    assert best_of([lost, few]) is few
+    # Equal ones: the first.
+    assert best_of([many, dict(many)]) is many
+
+
+def test_the_hammer_file_comes_back_the_same(tmp_path: Path) -> None:
+    constants = rounded(shipped_constants())
+    hammer = shipped_hammer(constants, "found")
+    hammer.save(tmp_path / "found.toml")
+    back = ph.load(tmp_path / "found.toml")
+    assert back.fingerprint == hammer.fingerprint
+    assert back.name == "found"
+    assert back.title == TITLE
+    assert back.note.strip() == NOTE.strip()
+    assert not back.note.startswith("\n")
+    for key, value in constants.items():
+        assert back.constants[key].si == value
+        assert back.constants[key].status == "reconstructed"
+    # It moves like the one that was judged, whatever it is called.
+    drive = ph.PulseTrain(hammer.waveform)
+    motions = [ph.simulate(one, drive, duration=2e-3) for one in (hammer, back)]
+    assert (motions[0].x == motions[1].x).all()
+
+
+def test_what_the_report_tells_can_be_read(some_fail: None, tmp_path: Path) -> None:
+    del some_fail
+    hammer = shipped_hammer(shipped_constants(), "found")
+    best = row(2.0, panels=6, settle_out=True, weak_prints_when_hung_up=False)
+    worse = row(3.0, panels=6, settle_out=True, **{STATED[1]: False})
+    panels = row(4.0, panels=11, **dict.fromkeys(STATED, False))
+    table = search_json(
+        hammer, [row(1.0), worse, best, panels], seed=5, candidates={"all": 40}, core_hours=1.23456
+    )
+    (tmp_path / "search.json").write_text(json.dumps(table, allow_nan=False))
+    found = results_in(tmp_path).search
+    assert found is not None
+    assert found.shipped == hammer.fingerprint
+    assert found.candidates.all == 40
+    assert found.candidates.stated == 0
+    assert found.core_hours == 1.23
+    assert found.tolerance == TOLERANCE
+    assert found.waveform == "rectangle"
+    assert found.gauge == gauge()
+    assert set(found.failing) == set(FAILING)
+    settled = found.failing["settle_out"]
+    assert settled.why == "So it is."
+    assert set(settled.value) == set(claims()["settle_out"].band)
+    assert settled.best is not None
+    assert settled.best.constants == {"mass": 2.0}
+    assert settled.best.value == {"rebounds": 7}
+    assert settled.best.holds
+    # Of what holds for the hammer that ships.
+    assert settled.best.costs == ["weak_prints_when_hung_up"]
+    # None holds for it.
+    assert found.failing["release_margin"].best is None
+    chaos = found.failing[FIGURE_11].best
+    assert chaos is not None
+    assert chaos.constants == {"mass": 4.0}
+    assert not chaos.holds
+    assert chaos.value == {"panels_as_printed": 11, "verdicts": ["strange", "strange"]}
+    assert set(chaos.costs) == set(STATED)
+
+
+def test_the_gauge_is_told_in_the_units_of_the_paper() -> None:
+    assert "5 lb" in gauge()
+    assert "1 A" in gauge()
