@@ -27,9 +27,9 @@ MOST: Final = 3000
 """Points of the region that are remembered."""
 
 _FEW: Final = 24
-_NEARLY: Final = 0.05
+_NEARLY: Final = 0.3
 _NOISE: Final = 0.003
-_TRIES: Final = 3
+_TRIES: Final = 4
 
 
 class Explorer:
