@@ -52,6 +52,7 @@ def search(
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.cli.workers import worker_pool
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
     from printhammer.reconstruction.search import Plan, starts_of
@@ -82,7 +83,7 @@ def search(
             progress.update(task, description=f"{count} candidates, least loss {least:.3f}{told}")
 
         count, best = 0, None
-        with _pool(workers) as pool:
+        with worker_pool(workers) as pool:
             for row in candidates(plan, log, pool=pool, tell=tell):
                 count += 1
                 if best is None or row["total"] < best["total"]:
@@ -93,17 +94,6 @@ def search(
         left = ", ".join(f"{name} {loss:.3f}" for name, loss in best["losses"].items() if loss)
         screen.print(f"{count} candidates; least loss {best['total']:.4f}: {left or 'none left'}")
     screen.print(f"[dim]wrote[/dim] {log}", soft_wrap=True)
-
-
-def _pool(workers: int) -> Any:
-    """Return processes, or for one worker nothing: this process does it."""
-    from concurrent.futures import ProcessPoolExecutor
-    from contextlib import nullcontext
-    from multiprocessing import get_context
-
-    if workers == 1:
-        return nullcontext(None)
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
 
 
 @app.command("judge", epilog="Example: printhammer reconstruct judge all.jsonl judged.jsonl --best 20")
@@ -119,6 +109,7 @@ def judge(
     """Judge the best candidates of a search by the claims themselves, at the default tolerance."""
     from printhammer.claims import claims
     from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.cli.workers import worker_pool
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
     from printhammer.reconstruction.judged import STATED
@@ -132,7 +123,7 @@ def judge(
     announce_compiling()
     screen = console()
     names = list(claims()) if every_claim else list(STATED)
-    with _progress() as progress, _pool(workers) as pool:
+    with _progress() as progress, worker_pool(workers) as pool:
         task = progress.add_task("judging", total=len(chosen))
 
         def tell(done: int, of: int, _row: dict[str, Any]) -> None:
@@ -173,12 +164,13 @@ def base_rates(
 ) -> None:
     """Count for how many random plausible hammers each claim holds."""
     from printhammer.cli.terminal import announce_compiling, console
+    from printhammer.cli.workers import worker_pool
     from printhammer.outputs import check_outputs
     from printhammer.reconstruction.base_rates import base_rates as count
 
     check_outputs([out])
     announce_compiling()
-    with _progress() as progress, _pool(workers) as pool:
+    with _progress() as progress, worker_pool(workers) as pool:
         task = progress.add_task("random hammers", total=hammers)
         table = count(
             hammers, seed, slow=slow, pool=pool, tell=lambda done, _of: progress.update(task, completed=done)
