@@ -55,6 +55,7 @@ def search(
     from printhammer.cli.workers import worker_pool
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
+    from printhammer.reconstruction.evaluation import WEIGHTS
     from printhammer.reconstruction.search import Plan, starts_of
     from printhammer.reconstruction.search import search as candidates
     from printhammer.reconstruction.shortlist import aim_of
@@ -72,26 +73,27 @@ def search(
     announce_compiling()
     start = monotonic()
     screen = console()
+    count: int = 0
+    best: dict[str, Any] | None = None
     with Progress(
         SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=screen, transient=True
     ) as progress:
         task = progress.add_task("compiling and sampling", total=None)
 
-        def tell(count: int, least: float, row: dict[str, Any]) -> None:
+        def tell(noted: int, least: float, row: dict[str, Any]) -> None:
+            nonlocal count, best
+            count, best = noted, row
             panels = row["measured"].get("panels")
             told = "" if panels is None else f", {panels} panels of Fig. 11 as printed"
-            progress.update(task, description=f"{count} candidates, least loss {least:.3f}{told}")
+            progress.update(task, description=f"{noted} candidates, least loss {least:.3f}{told}")
 
-        count, best = 0, None
         with worker_pool(workers) as pool:
-            for row in candidates(plan, log, pool=pool, tell=tell):
-                count += 1
-                if best is None or row["total"] < best["total"]:
-                    best = row
+            for _row in candidates(plan, log, pool=pool, tell=tell):
                 if minutes and monotonic() - start > 60.0 * minutes:
                     break
     if best is not None:
-        left = ", ".join(f"{name} {loss:.3f}" for name, loss in best["losses"].items() if loss)
+        known = best["losses"]
+        left = ", ".join(f"{name} {known[name]:.3f}" for name in WEIGHTS[plan.aim] if known.get(name))
         screen.print(f"{count} candidates; least loss {best['total']:.4f}: {left or 'none left'}")
     screen.print(f"[dim]wrote[/dim] {log}", soft_wrap=True)
 
