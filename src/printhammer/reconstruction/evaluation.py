@@ -40,7 +40,7 @@ PIECE: Final = 64
 """Points that one process looks at together."""
 
 _WORST_SINGLE: Final = 0.8
-_WORST_PAIRS: Final = 0.6
+_WORST_PAIRS: Final = 1.0
 
 
 def evaluate(points: Sequence[FloatArray], aim: Aim) -> list[tuple[Candidate | None, Score]]:
