@@ -213,7 +213,7 @@ def test_a_broken_line_in_the_middle_is_told(bowl: list[int], tmp_path: Path) ->
 
 def test_points_of_another_search_come_first(bowl: list[int], tmp_path: Path) -> None:
     rows = run(tmp_path / "a.jsonl", LONG)
-    starts = starts_of(tmp_path / "a.jsonl", 3)
+    starts = starts_of(tmp_path / "a.jsonl", "all", 3)
     best = min(rows, key=lambda row: float(row["total"]))
     assert starts[0] == tuple(best["point"])
     plan = Plan("all", seed=5, sample=16, starts=starts)

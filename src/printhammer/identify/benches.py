@@ -287,7 +287,7 @@ def _peaks(hammer: Hammer) -> FloatArray:
         raise InputError(
             f"{hammer.path}: the pack has no thickness, expected the largest indentations to be given"
         )
-    return thickness * np.array(PEAKS)
+    return float(thickness) * np.array(PEAKS)
 
 
 def _law(hammer: Hammer, name: str) -> Callable[..., float]:

@@ -6,7 +6,6 @@ on where it was: what the log holds is not computed again.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,6 +14,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.reconstruction.evaluation import WEIGHTS, scored
 from printhammer.reconstruction.explorer import Explorer
+from printhammer.reconstruction.search_log import Log
 from printhammer.reconstruction.space import VARIABLES
 
 if TYPE_CHECKING:
@@ -88,77 +88,30 @@ class Plan:
         }
 
 
-def starts_of(path: Path, count: int = STARTS) -> tuple[tuple[float, ...], ...]:
+def starts_of(path: Path, aim: Aim, count: int = STARTS) -> tuple[tuple[float, ...], ...]:
     """Return the best points of another search that are not next to each other.
-
-    Raises
-    ------
-    InputError
-        The file is not the log of a search.
-    """
-    from printhammer.reconstruction.shortlist import read_search, shortlist
-
-    _heading, rows = read_search(path)
-    return tuple(tuple(row["point"]) for row in shortlist(rows, count, _APART))
-
-
-class Log:
-    """The log of a search: a heading, then a line for each candidate, in the order they were tried.
 
     Parameters
     ----------
     path : Path
-        JSON lines; made where it is missing.
-    plan : Plan
-        Of the search.
+        Its log.
+    aim : str
+        Aim of the search that is to begin there.
+    count : int, optional
+        How many points at most.
 
     Raises
     ------
     InputError
-        The file holds something else, or the log of another search.
+        The file is not the log of a search, or a search on the stated claims would be led by others through
+        its starts.
     """
+    from printhammer.reconstruction.shortlist import read_search, shortlist
 
-    def __init__(self, path: Path, plan: Plan) -> None:
-        self.path = path
-        self.known: list[dict[str, Any]] = []
-        if path.exists() and path.stat().st_size:
-            self._read(plan)
-        else:
-            self._append([plan.heading()])
-
-    def _read(self, plan: Plan) -> None:
-        text = self.path.read_text(encoding="utf-8")
-        lines = text.split("\n")
-        whole = lines[:-1]
-        if not text.endswith("\n"):
-            # A search that was stopped while it wrote.
-            self.path.write_text("".join(f"{line}\n" for line in whole), encoding="utf-8")
-        try:
-            rows = [json.loads(line) for line in whole]
-        except json.JSONDecodeError as error:
-            raise InputError(f"{self.path}: expected JSON lines of a search ({error})") from None
-        if not rows or rows[0] != plan.heading():
-            raise InputError(f"{self.path}: the log of another search, expected {json.dumps(plan.heading())}")
-        self.known = rows[1:]
-
-    def _append(self, rows: list[dict[str, Any]]) -> None:
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write("".join(json.dumps(row) + "\n" for row in rows))
-
-    def take(
-        self, points: list[FloatArray], aim: Aim, pool: Executor | None, place: int
-    ) -> list[dict[str, Any]]:
-        """Return the rows of points from `place` on, computing and noting those that are not there yet."""
-        there = self.known[place : place + len(points)]
-        for row, point in zip(there, points, strict=False):
-            if not np.array_equal(row["point"], point):
-                raise InputError(f"{self.path}: candidate {place + 1} is not the one of this search")
-        fresh = scored(points[len(there) :], aim, pool) if len(there) < len(points) else []
-        if fresh:
-            self._append(fresh)
-        self.known[place : place + len(points)] = []  # replayed rows are not needed again
-        self.known[place:place] = [*there, *fresh]
-        return [*there, *fresh]
+    heading, rows = read_search(path)
+    if aim == "stated" and heading["aim"] != "stated":
+        raise InputError(f"{path}: aim = {heading['aim']!r}, expected the log of a search on stated claims")
+    return tuple(tuple(row["point"]) for row in shortlist(rows, count, _APART))
 
 
 def search(
@@ -191,12 +144,16 @@ def search(
     InputError
         The log is that of another search, or the package that searches is not installed.
     """
-    log = Log(path, plan)
+    _strategies()
+    log = Log(path, plan.heading())
     place, best = 0, None
 
     def batch(points: list[FloatArray]) -> list[dict[str, Any]]:
         nonlocal place, best
-        found = log.take(points, plan.aim, pool, place)
+        there = log.known(place, points)
+        fresh = scored(points[len(there) :], plan.aim, pool) if len(there) < len(points) else []
+        log.append(fresh)
+        found = [*there, *fresh]
         place += len(found)
         for row in found:
             if best is None or row["total"] < best["total"]:
@@ -238,19 +195,24 @@ def _wide(plan: Plan, rng: np.random.Generator) -> list[FloatArray]:
     return list(sampler.random(plan.sample))
 
 
+def _strategies() -> Any:
+    """Return the evolution strategy of the optional package."""
+    try:
+        from cmaes import CMA
+    except ImportError:
+        raise InputError(
+            "the search needs cmaes, which is not installed: pip install 'printhammer[identify]'"
+        ) from None
+    return CMA
+
+
 class _Island:
     """One evolution strategy, from one of the best points known."""
 
     def __init__(self, start: list[dict[str, Any]], rng: np.random.Generator) -> None:
-        try:
-            from cmaes import CMA
-        except ImportError:
-            raise InputError(
-                "the search needs cmaes, which is not installed: pip install 'printhammer[identify]'"
-            ) from None
         # Good ones are taken more often.
         pick = int(min(_SEEDS, len(start)) * rng.random() ** _FAVOUR)
-        self._strategy = CMA(
+        self._strategy = _strategies()(
             mean=np.clip(np.array(start[pick]["point"]), 0.02, 0.98),
             sigma=SIGMA * 2.0 ** -rng.integers(4),
             bounds=np.array([[0.0, 1.0]] * len(VARIABLES)),

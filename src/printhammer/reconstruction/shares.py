@@ -37,8 +37,8 @@ class Share:
     def interval(self) -> tuple[float, float]:
         """The 95 % interval of the share, after E. B. Wilson, J. Amer. Statist. Assoc. 22 (1927) 209.
 
-        It is the set of probabilities p with |rate - p| <= z sqrt(p (1 - p) / n), and so stays within 0 and 1
-        and has a width even where none or all hold.
+        It is the set of probabilities p with ``|rate - p| <= z sqrt(p (1 - p) / n)``, and so stays within 0
+        and 1 and has a width even where none or all hold.
         """
         n, p = self.measured, self.rate
         middle = p + _Z**2 / (2.0 * n)
