@@ -45,9 +45,9 @@ def test_random_hammers_print_the_stroke_and_are_those_of_the_seed(
 ) -> None:
     monkeypatch.setattr(module, "_BATCH", 8)
     drawn = draw(3, 5)
-    assert drawn == draw(3, 5)
-    assert drawn == draw(2, 5) + drawn[2:]
-    assert drawn != draw(3, 6)
+    # The first of many are those of few.
+    assert draw(2, 5) == drawn[:2]
+    assert draw(1, 6) != drawn[:1]
     for constants in drawn:
         for variable in VARIABLES:
             value = values_of(constants)[variable.name]

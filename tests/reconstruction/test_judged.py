@@ -82,8 +82,9 @@ def test_figure_11_is_judged_with_all_its_changes_only_where_it_may_hold(
     assert asked == ([] if wrong else [FIGURE_11])
 
 
+@pytest.mark.slow
 def test_panels_are_those_of_the_strobe(monkeypatch: pytest.MonkeyPatch) -> None:
-    (period,) = (1.30e-3,)
+    period = 1.30e-3
     monkeypatch.setattr(module, "printed_verdicts", lambda: {period: "period-1"})
     hammer = hammer_of(shipped_constants())
     ((name, (found, printed)),) = plain_panels(hammer).items()

@@ -42,7 +42,7 @@ def test_what_led_is_no_prediction_and_what_is_typical_is_none_either() -> None:
 
 
 @settings(max_examples=30)
-@given(st.lists(st.dictionaries(st.sampled_from([*STATED, *SHAPES]), st.booleans()), max_size=20))
+@given(st.lists(st.dictionaries(st.sampled_from([*STATED, *SHAPES]), st.booleans(), max_size=8), max_size=8))
 def test_counts_are_consistent(verdicts: list[dict[str, bool]]) -> None:
     rows = [row(**some) for some in verdicts]
     found = predictions(rows, seed=0, candidates=1)
