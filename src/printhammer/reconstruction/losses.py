@@ -225,7 +225,7 @@ def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArr
     wanted = band["flight_time_gain_s"]["at_least"]
     # Falling at 700 us is another branch of solutions, not a small miss.
     score.losses["two_pulses_700us"] = (
-        0.5 * hinge(max(low - ratio, ratio - high), 1.0)
+        0.5 * hinge(max(low - ratio, ratio - high), 0.3)
         + (0.3 + 0.4 * hinge(-speed, 1.0) if speed <= 0.0 else 0.0)
         + 0.1 * hinge(wanted - gain, 100e-6)
     )
