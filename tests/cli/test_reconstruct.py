@@ -120,7 +120,7 @@ def test_a_search_begins_from_another(cli: Callable, here: Path, cheap: None) ->
     # What leads to a prediction must not have been led by what is predicted.
     done = cli("reconstruct", "search", "more.jsonl", "--aim", "stated", "--from", "all.jsonl", *BRIEF)
     assert done.status == 2
-    assert "all.jsonl: its search was led by all claims, expected stated ones alone" in done.err
+    assert "all.jsonl: aim = 'all', expected the log of a search on stated claims" in done.err
     assert not (here / "more.jsonl").exists()
 
 

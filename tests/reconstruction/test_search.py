@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -96,6 +97,56 @@ def test_the_sample_is_spread_evenly(bowl: list[int], tmp_path: Path) -> None:
     assert bowl
 
 
+@pytest.mark.parametrize("length", [0, 1, 40, -1])
+def test_a_search_that_was_stopped_in_its_heading_begins_anew(
+    bowl: list[int], tmp_path: Path, length: int
+) -> None:
+    path = tmp_path / "a.jsonl"
+    run(path, SAMPLED)
+    whole = path.read_bytes()
+    path.write_bytes(whole.partition(b"\n")[0][:length])
+    run(path, SAMPLED)
+    assert path.read_bytes() == whole
+    assert bowl
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"notes", "expected JSON lines of a search"),
+        (b"some\nnotes", "expected JSON lines of a search"),
+        (b"[1]\n{}", "expected JSON lines of a search, each an object"),
+        (b"{}\nnotes", "the log of another search: format = null, expected 1"),
+        (b"\xff\xfe", "the log cannot be read"),
+    ],
+)
+def test_what_is_no_log_stays_as_it_is(bowl: list[int], tmp_path: Path, content: bytes, said: str) -> None:
+    path = tmp_path / "notes.txt"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=rf"notes\.txt: {said}"):
+        run(path, SAMPLED)
+    assert path.read_bytes() == content
+    assert bowl == []
+
+
+def test_a_log_that_cannot_be_written_is_told(bowl: list[int], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the log cannot be written"):
+        run(tmp_path / "none" / "a.jsonl", SAMPLED)
+    with pytest.raises(InputError, match="the log cannot be read"):
+        run(tmp_path, SAMPLED)
+    assert bowl == []
+
+
+def test_a_missing_package_is_told_before_anything_is_done(
+    bowl: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "cmaes", None)
+    with pytest.raises(InputError, match=r"the search needs cmaes, .* 'printhammer\[identify\]'"):
+        run(tmp_path / "a.jsonl", SAMPLED)
+    assert bowl == []
+    assert not (tmp_path / "a.jsonl").exists()
+
+
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.37, 0.5, 0.72, 0.9999])
 def test_a_search_goes_on_where_it_was_stopped(bowl: list[int], tmp_path: Path, share: float) -> None:
     path = tmp_path / "a.jsonl"
@@ -161,22 +212,33 @@ def test_progress_tells_the_best_so_far(bowl: list[int], tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    "plan",
+    ("plan", "said"),
     [
-        Plan("all", seed=4, sample=16),
-        Plan("stated", seed=3, sample=16),
-        Plan("all", seed=3, sample=32),
-        Plan("all", seed=3, sample=16, starts=((0.5,) * len(VARIABLES),)),
+        (Plan("all", seed=4, sample=16), "seed = 3, expected 4"),
+        (Plan("stated", seed=3, sample=16), 'aim = "all", expected "stated"'),
+        (Plan("all", seed=3, sample=32), "sample = 16, expected 32"),
+        (Plan("all", seed=3, sample=16, starts=((0.5,) * len(VARIABLES),)), r"starts = \[\], expected"),
     ],
 )
-def test_the_log_of_another_search_is_refused(bowl: list[int], tmp_path: Path, plan: Plan) -> None:
+def test_the_log_of_another_search_is_refused(bowl: list[int], tmp_path: Path, plan: Plan, said: str) -> None:
     path = tmp_path / "a.jsonl"
     run(path, SAMPLED)
     before = path.read_bytes()
-    with pytest.raises(InputError, match=r"a\.jsonl: the log of another search") as error:
+    with pytest.raises(InputError, match=rf"a\.jsonl: the log of another search: {said}") as error:
         run(path, SAMPLED, plan)
     assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 400
     assert path.read_bytes() == before
+    assert bowl
+
+
+def test_a_search_on_stated_claims_begins_from_none_that_others_led(bowl: list[int], tmp_path: Path) -> None:
+    run(tmp_path / "a.jsonl", SAMPLED)
+    run(tmp_path / "b.jsonl", SAMPLED, Plan("stated", seed=3, sample=16))
+    assert len(starts_of(tmp_path / "b.jsonl", "stated", 2)) == 2
+    assert len(starts_of(tmp_path / "b.jsonl", "all", 2)) == 2
+    with pytest.raises(InputError, match="aim = 'all', expected the log of a search on stated claims"):
+        starts_of(tmp_path / "a.jsonl", "stated")
     assert bowl
 
 
@@ -197,7 +259,7 @@ def test_a_candidate_that_is_not_of_this_search_is_told(bowl: list[int], tmp_pat
     lines = path.read_text().splitlines(keepends=True)
     lines[5], lines[6] = lines[6], lines[5]
     path.write_text("".join(lines))
-    with pytest.raises(InputError, match=r"candidate \d+ is not the one of this search"):
+    with pytest.raises(InputError, match="candidate 5 is not the one of this search"):
         run(path, SHORT)
     assert bowl
 

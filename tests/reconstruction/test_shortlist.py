@@ -14,7 +14,6 @@ from printhammer.errors import InputError
 from printhammer.reconstruction import shortlist as module
 from printhammer.reconstruction.judged import FIGURE_11, STATED
 from printhammer.reconstruction.shortlist import (
-    aim_of,
     judge_candidates,
     read_search,
     rounded,
@@ -80,7 +79,6 @@ def test_the_log_of_a_search_is_read_but_for_a_line_that_breaks_off(tmp_path: Pa
     rows = [candidate(0.1, total=1.0), candidate(0.2, total=2.0)]
     path = log(tmp_path, HEADING, *rows, tail='{"point": [0.')
     assert read_search(path) == (HEADING, rows)
-    assert aim_of(path) == "stated"
 
 
 @pytest.mark.parametrize(

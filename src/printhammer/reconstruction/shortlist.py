@@ -59,17 +59,6 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     return rows[0], rows[1:]
 
 
-def aim_of(path: Path) -> str:
-    """Return which claims led the search of a log.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or is no such log.
-    """
-    return str(read_search(path)[0]["aim"])
-
-
 def shortlist(rows: Sequence[dict[str, Any]], count: int, apart: float = APART) -> list[dict[str, Any]]:
     """Return the best candidates of a log that are not next to each other.
 
