@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from printhammer.reconstruction.candidates import Candidate
     from printhammer.segments import FloatArray
 
-FIRINGS: Final = 200
-"""Firings of each panel in the search; the claim itself is about many more."""
+FIRINGS: Final = 120
+"""Firings of each panel in the search; the claims themselves are about more."""
 
 _AGREE: Final = 1e-8
 """Distance, in half-widths of the window, from which on a train counts as settled."""
