@@ -114,10 +114,10 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, tuple[str, ...]
     """Verdicts at no cost: all hold; the list tells what was judged."""
     done: list[tuple[float, tuple[str, ...]]] = []
 
-    def row_of(constants: dict[str, float], names: tuple[str, ...]) -> dict[str, Any]:
-        done.append((constants["mass"], names))
-        held = dict.fromkeys([*(name for name in names if name != FIGURE_11), FIGURE_11], True)
-        return {"constants": constants, "verdicts": held, "values": {}, "panels": 12, "panel_verdicts": {}}
+    def row_of(constants: dict[str, float], names: tuple[str, ...], *, panels: bool) -> dict[str, Any]:
+        done.append((constants["mass"], (*names, FIGURE_11) if panels else names))
+        held = dict.fromkeys(done[-1][1], True)
+        return {"constants": constants, "verdicts": held, "values": {}, "panels": 12 if panels else None}
 
     monkeypatch.setattr(module, "row_of", row_of)
     return done
@@ -148,8 +148,9 @@ def test_more_claims_are_judged_where_they_were_not(
 ) -> None:
     path = tmp_path / "judged.jsonl"
     judge_candidates(masses(1.0), path)
-    (more,) = judge_candidates(masses(1.0), path, names=["settle_out", FIGURE_11])
-    assert judged == [(1.0, STATED), (1.0, ("settle_out", FIGURE_11))]
+    (more,) = judge_candidates(masses(1.0), path, names=[STATED[0], "settle_out", FIGURE_11])
+    assert judged == [(1.0, (*STATED, FIGURE_11)), (1.0, ("settle_out",))]
+    assert more["panels"] == 12
     # What was known stays known.
     assert set(more["verdicts"]) == {*STATED, "settle_out", FIGURE_11}
     judge_candidates(masses(1.0), path, names=list(STATED))
@@ -162,10 +163,10 @@ def test_judging_goes_on_after_an_interruption(
     path = tmp_path / "judged.jsonl"
     plain = module.row_of
 
-    def stopped(constants: dict[str, float], names: tuple[str, ...]) -> dict[str, Any]:
+    def stopped(constants: dict[str, float], names: tuple[str, ...], *, panels: bool) -> dict[str, Any]:
         if constants["mass"] == 3.0:
             raise KeyboardInterrupt
-        return plain(constants, names)
+        return plain(constants, names, panels=panels)
 
     monkeypatch.setattr(module, "row_of", stopped)
     with pytest.raises(KeyboardInterrupt):

@@ -88,9 +88,9 @@ def rounded(constants: Mapping[str, float]) -> dict[str, float]:
     return {key: float(f"{value:.{DIGITS}g}") for key, value in constants.items()}
 
 
-def _judge(task: tuple[dict[str, float], tuple[str, ...]]) -> dict[str, Any]:
-    constants, names = task
-    return row_of(constants, names)
+def _judge(task: tuple[dict[str, float], tuple[str, ...], bool]) -> dict[str, Any]:
+    constants, names, panels = task
+    return row_of(constants, names, panels=panels)
 
 
 def judge_candidates(
@@ -101,7 +101,7 @@ def judge_candidates(
     pool: Executor | None = None,
     tell: Callable[[int, int, dict[str, Any]], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Judge candidates and add them to a log; those that are in it already are not judged again.
+    """Judge candidates and add them to a log; what is in it already is not judged again.
 
     Parameters
     ----------
@@ -124,9 +124,12 @@ def judge_candidates(
     wanted = [dict(constants) for constants in every]
     known = {key_of(row["constants"]): row for row in read_judged(path)}
     mend(path)
-    there = {key for key, row in known.items() if set(names) - {FIGURE_11} <= set(row["verdicts"])}
-    fresh = {key: one for one in wanted if (key := key_of(one)) not in there}
-    tasks = [(constants, tuple(names)) for constants in fresh.values()]
+    tasks = []
+    for key, constants in {key_of(one): one for one in wanted}.items():
+        there = known[key]["verdicts"] if key in known else {}
+        missing = tuple(name for name in names if name not in there and name != FIGURE_11)
+        if missing or FIGURE_11 not in there:
+            tasks.append((constants, missing, FIGURE_11 not in there))
     for start in range(0, len(tasks), _TOGETHER):
         some = tasks[start : start + _TOGETHER]
         found = map(_judge, some) if pool is None else pool.map(_judge, some)
