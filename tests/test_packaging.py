@@ -152,7 +152,7 @@ def test_the_commands_of_the_readme_work_elsewhere(elsewhere: Path, tmp_path: Pa
     (commands,) = (block for block in blocks if "printhammer map" in block)
     output_of("sh", "-ec", f"PATH={shlex.quote(str(elsewhere))}:$PATH\n{commands}", cwd=tmp_path)
     made = {path.name for path in (tmp_path / "build").iterdir()}
-    assert made == {"map.png", "strobe.png", "sweep.toml", "sweep.zarr", "bench.json"}
+    assert made == {"map.png", "strobe.png", "sweep.toml", "sweep.zarr", "lab", "bench.json"}
 
 
 def test_the_readme_names_files_and_targets_that_exist() -> None:
