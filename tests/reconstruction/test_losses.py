@@ -44,6 +44,9 @@ def looked_at(chosen: tuple[Candidate, ...]) -> list[Score]:
 
 def close_call(name: str, value: dict[str, float]) -> bool:
     """Whether a measured value is about at the end of its band."""
+    # Without any peak after the second firing the claim fails; the search looks no closer.
+    if name == "two_pulses_660us" and value.get("peak_minus_pack_front_m") is None:
+        return True
     key, margin = NEAR.get(name, ("", 0.0))
     band = claims()[name].band.get(key)
     ends = band if isinstance(band, list) else (band or {}).values()
@@ -97,7 +100,7 @@ def test_no_loss_where_the_claim_holds_and_some_where_it_fails() -> None:
 
 @pytest.mark.slow
 def test_losses_and_verdicts_of_many_candidates() -> None:
-    chosen = some_candidates(96, 32, 5, 0.02)
+    chosen = some_candidates(200, 48, 5)
     scores = looked_at(chosen)
     assert check(chosen, QUICK, scores) > 0.8 * len(QUICK) * len(chosen)
     for name in QUICK:
