@@ -16,7 +16,7 @@ import pytest
 from tests.candidates import shipped_constants
 
 import printhammer as ph
-from printhammer.claims import claims
+from printhammer.claims import claims, judge_all
 from printhammer.cli.main import app
 from printhammer.cli.reconstruct import EXAMPLE
 from printhammer.cli.reconstruct import app as verbs
@@ -264,6 +264,8 @@ def test_ctrl_c_leaves_a_log_that_is_gone_on_with(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_from_the_search_to_the_hammer(cli: Callable, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "_TOGETHER", 8)
+    # Some claims take minutes for a hammer that is far from the one of the paper.
+    monkeypatch.setattr(shipping, "judge_all", lambda hammer: judge_all(hammer, STATED))
     words = ("reconstruct", "search", "stated.jsonl", "--aim", "stated", *BRIEF)
     assert cli(*words).status == 0
     judge = ("judge", "stated.jsonl", "judged.jsonl", "--best", "1", "--workers", "1")
@@ -275,9 +277,8 @@ def test_from_the_search_to_the_hammer(cli: Callable, here: Path, monkeypatch: p
     hammer = ph.load(here / "build" / "hammer" / "first.toml")
     assert found.shipped == hammer.fingerprint
     (row,) = [json.loads(line) for line in (here / "judged.jsonl").read_text().splitlines()]
-    failed = {name for name, holds in row["verdicts"].items() if not holds}
     # Judged once more as it ships, with the same verdicts.
-    assert failed == set(found.failing) & set(row["verdicts"])
+    assert set(found.failing) == {name for name in STATED if not row["verdicts"][name]}
     assert Predictions.model_validate_json((here / "p.json").read_text()).hammers == int(
         all(row["verdicts"][name] for name in STATED)
     )
