@@ -24,11 +24,13 @@ STATED: Final = {
     "two_pulses_660us": 2.0,
     "two_pulses_700us": 2.0,
     "second_dot_lost": 2.0,
+    "integrator_comparison": 2.0,
     "poincare": 4.0,
 }
 SHAPE: Final = {
     "release_margin": 1.0,
     "settle_out": 1.0,
+    "low_restitution": 0.5,
     "poincare_window": 1.0,
     "hang_up_at_high_rate": 0.5,
     "weak_prints_when_hung_up": 1.0,
@@ -74,7 +76,14 @@ def evaluate(points: Sequence[FloatArray], aim: Aim) -> list[tuple[Candidate | N
         statics(candidate, scores[i])
     look(single_pulse)
     chosen = keep(
-        _WORST_SINGLE, ["return_from_everywhere", "single_pulse_stroke", "release_margin", "settle_out"]
+        _WORST_SINGLE,
+        [
+            "return_from_everywhere",
+            "single_pulse_stroke",
+            "integrator_comparison",
+            "release_margin",
+            "settle_out",
+        ],
     )
     look(pairs)
     chosen = keep(_WORST_PAIRS, ["two_pulses_660us", "two_pulses_700us", "second_dot_lost"])

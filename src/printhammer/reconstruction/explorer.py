@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 CHEAP: Final = (
     "return_from_everywhere",
     "single_pulse_stroke",
+    "integrator_comparison",
     "release_margin",
     "settle_out",
     "two_pulses_660us",
