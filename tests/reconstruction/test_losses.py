@@ -14,7 +14,7 @@ from printhammer.reconstruction import losses
 from printhammer.reconstruction.candidates import Candidate
 from printhammer.reconstruction.evaluation import WEIGHTS, evaluate, rows
 from printhammer.reconstruction.losses import Score, hinge
-from printhammer.reconstruction.panel_losses import panels
+from printhammer.reconstruction.panel_losses import FIRINGS, panels
 
 QUICK = (
     "single_pulse_stroke",
@@ -199,7 +199,8 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
         )
         assert share is not None
         off.append(abs(score.measured["least_share"] - share))
-    # Where a strange train goes depends on the tolerance, and with it the share of a panel.
-    assert np.median(off) < 0.02
+    # Where a strange train goes depends on the tolerance, and the search looks at fewer firings than the
+    # claim: within two standard errors of a share among so many.
+    assert np.median(off) < 2.0 * math.sqrt(0.25 / FIRINGS)
     # A short train tells period from chaos in most panels; the claim alone decides.
     assert right > 0.75 * 12 * len(chosen)
