@@ -205,7 +205,7 @@ def backstop(
 
 
 @app.command(
-    "motion", epilog="Example: printhammer fit motion shot.csv --hammer hendriks-1983 --out motion.toml"
+    "motion", epilog="Example: printhammer fit motion motion.csv --hammer hendriks-1983 --out motion.toml"
 )
 def motion(
     files: Annotated[
