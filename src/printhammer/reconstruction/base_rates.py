@@ -1,4 +1,6 @@
-"""How often each claim holds by chance: among random hammers of the search space.
+"""How often each claim holds by chance: among random hammers of the search space that work at all.
+
+They rest at the backstop, print with one pulse, and come back to rest.
 
 A hammer drawn at random has another stroke than the printed one, so the claim about the stroke is judged for
 a random mass first; then the mass is set so that the stroke is as printed, and the others are judged.
@@ -11,19 +13,25 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.claims import claims
-from printhammer.reconstruction.candidates import candidates
+from printhammer.claims.context import CYCLE
+from printhammer.drive import PulseTrain
+from printhammer.ensemble import Ensemble
+from printhammer.reconstruction.candidates import TOLERANCE, candidates
 from printhammer.reconstruction.judged import FIGURE_11, SLOW, row_of
 from printhammer.reconstruction.space import VARIABLES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from concurrent.futures import Executor
+
+    from printhammer.reconstruction.candidates import Candidate
 
 STROKE: Final = "single_pulse_stroke"
 MASSES: Final = (0.05e-3, 2e-3)
 """Range of the random masses, kg."""
 
 _BATCH: Final = 64
+_NEAR: Final = 1e-6
 
 
 def draw(count: int, seed: int) -> list[dict[str, float]]:
@@ -40,8 +48,23 @@ def draw(count: int, seed: int) -> list[dict[str, float]]:
     found: list[dict[str, float]] = []
     while len(found) < count:
         points = [rng.random(len(VARIABLES)) for _ in range(_BATCH)]
-        found += [candidate.constants for candidate in candidates(points) if candidate is not None]
+        printing = [candidate for candidate in candidates(points) if candidate is not None]
+        back = _back(printing)
+        found += [one.constants for one, returns in zip(printing, back, strict=True) if returns]
     return found[:count]
+
+
+def _back(printing: Sequence[Candidate]) -> list[bool]:
+    """Tell which hammers are back at the backstop, all but at rest, some time after a single pulse."""
+    drives = [PulseTrain(candidate.waveform) for candidate in printing]
+    moments = [np.array([CYCLE])] * len(printing)
+    states = [candidate.state for candidate in printing]
+    hammers = [candidate.hammer for candidate in printing]
+    ensemble = Ensemble(hammers, drives, CYCLE, states=states, tolerance=TOLERANCE)
+    table = ensemble.run(threads=1, strobes=moments).strobes
+    assert table is not None
+    rests = np.array([candidate.rest for candidate in printing])
+    return [bool(near) for near in np.abs(table.x[:, 0] - rests) < _NEAR]
 
 
 def _judged(task: tuple[dict[str, float], float, bool]) -> dict[str, Any]:
