@@ -31,6 +31,7 @@ SHAPE: Final = {
     "release_margin": 1.0,
     "settle_out": 1.0,
     "low_restitution": 0.5,
+    "backstop_force_dominates": 1.0,
     "poincare_window": 1.0,
     "hang_up_at_high_rate": 0.5,
     "weak_prints_when_hung_up": 1.0,

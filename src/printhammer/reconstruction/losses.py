@@ -143,7 +143,8 @@ def _settling(x: npt.NDArray[np.float32], score: Score) -> None:
     below = np.flatnonzero(~above[peak:])
     band = claims()["settle_out"].band
     if not below.size:
-        score.losses["settle_out"] = score.losses["low_restitution"] = 1.0
+        for name in ("settle_out", "low_restitution", "backstop_force_dominates"):
+            score.losses[name] = 1.0
         return
     touch = peak + int(below[0])
     later = x[touch:]
@@ -155,6 +156,7 @@ def _settling(x: npt.NDArray[np.float32], score: Score) -> None:
     falls = all(after < before for before, after in itertools.pairwise(heights))
     wanted = band["rebounds"]["at_least"]
     score.measured |= {"first_touch": touch * _GRID, "highest": highest, "rebounds": count}
+    _loudness(x, touch, score)
     ratios = [math.sqrt(after / before) for before, after in itertools.pairwise(heights) if before > 0.0]
     rise = rank_correlation(range(len(ratios)), ratios)
     score.losses["low_restitution"] = 1.0 if rise is None else hinge(_RISE - rise, 1.0)
@@ -164,6 +166,17 @@ def _settling(x: npt.NDArray[np.float32], score: Score) -> None:
         + 0.5 * hinge(wanted - count, wanted)
         + (0.0 if falls else 0.1),
     )
+
+
+def _loudness(x: npt.NDArray[np.float32], touch: int, score: Score) -> None:
+    """Compare the largest acceleration in the backstop with the largest one elsewhere."""
+    size = np.abs(np.diff(x.astype(np.float64), 2))
+    inside = x[1:-1] < np.float32(geometry()["b"])
+    at_stop = inside & (np.arange(1, len(x) - 1) >= touch)
+    ratio = float(size[at_stop].max(initial=0.0) / size[~at_stop].max())
+    wanted = claims()["backstop_force_dominates"].band["force_ratio"]["at_least"]
+    score.losses["backstop_force_dominates"] = hinge(wanted - ratio, wanted)
+    score.measured["force_ratio"] = ratio
 
 
 def _pair_gaps() -> tuple[FloatArray, int, int]:
