@@ -13,7 +13,7 @@ from printhammer.ensemble import Ensemble
 from printhammer.equilibrium import rest_state
 from printhammer.errors import InputError
 from printhammer.reconstruction.space import (
-    PRINT_FORCE,
+    LOADING_EXPONENT,
     constants_at,
     geometry,
     hammer_of,
@@ -35,6 +35,9 @@ SINGLE: Final = 2e-3
 """Time within which a single pulse has printed, s."""
 
 _MASS: Final = 4e-4
+_STIFFNESS: Final = 220.0
+"""First guess of the stiffness of the pack for that mass, N."""
+
 _ROUNDS: Final = 6
 _CLOSE: Final = 0.1e-6
 _LONGEST: Final = math.log(30.0)
@@ -105,7 +108,7 @@ def candidates(points: Sequence[FloatArray]) -> list[Candidate | None]:
 def _stiffnesses(values: Sequence[dict[str, float]], rests: dict[int, float]) -> dict[int, float]:
     """Return the stiffnesses of the pack at which hammers of a fixed mass have the printed stroke."""
     wanted = math.log(geometry()["top"] - geometry()["xp"])
-    guess = dict.fromkeys(rests, math.log(PRINT_FORCE * 10.0))
+    guess = dict.fromkeys(rests, math.log(_STIFFNESS))
     before: dict[int, tuple[float, float]] = {}
     close = math.log1p(_CLOSE / (geometry()["top"] - geometry()["xp"]))
     found: dict[int, float] = {}
@@ -130,7 +133,8 @@ def _stiffnesses(values: Sequence[dict[str, float]], rests: dict[int, float]) ->
             if abs(miss) < close:
                 found[i] = math.exp(guess.pop(i))
                 continue
-            slope = -1.0 / 3.7
+            # Energy alone: the indentation goes with the stiffness to the power -1 / (n + 1).
+            slope = -1.0 / (LOADING_EXPONENT + 1.0)
             if i in before:
                 secant = (miss - before[i][1]) / (guess[i] - before[i][0])
                 slope = min(max(secant, -1.0), -0.05) if math.isfinite(secant) else slope

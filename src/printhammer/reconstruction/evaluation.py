@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from printhammer.reconstruction.candidates import candidates
@@ -44,6 +47,15 @@ PIECE: Final = 64
 
 _WORST_SINGLE: Final = 0.8
 _WORST_PAIRS: Final = 1.0
+
+
+@cache
+def losses_digest() -> str:
+    """Return a digest of the sources that decide on the losses, so that logs of different ones do not mix."""
+    digest = hashlib.sha256()
+    for name in ("space", "candidates", "losses", "panel_losses", "evaluation"):
+        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def evaluate(points: Sequence[FloatArray], aim: Aim) -> list[tuple[Candidate | None, Score]]:

@@ -21,7 +21,7 @@ from printhammer.drive import PulseTrain
 from printhammer.ensemble import Ensemble, EnsembleResult
 from printhammer.equilibrium import holding_margin
 from printhammer.reconstruction.candidates import TOLERANCE
-from printhammer.reconstruction.space import geometry
+from printhammer.reconstruction.space import LOADING_EXPONENT, geometry
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,6 +60,9 @@ _TAIL: Final = 1e-3
 
 CHUNK: Final = 64
 _BURST_RATES: Final = 32
+_SLOW_BURST: Final = 2000.0
+"""Rate of the slowest burst looked at, Hz; what is hung up is looked for from the fastest down."""
+
 _PULSES: Final = 9
 
 
@@ -222,26 +225,27 @@ def half_times(some: Sequence[Candidate]) -> list[float]:
 
 
 def _peak_after(x: npt.NDArray[np.float32], times: FloatArray, gap: float) -> float:
-    """Return the largest local maximum after the second firing, m; b where there is none."""
+    """Return the largest local maximum after the second firing, m; NaN where there is none."""
     later = x[np.searchsorted(times, gap) :]
     later = later[np.isfinite(later)]
-    if later.size < 3:
-        return geometry()["b"]
     tops = later[1:-1][(later[1:-1] >= later[:-2]) & (later[1:-1] > later[2:])]
-    return float(tops.max()) if tops.size else geometry()["b"]
+    return float(tops.max()) if tops.size else math.nan
 
 
 def _judge_quench(score: Score, gaps: FloatArray, peaks: FloatArray, place: int) -> None:
     """Take as loss how far in time the nearest quenched second pulse is from the printed one."""
     front, way = geometry()["xp"], geometry()["xp"] - geometry()["b"]
     miss = (peaks - front) / way
-    score.measured["quench"] = float(miss[place])
+    score.measured["quench"] = None if math.isnan(miss[place]) else float(miss[place])
+    if math.isnan(miss[place]):
+        score.losses["two_pulses_660us"] = 1.0
+        return
     if miss[place] < -_CLEARLY:
         score.losses["two_pulses_660us"] = 0.0
         return
     lost = np.flatnonzero(miss < -_CLEARLY)
     nearest = float(np.abs(gaps[lost] - gaps[place]).min()) if lost.size else 2.0 * _REACH
-    depth = hinge(float(miss.min()) + _CLEARLY, 1.0)
+    depth = hinge(float(np.nanmin(miss)) + _CLEARLY, 1.0)
     score.losses["two_pulses_660us"] = 0.2 + 0.4 * hinge(nearest, _REACH) + 0.2 * depth
     score.losses["two_pulses_660us"] += 0.2 * hinge(float(miss[place]) + _CLEARLY, 0.5)
 
@@ -249,7 +253,8 @@ def _judge_quench(score: Score, gaps: FloatArray, peaks: FloatArray, place: int)
 def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArray, speed: float) -> None:
     """Look at the pulse that is caught on the rise, and at all later ones."""
     front, way = geometry()["xp"], geometry()["xp"] - geometry()["b"]
-    miss = (peaks - front) / way
+    # A second pulse that never turns back is as good as one that stays in the backstop.
+    miss = np.where(np.isnan(peaks), -1.0, (peaks - front) / way)
     band = claims()["two_pulses_700us"].band
     low, high = band["second_over_first_peak_force"]
     ratio = 0.0 if math.isnan(force) else float(force / score.measured["force"])
@@ -286,7 +291,7 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
             fast = settings["last_rate_Hz"]
             while fast > must and _highest(PulseTrain(waveform, rate=fast, pulses=_PULSES)) > limit:
                 fast -= 100.0
-            plan.append(np.linspace(2000.0, fast, _BURST_RATES))
+            plan.append(np.linspace(min(_SLOW_BURST, fast), fast, _BURST_RATES))
         drives = [
             PulseTrain(candidate.waveform, rate=float(rate), pulses=_PULSES)
             for candidate, rates in zip(some, plan, strict=True)
@@ -294,9 +299,8 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
         ]
         ends = [float(drive.times[-1]) + 1e-3 for drive in drives]
         times = np.arange(0.0, max(ends), _COARSE)
-        result = run_all(some, drives, ends, _BURST_RATES, times=times, dots=True)
+        result = run_all(some, drives, ends, _BURST_RATES, times=times)
         assert result.x is not None
-        assert result.dots is not None
         for k, score in enumerate(own):
             free, strong = [], []
             for j in range(len(plan[k])):
@@ -311,7 +315,7 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
                     bool(between.any() and (x[between] > b).all()) or (left >= last and inside.size > 0)
                 )
                 depth = np.nanmax(x[times > left]) - xp if (times > left).any() else 0.0
-                strong.append(max(float(depth) / (geometry()["top"] - xp), 0.0) ** 2.7)
+                strong.append(max(float(depth) / (geometry()["top"] - xp), 0.0) ** LOADING_EXPONENT)
             # From the fastest down, as long as all hang up.
             reach = len(free)
             while reach > 0 and free[reach - 1]:

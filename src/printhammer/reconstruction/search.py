@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.reconstruction.evaluation import WEIGHTS, scored
+from printhammer.reconstruction.evaluation import WEIGHTS, losses_digest, scored
 from printhammer.reconstruction.explorer import Explorer
 from printhammer.reconstruction.search_log import Log
 from printhammer.reconstruction.space import VARIABLES
@@ -84,6 +84,7 @@ class Plan:
             "explored": EXPLORED,
             "population": POPULATION,
             "weights": WEIGHTS[self.aim],
+            "losses": losses_digest(),
             "variables": [[v.name, v.low, v.high, v.logarithmic] for v in VARIABLES],
         }
 
