@@ -8,7 +8,7 @@ for it pay nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -117,6 +117,11 @@ class Exponent:
         False where the motion passes a touch without velocity, where it has no derivative.
     status : str
         How the run ended.
+    second_factors : array
+        As `factors`, for the second exponent.
+    states : array, shape (number of factors + 1, 4)
+        Displacement, m, velocity, m/s, mode, and displacement of the latest local maximum, m, at the firings;
+        NaN where the run did not get.
     """
 
     value: float
@@ -126,6 +131,8 @@ class Exponent:
     factors: FloatArray
     smooth: bool
     status: str
+    second_factors: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    states: FloatArray = field(default_factory=lambda: np.zeros((0, 4)), repr=False)
 
     @property
     def ok(self) -> bool:
@@ -258,7 +265,17 @@ def strobe_exponent(
         error = standard_error(factors)
     else:
         value = error = second = math.nan
-    return Exponent(value, error, second, spacing, factors, followed.smooth, STATUS_NAMES[followed.status])
+    return Exponent(
+        value=value,
+        standard_error=error,
+        second=second,
+        period=spacing,
+        factors=factors,
+        smooth=followed.smooth,
+        status=STATUS_NAMES[followed.status],
+        second_factors=growth[:, 1].copy(),
+        states=followed.found[first - 1 - before :, :4].copy(),
+    )
 
 
 def strobe_exponents(
