@@ -31,8 +31,10 @@ SAMPLE: dict[str, Any] = {
     "search": {
         "format": 1,
         "shipped": "ab" * 32,
-        "seed": 7,
-        "candidates": {"stated": 4000, "all": 9000},
+        "searches": [
+            {"aim": "stated", "seed": 7, "candidates": 4000},
+            {"aim": "all", "seed": 8, "candidates": 9000},
+        ],
         "core_hours": 4.5,
         "tolerance": 2e-11,
         "waveform": "rectangle",

@@ -58,7 +58,7 @@ def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         rates, "draw", lambda count, seed: [{"mass": 1e-3 + 1e-5 * (seed + k)} for k in range(count)]
     )
-    monkeypatch.setattr(shipping, "judge_all", lambda _hammer: [])
+    monkeypatch.setattr(shipping, "judge_all", lambda _hammer, progress: [])
 
 
 def held(constants: dict[str, float], names: list[str], *, panels: bool = True) -> dict[str, Any]:
@@ -172,7 +172,7 @@ def test_the_best_ships(cli: Callable, here: Path, cheap: None) -> None:
     )
     row = {"point": [0.5], "total": 1.0, "constants": None}
     judged_rows(here / "a.jsonl", HEADING, row, row)
-    judged_rows(here / "b.jsonl", {**HEADING, "aim": "all"}, row)
+    judged_rows(here / "b.jsonl", {**HEADING, "aim": "all", "seed": 9}, row)
     done = cli("reconstruct", "ship", "judged.jsonl", "a.jsonl", "b.jsonl", "--core-hours", "2.5")
     assert done.status == 0
     assert "failing: none" in done.out
@@ -180,7 +180,10 @@ def test_the_best_ships(cli: Callable, here: Path, cheap: None) -> None:
     assert {key: hammer.constants[key].si for key in best} == best
     found = Search.model_validate_json((here / "build" / "hammer" / "search.json").read_text())
     assert found.shipped == hammer.fingerprint
-    assert (found.candidates.stated, found.candidates.all, found.seed) == (2, 1, 4)
+    assert [(one.aim, one.seed, one.candidates) for one in found.searches] == [
+        ("stated", 4, 2),
+        ("all", 9, 1),
+    ]
     assert found.core_hours == 2.5
 
 
@@ -265,7 +268,7 @@ def test_ctrl_c_leaves_a_log_that_is_gone_on_with(tmp_path: Path) -> None:
 def test_from_the_search_to_the_hammer(cli: Callable, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "_TOGETHER", 8)
     # Some claims take minutes for a hammer that is far from the one of the paper.
-    monkeypatch.setattr(shipping, "judge_all", lambda hammer: judge_all(hammer, STATED))
+    monkeypatch.setattr(shipping, "judge_all", lambda hammer, progress: judge_all(hammer, STATED, progress))
     words = ("reconstruct", "search", "stated.jsonl", "--aim", "stated", *BRIEF)
     assert cli(*words).status == 0
     judge = ("judge", "stated.jsonl", "judged.jsonl", "--best", "1", "--workers", "1")

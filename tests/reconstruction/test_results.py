@@ -24,7 +24,10 @@ def test_all_that_is_there_is_read(tmp_path: Path) -> None:
     assert found.predictions is not None
     assert found.predictions.share("settle_out") == Share(20, 3)
     assert found.search is not None
-    assert found.search.candidates.all == 9000
+    assert [(one.aim, one.seed, one.candidates) for one in found.search.searches] == [
+        ("stated", 7, 4000),
+        ("all", 8, 9000),
+    ]
     assert found.family is not None
     assert found.family.hammers[0].panels == 9
 
@@ -60,6 +63,8 @@ def test_what_ships_can_be_read() -> None:
         (changed("predictions", "extra", to=1), "the key extra is not known"),
         (changed("predictions", "claims", "settle_out", "kind", to="odd"), "kind = 'odd': expected 'stated'"),
         (changed("search", "core_hours", to="long"), "core_hours = 'long': expected a valid number"),
+        (changed("search", "searches", to=[]), "search.json: searches: expected"),
+        (changed("search", "searches", 1, "aim", to="shape"), "searches.*aim = 'shape': expected 'stated'"),
         (
             changed("search", "failing", "release_margin", "best", "costs", to=["x"]),
             "costs.* = 'x': expected the name",

@@ -1,6 +1,7 @@
 """From judged candidates to the hammer file and what the report tells of the search."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,8 @@ from tests.candidates import shipped_constants
 
 import printhammer as ph
 from printhammer.claims import Result, claims
-from printhammer.problem import TOLERANCE
 from printhammer.reconstruction import shipping as module
+from printhammer.reconstruction.candidates import TOLERANCE
 from printhammer.reconstruction.judged import FIGURE_11, STATED
 from printhammer.reconstruction.results import results_in
 from printhammer.reconstruction.shipping import NOTE, TITLE, best_of, gauge, search_json, shipped_hammer
@@ -33,7 +34,9 @@ def row(mass: float, *, panels: int = 5, **verdicts: bool) -> dict[str, Any]:
 def some_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     """All claims hold for the shipped hammer but for some."""
 
-    def judge_all(_hammer: ph.Hammer) -> list[Result]:
+    def judge_all(_hammer: ph.Hammer, progress: Callable[[str], None] | None = None) -> list[Result]:
+        for name in claims() if progress is not None else ():
+            progress(name)
         return [
             Result(claim, dict.fromkeys(claim.band, 0.5), "fails", "So it is.")
             if name in FAILING
@@ -81,16 +84,31 @@ def test_what_the_report_tells_can_be_read(some_fail: None, tmp_path: Path) -> N
     best = row(2.0, panels=6, settle_out=True, weak_prints_when_hung_up=False)
     worse = row(3.0, panels=6, settle_out=True, **{STATED[1]: False})
     panels = row(4.0, panels=11, **dict.fromkeys(STATED, False))
+    searches = [
+        {"aim": "all", "seed": 5, "candidates": 40, "sample": 16},
+        {"aim": "all", "seed": 6, "candidates": 2},
+        {"aim": "stated", "seed": 1, "candidates": 7},
+    ]
+    told: list[str] = []
     table = search_json(
-        hammer, [row(1.0), worse, best, panels], seed=5, candidates={"all": 40}, core_hours=1.23456
+        hammer,
+        [row(1.0), worse, best, panels],
+        searches=searches,
+        core_hours=1.23456,
+        progress=told.append,
     )
+    assert told == list(claims())
     (tmp_path / "search.json").write_text(json.dumps(table, allow_nan=False))
     found = results_in(tmp_path).search
     assert found is not None
     assert found.shipped == hammer.fingerprint
-    assert found.candidates.all == 40
-    assert found.candidates.stated == 0
+    assert [(one.aim, one.seed, one.candidates) for one in found.searches] == [
+        ("all", 5, 40),
+        ("all", 6, 2),
+        ("stated", 1, 7),
+    ]
     assert found.core_hours == 1.23
+    # What the search ran at, not what the claims are judged at.
     assert found.tolerance == TOLERANCE
     assert found.waveform == "rectangle"
     assert found.gauge == gauge()

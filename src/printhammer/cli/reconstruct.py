@@ -249,6 +249,7 @@ def ship(
     """Write the best judged candidate as a hammer file, and for each claim that fails the best for it."""
     import math
 
+    from printhammer.claims import claims
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs, make_folder
@@ -260,17 +261,19 @@ def ship(
     if not name or Path(name).name != name:
         raise InputError(f"--name = {name!r}, expected a short name of the hammer, which names its file too")
     rows = _judged(judged)
-    counts: dict[str, int] = {}
-    seed = 0
-    for heading, tried in map(read_search, logs):
-        counts[heading["aim"]] = counts.get(heading["aim"], 0) + len(tried)
-        seed = int(heading["seed"])
+    searches = [{**heading, "candidates": len(tried)} for heading, tried in map(read_search, logs)]
     hammer = shipped_hammer(best_of(rows)["constants"], name)
     folder = make_folder(out)
     check_outputs([folder / f"{name}.toml", folder / "search.json"], [judged, *logs])
     announce_compiling()
     hammer.save(folder / f"{name}.toml")
-    table = search_json(hammer, rows, seed=seed, candidates=counts, core_hours=core_hours)
+    with _progress() as progress:
+        task = progress.add_task("judging", total=len(claims()))
+
+        def tell(claim: str) -> None:
+            progress.update(task, description=claim.replace("_", " "), completed=list(claims()).index(claim))
+
+        table = search_json(hammer, rows, searches=searches, core_hours=core_hours, progress=tell)
     _write_json(folder / "search.json", table)
     console().print(
         f"[dim]wrote[/dim] {folder / name}.toml; failing: {', '.join(table['failing']) or 'none'}"

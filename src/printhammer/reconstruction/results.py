@@ -108,9 +108,12 @@ class Predictions(_Table):
         return _share(self.claims.get(name))
 
 
-class _Candidates(_Table):
-    stated: _Count = Field(description="the number tried on the stated claims alone")
-    all: _Count = Field(description="the number tried on all claims")
+class Searched(_Table):
+    """One search, by what decides on it and how far it came."""
+
+    aim: Literal["stated", "all"] = Field(description="the claims that led: stated ones alone, or all")
+    seed: int = Field(description="the seed of the search")
+    candidates: _Count = Field(description="the number of hammers tried")
 
 
 class BestFor(_Table):
@@ -131,15 +134,14 @@ class Failing(_Table):
 
 
 class Search(_Table):
-    """The search that found the shipped hammer."""
+    """The searches that found the shipped hammer."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     shipped: str = Field(description="the fingerprint of the shipped hammer")
-    seed: int = Field(description="the seed of the search")
-    candidates: _Candidates = Field(description="the numbers of hammers tried")
-    core_hours: Annotated[_Number, Field(ge=0.0)] = Field(description="the hours of one core that it took")
-    tolerance: Annotated[_Number, Field(gt=0.0)] = Field(description="the tolerance of its runs")
-    waveform: str = Field(description="the shape of its waveforms")
+    searches: list[Searched] = Field(min_length=1, description="each search, in the order of their logs")
+    core_hours: Annotated[_Number, Field(ge=0.0)] = Field(description="the hours of one core that they took")
+    tolerance: Annotated[_Number, Field(gt=0.0)] = Field(description="the tolerance of their runs")
+    waveform: str = Field(description="the shape of their waveforms")
     gauge: str = Field(description="how the common scale of masses and forces was fixed")
     failing: dict[_ClaimName, Failing] = Field(description="the claims that fail for the shipped hammer")
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import claims, judge_all
-from printhammer.problem import TOLERANCE
+from printhammer.reconstruction.candidates import TOLERANCE
 from printhammer.reconstruction.shortlist import standing
 from printhammer.reconstruction.space import CURRENT, PRINT_FORCE, hammer_of
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from printhammer.claims import Result
     from printhammer.hammer import Hammer
@@ -49,9 +49,9 @@ def search_json(
     hammer: Hammer,
     rows: Sequence[dict[str, Any]],
     *,
-    seed: int,
-    candidates: Mapping[str, int],
+    searches: Sequence[Mapping[str, Any]],
     core_hours: float,
+    progress: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
     """Return what `search.json` holds: the search, and for each claim that fails the best hammer for it.
 
@@ -61,20 +61,19 @@ def search_json(
         The one that ships.
     rows : sequence of dict
         Judged candidates.
-    seed : int
-        Of the searches.
-    candidates : mapping
-        Numbers tried, by aim.
+    searches : sequence of mapping
+        Of each search its `aim`, its `seed` and the number of `candidates` that it tried.
     core_hours : float
         Time of one core that the searches took, h.
+    progress : callable, optional
+        Called with the name of each claim before it is judged.
     """
-    results = judge_all(hammer)
+    results = judge_all(hammer, progress=progress)
     held = {result.claim.name for result in results if result.verdict == "holds"}
     return {
         "format": 1,
         "shipped": hammer.fingerprint,
-        "seed": seed,
-        "candidates": {"stated": candidates.get("stated", 0), "all": candidates.get("all", 0)},
+        "searches": [{key: one[key] for key in ("aim", "seed", "candidates")} for one in searches],
         "core_hours": round(core_hours, 2),
         "tolerance": TOLERANCE,
         "waveform": "" if hammer.waveform is None else hammer.waveform.shape,

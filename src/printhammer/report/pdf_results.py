@@ -116,10 +116,14 @@ def reconstruction_pages(sheet: Sheet, report: Report) -> None:
         ),
         after=6.0,
     )
-    tried, effort = search.candidates, f"{search.core_hours:.3g} hours of one core"
+    tried = ", ".join(
+        f"{one.candidates} on {'the stated claims alone' if one.aim == 'stated' else 'all claims'}"
+        f" (seed {one.seed})"
+        for one in search.searches
+    )
     for text in (
-        f"Hammers tried: {tried.stated} on the stated claims alone, {tried.all} on all.",
-        f"Effort: {effort}; seed {search.seed}; tolerance {search.tolerance:g}.",
+        f"Hammers tried: {tried}.",
+        f"Effort: {search.core_hours:.3g} hours of one core; tolerance {search.tolerance:g}.",
         f"Waveform: {search.waveform}. Gauge: {search.gauge}.",
     ):
         sheet.write(Words(text), after=2.0)
