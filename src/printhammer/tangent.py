@@ -188,7 +188,7 @@ def tangent_map(
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
         raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
     problem = _problem(hammer, drive, state, tolerance)
-    followed = _follow(problem, np.array([start, end]), np.eye(3), renormalise=False)
+    followed = follow(problem, np.array([start, end]), np.eye(3), renormalise=False)
     found, status = followed.found, followed.status
     branches = [int(code) if code >= 0.0 else -1 for code in found[:, 2]]
     shape = [3 if branch in (UNLOADING, RELOADING, HELD_UNLOADING) else 2 for branch in branches]
@@ -257,7 +257,7 @@ def strobe_exponent(
     before = max(first - 1 - _WARM_UP, 0)
     scale, speed = problem.scales
     initial = np.array([[scale, 0.0], [0.0, speed], [0.0, 0.0]])
-    followed = _follow(problem, times[before:], initial, renormalise=True)
+    followed = follow(problem, times[before:], initial, renormalise=True)
     growth = followed.found[first - before :, 4:]
     factors = growth[:, 0].copy()
     if followed.status == OK:
@@ -379,7 +379,7 @@ def _strobes(
 
 
 @dataclass(frozen=True)
-class _Followed:
+class Followed:
     """Status code, differentiability, the kernel's `found` at the marks (NaN beyond), columns at the last."""
 
     status: int
@@ -388,7 +388,7 @@ class _Followed:
     columns: FloatArray
 
 
-def _follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> _Followed:
+def follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> Followed:
     """Run a problem to the last mark and carry columns along from the first.
 
     The record is kept in stretches: memory does not grow with the length of the run.
@@ -403,8 +403,8 @@ def _follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renorma
 
 def _stretches(
     problem: Problem, marks: FloatArray, initial: FloatArray, renormalise: bool, capacity: int
-) -> _Followed | None:
-    """Do as `_follow` with a record of at most `capacity` nodes; None where one contact alone needs more."""
+) -> Followed | None:
+    """Do as `follow` with a record of at most `capacity` nodes; None where one contact alone needs more."""
     count = initial.shape[1]
     columns = np.zeros((3, count))
     found = np.full((len(marks), 4 + count), np.nan)
@@ -450,4 +450,4 @@ def _stretches(
             track,
             found,
         )
-    return _Followed(status, bool(track[1]), found, columns)
+    return Followed(status, bool(track[1]), found, columns)
