@@ -55,6 +55,9 @@ _CLEAR: Final = 0.06
 _CLEARLY: Final = 0.002
 """Part of the way to the pack by which a quenched pulse stays short of it."""
 
+_LATE: Final = 100e-6
+"""How much too late, for the second current, the armature may rise to be of some use to the search, s."""
+
 _TAIL: Final = 1e-3
 """Time after the second of two pulses within which its peak lies, s."""
 
@@ -214,8 +217,14 @@ def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
         for k, score in enumerate(own):
             peaks = np.array([_peak_after(x[k, j], times, gap) for j, gap in enumerate(gaps)])
             _judge_quench(score, gaps, peaks, quenched)
+            late = _late(x[k, caught], times, float(moments[k * len(gaps) + caught][0]))
+            score.measured["rise_speed"] = float(speed[k, caught])
             _judge_later(
-                score, peaks[caught:], float(force[k, caught]), flight[k, caught], float(speed[k, caught])
+                score,
+                peaks[caught:],
+                float(force[k, caught]),
+                flight[k, caught],
+                0.0 if speed[k, caught] > 0.0 else late,
             )
 
 
@@ -250,8 +259,15 @@ def _judge_quench(score: Score, gaps: FloatArray, peaks: FloatArray, place: int)
     score.losses["two_pulses_660us"] += 0.2 * hinge(float(miss[place]) + _CLEARLY, 0.5)
 
 
-def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArray, speed: float) -> None:
-    """Look at the pulse that is caught on the rise, and at all later ones."""
+def _late(x: npt.NDArray[np.float32], times: FloatArray, moment: float) -> float:
+    """Return how long after a moment a falling armature is first on the rise, s; infinite for never."""
+    first = int(np.searchsorted(times, moment))
+    up = np.flatnonzero(np.diff(x[first:]) > 0.0)
+    return float(times[first + up[0]] - moment) + _COARSE if up.size else math.inf
+
+
+def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArray, late: float) -> None:
+    """Look at the pulse that is caught on the rise, `late` or in time, and at all later ones."""
     front, way = geometry()["xp"], geometry()["xp"] - geometry()["b"]
     # A second pulse that never turns back is as good as one that stays in the backstop.
     miss = np.where(np.isnan(peaks), -1.0, (peaks - front) / way)
@@ -260,17 +276,16 @@ def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArr
     ratio = 0.0 if math.isnan(force) else float(force / score.measured["force"])
     gain = -math.inf if math.isnan(flight[1]) else float(flight[0] - flight[1])
     wanted = band["flight_time_gain_s"]["at_least"]
-    # Falling at 700 us is another branch of solutions, not a small miss.
     score.losses["two_pulses_700us"] = (
         0.5 * hinge(max(low - ratio, ratio - high), 0.3)
-        + (0.3 + 0.4 * hinge(-speed, 1.0) if speed <= 0.0 else 0.0)
+        + 0.4 * hinge(late, _LATE)
         + 0.1 * hinge(wanted - gain, 100e-6)
     )
     # With a reserve, since what is lost between the times looked at counts as well.
     score.losses["second_dot_lost"] = hinge(_CLEAR - float(miss.min()), _CLEAR + 0.5)
     score.measured |= {
         "ratio": ratio,
-        "rise_speed": speed,
+        "late": None if math.isinf(late) else late,
         "gain": None if math.isinf(gain) else gain,
         "gaps_lost": int(np.sum(miss <= 0.0)),
     }

@@ -27,7 +27,7 @@ PRINT_FORCE: Final = to_si(5.0, "lbf", "N")
 """Force of the single-pulse dot that sets the scale of mass and forces, N (introduction of the paper)."""
 
 CURRENT: Final = 1.0
-"""Coil current that sets the scale of Bm, A: the middle of the range of Fig. 2."""
+"""Largest current of a pulse that sets the scale of Bm, A: the middle of the range of Fig. 2."""
 
 LOADING_EXPONENT: Final = 2.7
 """Exponent of the loading branch of the pack, equation (5)."""
@@ -78,9 +78,9 @@ VARIABLES: Final = (
     Variable("bias", 0.0, 0.4, False, "", "F0 over Am^2 / sqrt(b)"),
     Variable("margin", 0.05, 0.8, False, "", "net force over magnet force at the backstop, no current"),
     Variable("reach", 150e-6, 2000e-6, True, "m", "As: way from the backstop to where the spring is slack"),
-    Variable("release", 0.03, 0.45, True, "", "share of the field that the current takes away, Bm I / Am"),
+    Variable("release", 0.03, 0.45, True, "", "share of the field that the largest current takes away"),
     Variable("width", 120e-6, 500e-6, True, "s", "width of the current pulse"),
-    Variable("rise", 3e-6, 80e-6, True, "s", "time constant of its rise"),
+    Variable("rise", 3e-6, 400e-6, True, "s", "time constant of its rise"),
     Variable("decay", 3e-6, 80e-6, True, "s", "time constant of its decay"),
     Variable("depth", 0.2e-6, 10e-6, True, "m", "compression of the backstop at rest"),
     Variable("damping", 0.05, 2.0, True, "s/m", "l / k of the backstop"),
@@ -115,6 +115,11 @@ def geometry() -> dict[str, float]:
     }
 
 
+def _reached(width: float, rise: float) -> float:
+    """Return the part of its amplitude that a pulse reaches."""
+    return -math.expm1(-width / rise)
+
+
 def constants_at(values: Mapping[str, float], mass: float, stiffness: float) -> dict[str, float]:
     """Return the constants of a hammer file, SI, for values of the variables and any scale of mass.
 
@@ -142,7 +147,7 @@ def constants_at(values: Mapping[str, float], mass: float, stiffness: float) -> 
         "pack.stiffness": stiffness,
         "backstop.stiffness": stiff,
         "backstop.damping": values["damping"] * stiff,
-        "waveform.amplitude": CURRENT,
+        "waveform.amplitude": CURRENT / _reached(values["width"], values["rise"]),
         "waveform.width": values["width"],
         "waveform.rise": values["rise"],
         "waveform.decay": values["decay"],
@@ -155,12 +160,14 @@ def values_of(constants: Mapping[str, float]) -> dict[str, float]:
     field = constants["magnet.Am"] ** 2
     magnet_force = field / math.sqrt(b) - constants["magnet.F0"]
     net = magnet_force - constants["spring.Bs"]
+    reached = _reached(constants["waveform.width"], constants["waveform.rise"])
+    current = constants["waveform.amplitude"] * reached
     return {
         "pull": magnet_force / constants["mass"],
         "bias": constants["magnet.F0"] * math.sqrt(b) / field,
         "margin": net / magnet_force,
         "reach": constants["spring.As"],
-        "release": constants["magnet.Bm"] * constants["waveform.amplitude"] / constants["magnet.Am"],
+        "release": constants["magnet.Bm"] * current / constants["magnet.Am"],
         "width": constants["waveform.width"],
         "rise": constants["waveform.rise"],
         "decay": constants["waveform.decay"],
