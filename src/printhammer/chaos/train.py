@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from printhammer.threads import Progress
     from printhammer.waveforms import Waveform
 
-_HELD: Final = {
+HELD_BRANCHES: Final = {
     MODE_NAMES.index(f"held on the {branch} branch"): MODE_NAMES.index(branch)
     for branch in ("loading", "unloading")
 }
@@ -113,7 +113,7 @@ class States:
         width, speed = window_of(train.hammer, train.drive).half_widths
         front = math.inf if train.hammer.front is None else train.hammer.front
         branch = np.where(self.x > front, self.branch, 0)
-        for held, part_of in _HELD.items():
+        for held, part_of in HELD_BRANCHES.items():
             branch[branch == held] = part_of
         return repeats(
             np.column_stack([self.x, self.v, self.memory]),
