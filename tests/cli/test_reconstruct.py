@@ -229,7 +229,12 @@ def files(here: Path) -> Path:
         ("ship judged.jsonl search.jsonl --name ../a", "--name = '../a', expected a short name"),
         ("ship judged.jsonl search.jsonl --name ''", "--name = '', expected a short name"),
         ("ship judged.jsonl search.jsonl --core-hours inf", "--core-hours = inf, expected a finite number"),
-        ("family none.jsonl", "none.jsonl: the log cannot be read"),
+        ("family none.jsonl", "none.jsonl: expected judged candidates, and there are none"),
+        (
+            "family judged.jsonl search.jsonl",
+            "search.jsonl, line 1: constants = None, expected the constants",
+        ),
+        ("family judged.jsonl --out notes.txt", "notes.txt: expected a folder"),
     ],
 )
 def test_bad_input_is_one_sentence(cli: Callable, files: Path, words: str, said: str) -> None:

@@ -11,6 +11,7 @@ from printhammer.errors import InputError
 from printhammer.reconstruction import family
 from printhammer.reconstruction.family import Member, csv_text, family_hammers, write_family
 from printhammer.reconstruction.family_picture import family_picture
+from printhammer.reconstruction.judged import STATED
 from printhammer.reconstruction.results import results_in
 from printhammer.reconstruction.space import hammer_of, template
 from printhammer.units import to_si
@@ -32,7 +33,12 @@ def log(hammer: ph.Hammer, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for number, factors in enumerate(itertools.product((1.0, 1.2), repeat=len(VARIED))):
         verdicts = {"geometry": True, "settle_out": number % 2 == 0}
         rows.append(
-            {"constants": constants_of(hammer, *factors), "verdicts": verdicts, "panels": 8 + number % 3}
+            {
+                "constants": constants_of(hammer, *factors),
+                "verdicts": verdicts,
+                "values": {},
+                "panels": 8 + number % 3,
+            }
         )
     path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
     return path
@@ -144,11 +150,24 @@ def test_too_few_hammers_are_told_and_nothing_is_overwritten(
     assert (tmp_path / "family.json").read_text("utf-8") == "old"
 
 
-def test_no_hammer_at_all_is_told(tmp_path: Path) -> None:
-    empty = tmp_path / "empty.jsonl"
-    empty.write_text('{"seed": 3}\n', encoding="utf-8")
-    with pytest.raises(InputError, match="0 clearly different hammers"):
-        write_family([empty], tmp_path)
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        (
+            {"constants": {"mass": 4e-4}, "verdicts": {}, "values": {}, "panels": 7},
+            "0 clearly different hamm",
+        ),
+        ({"constants": {"mas": 4e-4}, "verdicts": {}, "values": {}, "panels": 9}, "mas"),
+        ({"seed": 3}, "expected the constants of a judged candidate"),
+        (None, "expected judged candidates, and there are none"),
+    ],
+)
+def test_no_hammer_at_all_is_told_and_leaves_nothing_behind(tmp_path: Path, row: Any, said: str) -> None:
+    path = tmp_path / "judged.jsonl"
+    path.write_text("" if row is None else json.dumps(row) + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        write_family([path], tmp_path / "new" / "family")
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_hammer_that_is_no_member_is_left_out(
@@ -177,7 +196,7 @@ def test_a_constant_that_a_hammer_lacks_is_left_empty_in_the_table() -> None:
 def test_the_claims_decide_who_is_a_member(hammer: ph.Hammer) -> None:
     found = family._judge(hammer)
     held = {name for name, verdict in found["verdicts"].items() if verdict == "holds"}
-    assert found["member"] == (set(family.stated()) <= held and found["panels"] >= 8)
+    assert found["member"] == (set(STATED) <= held and found["panels"] >= 8)
 
 
 def test_the_picture_has_a_dot_for_each_member_in_each_row(

@@ -1,3 +1,5 @@
+"""Judged candidates, read as hammers for the family; what is no log is told in `test_judged`."""
+
 import json
 from pathlib import Path
 from typing import Any
@@ -6,30 +8,61 @@ import pytest
 
 from printhammer.errors import InputError
 from printhammer.reconstruction.family import promising
-from printhammer.reconstruction.family_log import read_logs, stated
+from printhammer.reconstruction.family_log import read_logs
+from printhammer.reconstruction.judged_log import read_judged
 
-GOOD = {"constants": {"mass": 4e-4}, "verdicts": {"geometry": True, "settle_out": False}, "panels": 9}
+GOOD = {
+    "constants": {"mass": 4e-4},
+    "verdicts": {"geometry": True, "settle_out": False},
+    "values": {},
+    "panels": 9,
+}
 
 
-def log(folder: Path, *rows: Any, tail: str = "") -> Path:
-    path = folder / "search.jsonl"
-    path.write_text("".join(json.dumps(row) + "\n" for row in rows) + tail, encoding="utf-8")
+def log(folder: Path, *rows: Any, name: str = "judged") -> Path:
+    path = folder / f"{name}.jsonl"
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
     return path
 
 
-def test_a_log_is_read_but_for_what_is_no_hammer_and_a_line_that_breaks_off(tmp_path: Path) -> None:
-    path = log(tmp_path, {"format": 1, "seed": 7}, GOOD, tail='{"constants": {"ma')
-    (found,) = read_logs([path])
-    assert found.constants == {"mass": 4e-4}
-    assert found.panels == 9
-    assert found.promising
-    assert found.source == f"{path}, line 2"
+def test_hammers_come_in_the_order_of_the_files_with_where_they_are_from(tmp_path: Path) -> None:
+    light = {**GOOD, "constants": {"mass": 1, "magnet.F0": 2.5}}
+    paths = [log(tmp_path, GOOD, light), log(tmp_path, {**GOOD, "constants": {"mass": 7e-4}}, name="more")]
+    first, second, third = read_logs(paths)
+    assert [row.constants for row in (first, second, third)] == [
+        {"mass": 4e-4},
+        {"mass": 1.0, "magnet.F0": 2.5},
+        {"mass": 7e-4},
+    ]
+    assert (first.panels, first.verdicts) == (9, GOOD["verdicts"])
+    assert first.promising
+    assert second.source == f"{paths[0]}, candidate 2"
+    assert third.source == f"{paths[1]}, candidate 1"
+
+
+def test_what_was_judged_later_does_not_hide_what_was_known(tmp_path: Path) -> None:
+    # As `judge --every-claim` notes it: only what was not known.
+    later = {**GOOD, "verdicts": {"release_margin": True}, "panels": None}
+    for paths in (
+        [log(tmp_path, GOOD, later, name="both")],
+        [log(tmp_path, GOOD), log(tmp_path, later, name="later")],
+    ):
+        (found,) = read_logs(paths)
+        assert found.panels == 9
+        assert found.verdicts == {"geometry": True, "settle_out": False, "release_margin": True}
+        assert found.promising
+        assert found.source == f"{paths[0]}, candidate 1"
 
 
 def test_the_last_word_on_a_hammer_counts(tmp_path: Path) -> None:
-    (found,) = read_logs([log(tmp_path, GOOD, {**GOOD, "panels": 5})])
-    assert found.panels == 5
-    assert not found.promising
+    again = {**GOOD, "panels": 5}
+    for paths in (
+        [log(tmp_path, GOOD, again, name="both")],
+        [log(tmp_path, GOOD), log(tmp_path, again, name="again")],
+    ):
+        (found,) = read_logs(paths)
+        assert found.panels == 5
+        assert not found.promising
 
 
 @pytest.mark.parametrize(
@@ -48,51 +81,16 @@ def test_only_stated_claims_and_panels_decide(tmp_path: Path, change: Any, promi
     assert found.promising == promising_
 
 
-def test_the_stated_claims_are_those_of_the_paper_outside_figure_11() -> None:
-    assert stated() == [
-        "geometry",
-        "return_from_everywhere",
-        "single_pulse_stroke",
-        "two_pulses_660us",
-        "two_pulses_700us",
-        "second_dot_lost",
-        "integrator_comparison",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("row", "said"),
-    [
-        ([1], "line 1: expected a JSON object, not '[1]'"),
-        ({**GOOD, "constants": {}}, "line 1: constants = {}, expected keys"),
-        (
-            {**GOOD, "constants": {"mass": "4 g"}},
-            "line 1: constants.mass = '4 g', expected a finite number in SI",
-        ),
-        ({**GOOD, "constants": {"mass": True}}, "line 1: constants.mass = True, expected"),
-        ({**GOOD, "verdicts": [1]}, "line 1: verdicts = [1], expected claims"),
-        ({**GOOD, "verdicts": {"speed": True}}, "line 1: verdicts.speed is not known"),
-        (
-            {**GOOD, "verdicts": {"geometry": "holds"}},
-            "line 1: verdicts.geometry = 'holds', expected true or false",
-        ),
-        ({**GOOD, "panels": 8.5}, "line 1: panels = 8.5, expected a whole number"),
-    ],
-)
-def test_bad_lines_are_told(tmp_path: Path, row: Any, said: str) -> None:
-    path = log(tmp_path, row, GOOD)
-    with pytest.raises(InputError) as error:
-        read_logs([path])
-    assert f"{path}, {said}" in str(error.value)
-
-
-def test_a_broken_line_in_the_middle_and_a_missing_file_are_told(tmp_path: Path) -> None:
-    path = tmp_path / "broken.jsonl"
-    path.write_text("{\n" + json.dumps(GOOD) + "\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"line 1: expected a JSON object, not '\{'"):
-        read_logs([path])
-    with pytest.raises(InputError, match="the log cannot be read"):
-        read_logs([tmp_path / "none.jsonl"])
+def test_what_is_no_log_is_told_as_wherever_one_is_read(tmp_path: Path) -> None:
+    good = log(tmp_path, GOOD)
+    bad = log(tmp_path, {**GOOD, "panels": 8.5}, name="bad")
+    for path in (bad, tmp_path / "none.jsonl"):
+        with pytest.raises(InputError) as one:
+            read_judged(path, some=True)
+        with pytest.raises(InputError) as error:
+            read_logs([good, path])
+        assert str(error.value) == str(one.value)
+        assert str(path) in str(error.value)
 
 
 def test_the_best_come_first_and_nearly_equal_ones_once_where_there_are_many(tmp_path: Path) -> None:

@@ -30,6 +30,15 @@ def test_claims_of_the_lists_are_those_of_the_paper() -> None:
     assert all(claims()[name].kind == "stated" for name in STATED)
     stated = {name for name, claim in claims().items() if claim.kind == "stated"}
     assert stated - set(STATED) == {FIGURE_11}
+    assert STATED == (
+        "geometry",
+        "return_from_everywhere",
+        "single_pulse_stroke",
+        "two_pulses_660us",
+        "two_pulses_700us",
+        "second_dot_lost",
+        "integrator_comparison",
+    )
     assert set(SLOW) < set(claims())
 
 
@@ -166,6 +175,20 @@ def test_bad_lines_are_told_in_one_sentence(tmp_path: Path, row: Any, said: str)
         read_judged(path)
     assert str(error.value).startswith(f"{path}, line 1: ")
     assert "\n" not in str(error.value)
+
+
+def test_a_log_in_which_there_must_be_some(tmp_path: Path) -> None:
+    path = tmp_path / "judged.jsonl"
+    for content in (None, "", text_of(ROW)[:20]):
+        if content is not None:
+            path.write_text(content)
+        assert read_judged(path) == []
+        with pytest.raises(
+            InputError, match=r"judged\.jsonl: expected judged candidates, and there are none"
+        ):
+            read_judged(path, some=True)
+    path.write_text(text_of(ROW))
+    assert read_judged(path, some=True) == [ROW]
 
 
 def test_files_that_cannot_be_read_or_written_are_told(tmp_path: Path) -> None:

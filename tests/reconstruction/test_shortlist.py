@@ -13,15 +13,7 @@ from printhammer.claims import claims
 from printhammer.errors import InputError
 from printhammer.reconstruction import shortlist as module
 from printhammer.reconstruction.judged import FIGURE_11, STATED
-from printhammer.reconstruction.shortlist import (
-    judge_candidates,
-    read_search,
-    rounded,
-    shortlist,
-    standing,
-)
-
-HEADING = {"format": 1, "aim": "stated", "seed": 4}
+from printhammer.reconstruction.shortlist import judge_candidates, rounded, shortlist, standing
 
 
 def candidate(*point: float, total: float, constants: Any = None) -> dict[str, Any]:
@@ -67,46 +59,6 @@ def test_constants_are_rounded_to_six_digits(value: float) -> None:
     assert found == pytest.approx(value, rel=5.001e-6)
     assert rounded({"mass": found}) == {"mass": found}
     assert len(f"{found:e}".partition("e")[0].replace(".", "").rstrip("0")) <= 6
-
-
-def log(folder: Path, *rows: Any, tail: str = "") -> Path:
-    path = folder / "search.jsonl"
-    path.write_text("".join(json.dumps(row) + "\n" for row in rows) + tail, encoding="utf-8")
-    return path
-
-
-def test_the_log_of_a_search_is_read_but_for_a_line_that_breaks_off(tmp_path: Path) -> None:
-    rows = [candidate(0.1, total=1.0), candidate(0.2, total=2.0)]
-    path = log(tmp_path, HEADING, *rows, tail='{"point": [0.')
-    assert read_search(path) == (HEADING, rows)
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"", "expected the log of a search, and there is nothing"),
-        (b"{}\n", "line 1: expected the heading of the log of a search, not '{}'"),
-        (b"[1]\n", "line 1: expected the heading"),
-        (b"words\n", "line 1: expected the heading of the log of a search, not 'words'"),
-        (json.dumps(HEADING).encode() + b"\n{}\n", "line 2: expected a candidate of the log of a search"),
-        (json.dumps(HEADING).encode() + b"\n\n", "line 2: expected a candidate"),
-        (b"\xff\xfe\n", "the log cannot be read \\(not UTF-8\\)"),
-    ],
-)
-def test_what_is_no_log_of_a_search_is_told(tmp_path: Path, content: bytes, said: str) -> None:
-    path = tmp_path / "log.jsonl"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=said) as error:
-        read_search(path)
-    assert str(error.value).startswith(str(path))
-    assert "\n" not in str(error.value)
-
-
-def test_a_log_that_is_not_there_is_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the log cannot be read"):
-        read_search(tmp_path / "none.jsonl")
-    with pytest.raises(InputError, match="the log cannot be read"):
-        read_search(tmp_path)
 
 
 @pytest.fixture

@@ -110,7 +110,8 @@ def judge(
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
     from printhammer.reconstruction.judged import STATED
-    from printhammer.reconstruction.shortlist import judge_candidates, read_search, rounded, shortlist
+    from printhammer.reconstruction.search_log import read_search
+    from printhammer.reconstruction.shortlist import judge_candidates, rounded, shortlist
 
     check_outputs([judged], [log])
     _heading, rows = read_search(log)
@@ -199,25 +200,15 @@ def predictions(
     """Tell what hammers found on the stated claims alone say about the claims that did not lead."""
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
+    from printhammer.reconstruction.judged_log import read_judged
     from printhammer.reconstruction.predictions import predictions as count
-    from printhammer.reconstruction.shortlist import read_search
+    from printhammer.reconstruction.search_log import read_search
 
     check_outputs([out], [log, judged])
     heading, rows = read_search(log)
     if heading["aim"] != "stated":
         raise InputError(f"{log}: aim = {heading['aim']!r}, expected the log of a search on stated claims")
-    _write_json(out, count(_judged(judged), heading["seed"], len(rows)))
-
-
-def _judged(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a log of judged candidates, of which there must be some."""
-    from printhammer.errors import InputError
-    from printhammer.reconstruction.judged_log import read_judged
-
-    rows = read_judged(path)
-    if not rows:
-        raise InputError(f"{path}: expected judged candidates, and there are none")
-    return rows
+    _write_json(out, count(read_judged(judged, some=True), heading["seed"], len(rows)))
 
 
 @app.command("family", epilog="Example: printhammer reconstruct family judged.jsonl --out family")
@@ -253,14 +244,15 @@ def ship(
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs, make_folder
+    from printhammer.reconstruction.judged_log import read_judged
+    from printhammer.reconstruction.search_log import read_search
     from printhammer.reconstruction.shipping import best_of, search_json, shipped_hammer
-    from printhammer.reconstruction.shortlist import read_search
 
     if not math.isfinite(core_hours):
         raise InputError(f"--core-hours = {core_hours}, expected a finite number")
     if not name or Path(name).name != name:
         raise InputError(f"--name = {name!r}, expected a short name of the hammer, which names its file too")
-    rows = _judged(judged)
+    rows = read_judged(judged, some=True)
     searches = [{**heading, "candidates": len(tried)} for heading, tried in map(read_search, logs)]
     hammer = shipped_hammer(best_of(rows)["constants"], name)
     folder = make_folder(out)

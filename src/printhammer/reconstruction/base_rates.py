@@ -14,10 +14,11 @@ import numpy as np
 
 from printhammer.claims import claims
 from printhammer.claims.context import CYCLE
+from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.drive import PulseTrain
-from printhammer.ensemble import Ensemble
-from printhammer.reconstruction.candidates import TOLERANCE, candidates
+from printhammer.reconstruction.candidates import candidates
 from printhammer.reconstruction.judged import FIGURE_11, SLOW, row_of
+from printhammer.reconstruction.losses import run_all
 from printhammer.reconstruction.space import VARIABLES
 
 if TYPE_CHECKING:
@@ -57,11 +58,8 @@ def draw(count: int, seed: int) -> list[dict[str, float]]:
 def _back(printing: Sequence[Candidate]) -> list[bool]:
     """Tell which hammers are back at the backstop, all but at rest, some time after a single pulse."""
     drives = [PulseTrain(candidate.waveform) for candidate in printing]
-    moments = [np.array([CYCLE])] * len(printing)
-    states = [candidate.state for candidate in printing]
-    hammers = [candidate.hammer for candidate in printing]
-    ensemble = Ensemble(hammers, drives, CYCLE, states=states, tolerance=TOLERANCE)
-    table = ensemble.run(threads=1, strobes=moments).strobes
+    ends = [CYCLE] * len(printing)
+    table = run_all(printing, drives, ends, 1, strobes=[np.array([end]) for end in ends]).strobes
     assert table is not None
     rests = np.array([candidate.rest for candidate in printing])
     return [bool(near) for near in np.abs(table.x[:, 0] - rests) < _NEAR]
@@ -113,7 +111,7 @@ def base_rates(
     counts = {name: {"measured": 0, "holds": 0} for name in claims()}
     panels: dict[str, dict[str, int]] = {}
     source = map(_judged, tasks) if pool is None else pool.map(_judged, tasks)
-    printed = dict(zip(_panel_names(), claims()[FIGURE_11].band["verdicts"], strict=True))
+    printed = {panel_name(period): verdict for period, verdict in printed_verdicts().items()}
     for done, row in enumerate(source, 1):
         for name, holds in row["verdicts"].items():
             counts[name]["measured"] += 1
@@ -133,7 +131,3 @@ def base_rates(
         "claims": counts,
         "poincare_panels": panels,
     }
-
-
-def _panel_names() -> list[str]:
-    return [f"{period * 1e3:.2f} ms" for period in claims()[FIGURE_11].settings["strobe_times_s"]]

@@ -25,8 +25,9 @@ from printhammer.errors import InputError
 from printhammer.outputs import make_folder, write_file
 from printhammer.reconstruction.choice import at_gauge, choose
 from printhammer.reconstruction.conclusions import conclude
-from printhammer.reconstruction.family_log import FIGURE_11, LEAST_PANELS, Logged, read_logs, stated
+from printhammer.reconstruction.family_log import LEAST_PANELS, Logged, read_logs
 from printhammer.reconstruction.family_shelf import Shelf
+from printhammer.reconstruction.judged import FIGURE_11, STATED
 from printhammer.reconstruction.results import Family, Results, results_in, shipped_results
 from printhammer.reconstruction.robustness import robustness
 from printhammer.reconstruction.space import hammer_of, template
@@ -125,7 +126,7 @@ def write_family(
     count: int = COUNT,
     least: int = LEAST,
 ) -> list[Member]:
-    """Choose a family from the logs of searches, judge it, and write `family.json` and `family.csv`.
+    """Choose a family from logs of judged candidates, judge it, and write `family.json` and `family.csv`.
 
     What is judged is kept in `family.part.jsonl` in the folder until the family is complete, so that work
     that was interrupted goes on from there.
@@ -135,7 +136,7 @@ def write_family(
     logs : iterable of path
         See `printhammer.reconstruction.family_log`.
     folder : path
-        Where to write; made if it is missing.
+        Where to write; made if it is missing, once the logs are read.
     progress : callable, optional
         Told what is being done, a line each.
     count : int, optional
@@ -156,7 +157,6 @@ def write_family(
     """
     tell = progress or (lambda _: None)
     paths = list(logs)
-    place = make_folder(folder)
     logged = read_logs(paths)
     found = promising(logged)
     tell(f"{len(logged)} hammers in the logs, {len(found)} of them promising")
@@ -167,6 +167,7 @@ def write_family(
     if not found:
         raise InputError(_too_few(paths, 0, least))
     tables = compared([row.constants for row in found], forces[printing].tolist())
+    place = make_folder(folder)
     shelf = Shelf(place / "family.part.jsonl")
     members: dict[int, Member] = {}
 
@@ -291,7 +292,7 @@ def _judge(hammer: Hammer) -> dict[str, Any]:
     context = Context(hammer)
     verdicts: dict[str, str] = {}
     found: dict[str, Any] = {"member": False, "verdicts": verdicts, "panels": 0, "conclusions": {}}
-    for name in stated():
+    for name in STATED:
         verdicts[name] = judge(context, claims()[name]).verdict
         if verdicts[name] != "holds":
             return found

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.chaos import strobes
 from printhammer.claims import Context, claims, judge
-from printhammer.claims.verdicts import printed_verdicts
+from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.problem import TOLERANCE
 from printhammer.reconstruction.space import hammer_of
 
@@ -43,7 +43,7 @@ def plain_panels(hammer: Hammer, tolerance: float = TOLERANCE) -> dict[str, tupl
     periods = list(printed)
     found = strobes(hammer, periods, points=1, threads=1, tolerance=tolerance)
     return {
-        f"{period * 1e3:.2f} ms": ("" if one.verdict is None else one.verdict.name, printed[period])
+        panel_name(period): ("" if one.verdict is None else one.verdict.name, printed[period])
         for period, one in zip(periods, found, strict=True)
     }
 

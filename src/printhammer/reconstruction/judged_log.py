@@ -23,7 +23,7 @@ def key_of(constants: Mapping[str, float]) -> Key:
     return tuple(sorted(constants.items()))
 
 
-def read_judged(path: Path) -> list[dict[str, Any]]:
+def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
     """Return the candidates of a log in the order of their first lines; none where there is no file.
 
     A candidate that was judged again comes once, with all verdicts on it, the last of each claim. A last line
@@ -33,6 +33,8 @@ def read_judged(path: Path) -> list[dict[str, Any]]:
     ----------
     path : Path
         The log.
+    some : bool, optional
+        Whether there must be some.
 
     Returns
     -------
@@ -42,13 +44,15 @@ def read_judged(path: Path) -> list[dict[str, Any]]:
     Raises
     ------
     InputError
-        The file cannot be read, or is no such log.
+        The file cannot be read, is no such log, or has no candidates where there must be some.
     """
     found: dict[Key, dict[str, Any]] = {}
     for number, line in enumerate(_read(path)[0].split("\n")[:-1], 1):
         row = _row(line, f"{path}, line {number}")
         key = key_of(row["constants"])
         found[key] = joined(found.get(key), row)
+    if some and not found:
+        raise InputError(f"{path}: expected judged candidates, and there are none")
     return list(found.values())
 
 

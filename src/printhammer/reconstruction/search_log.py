@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.constants import shown
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -14,6 +15,45 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from printhammer.segments import FloatArray
+
+_HEADING: Final = {"aim", "seed"}
+_CANDIDATE: Final = {"point", "total", "constants"}
+
+
+def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return the heading and the candidates of the log of a search.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no such log.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")[:-1]
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8"
+        raise InputError(f"{path}: the log cannot be read ({reason})") from None
+    rows = []
+    for number, line in enumerate(lines, 1):
+        try:
+            row = json.loads(line)
+        except ValueError:
+            row = None
+        wanted = _HEADING if number == 1 else _CANDIDATE
+        if not isinstance(row, dict) or not wanted <= set(row):
+            what = "the heading" if number == 1 else "a candidate"
+            raise InputError(
+                f"{path}, line {number}: expected {what} of the log of a search, not {line[:40]!r}"
+            )
+        rows.append(row)
+    if not rows:
+        raise InputError(f"{path}: expected the log of a search, and there is nothing")
+    aim, seed = rows[0]["aim"], rows[0]["seed"]
+    if aim not in ("stated", "all"):
+        raise InputError(f"{path}, line 1: aim = {shown(aim)}, expected stated or all")
+    if isinstance(seed, bool) or not isinstance(seed, int):
+        raise InputError(f"{path}, line 1: seed = {shown(seed)}, expected a whole number")
+    return rows[0], rows[1:]
 
 
 class Log:

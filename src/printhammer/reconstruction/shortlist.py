@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.claims import claims
-from printhammer.errors import InputError
 from printhammer.reconstruction.judged import FIGURE_11, STATED, row_of
 from printhammer.reconstruction.judged_log import append, joined, key_of, mend, read_judged
+from printhammer.reconstruction.search_log import read_search
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
+
+__all__ = ["judge_candidates", "read_search", "rounded", "shortlist", "standing"]
 
 APART: Final = 0.01
 """Least distance of two candidates of a shortlist in one variable, in shares of its range."""
@@ -24,39 +25,6 @@ DIGITS: Final = 6
 """Digits of the constants that are judged and shipped."""
 
 _TOGETHER: Final = 8
-_HEADING: Final = {"aim", "seed"}
-_CANDIDATE: Final = {"point", "total", "constants"}
-
-
-def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return the heading and the candidates of the log of a search.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or is no such log.
-    """
-    try:
-        lines = path.read_text(encoding="utf-8").split("\n")[:-1]
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8"
-        raise InputError(f"{path}: the log cannot be read ({reason})") from None
-    rows = []
-    for number, line in enumerate(lines, 1):
-        try:
-            row = json.loads(line)
-        except ValueError:
-            row = None
-        wanted = _HEADING if number == 1 else _CANDIDATE
-        if not isinstance(row, dict) or not wanted <= set(row):
-            what = "the heading" if number == 1 else "a candidate"
-            raise InputError(
-                f"{path}, line {number}: expected {what} of the log of a search, not {line[:40]!r}"
-            )
-        rows.append(row)
-    if not rows:
-        raise InputError(f"{path}: expected the log of a search, and there is nothing")
-    return rows[0], rows[1:]
 
 
 def shortlist(rows: Sequence[dict[str, Any]], count: int, apart: float = APART) -> list[dict[str, Any]]:
