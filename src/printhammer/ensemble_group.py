@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.kernel import carry, lane_layout
 from printhammer.kernel.layout import MAGNET, PLACES
-from printhammer.problem import MAX_STEPS, Problem
+from printhammer.problem import MAX_STEPS, Problem, scales_of
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
@@ -84,21 +85,30 @@ class Group:
         tables: list[FloatArray] = []
         self.hammer_of = np.zeros(len(members), np.int64)
         self.waveform_of = np.zeros(len(members), np.int64)
+        forms_of: dict[int, tuple[int, float]] = {}
+        typical: dict[tuple[Any, ...], float] = {}
         for i, (hammer, drive) in enumerate(zip(hammers, drives, strict=True)):
-            pieces = np.asarray(drive.kernel_arrays()[1], dtype=np.float64)
+            if id(drive) not in forms_of:
+                pieces = np.asarray(drive.kernel_arrays()[1], dtype=np.float64)
+                form = pieces.tobytes()
+                if form not in waves:
+                    waves[form] = len(tables)
+                    tables.append(pieces)
+                forms_of[id(drive)] = waves[form], drive.waveform.peak
+            self.waveform_of[i], peak = forms_of[id(drive)]
             x, v = float(states[i, 1]), float(states[i, 2])
-            key: tuple[Any, ...] = (id(hammer), drive.waveform.peak, drive.quantity, v)
-            if hammer.position is None or hammer.front is None:
-                key = (*key, x, drive.period)
+            key: tuple[Any, ...] = (id(hammer), peak, drive.quantity)
+            if key not in typical:
+                free = hammer.position is None or hammer.front is None
+                typical[key] = math.nan if free else scales_of(hammer, drive, (x, 0.0))[1]
+            # Only what is faster than the typical speed has scales of its own.
+            key = (
+                (*key, x, v, drive.period) if math.isnan(typical[key]) else (*key, max(abs(v), typical[key]))
+            )
             if key not in rows:
                 rows[key] = len(problems)
                 problems.append(Problem(hammer, drive, (x, v), 0.0, tolerance))
             self.hammer_of[i] = rows[key]
-            form = pieces.tobytes()
-            if form not in waves:
-                waves[form] = len(tables)
-                tables.append(pieces)
-            self.waveform_of[i] = waves[form]
         firings = [np.asarray(drive.times, dtype=np.float64) for drive in drives]
         self.replace = bool(drives[0].kernel_arrays()[2])
         self.kernel: Kernel = problems[0].kernel
