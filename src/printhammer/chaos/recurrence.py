@@ -134,8 +134,8 @@ def recurrence(
         difference of a component.
     rate : float, optional
         Instead: the recurrence rate to have, from which the threshold follows; 0.05 where neither is given.
-        Where many distances are equal, the rate comes out larger; so it does for points of a strobe that agree
-        as closely as its verdict asks for, 1e-6.
+        Where many distances are equal, the rate comes out larger; so it does for
+        strobe points that agree as closely as a verdict asks for.
     scales : array, optional
         By which the components are divided; by default the half-widths of the window of a strobe, and 1 for
         other states.

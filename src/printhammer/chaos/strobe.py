@@ -266,7 +266,7 @@ def strobes(
     InputError
         As for `strobe`, or numbers of hammers, periods and states that do not fit together.
     """
-    count, skipped = read_count(points, "points"), _transient(transient)
+    count, skipped = read_count(points, "points"), transient_of(transient)
     part = read_number(phase, "1", "phase")
     if not 0.0 <= part < 1.0:
         raise InputError(f"phase = {phase!r}, expected a part of the period from 0 up to but not including 1")
@@ -324,7 +324,14 @@ def strobes(
     ]
 
 
-def _transient(transient: SupportsIndex) -> int:
+def transient_of(transient: SupportsIndex) -> int:
+    """Read a number of firings to leave out.
+
+    Raises
+    ------
+    InputError
+        It is none.
+    """
     try:
         count = -1 if isinstance(transient, bool) else operator.index(transient)
     except TypeError:
