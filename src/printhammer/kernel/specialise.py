@@ -45,7 +45,7 @@ TEMPLATES = (
 )
 """Template modules in the order in which they use one another."""
 
-ENTRIES = ("run", "resample", "quadratures", "peaks", "members", "tangent", "lanes")
+ENTRIES = ("run", "resample", "quadratures", "peaks", "members", "tangent", "lanes", "sensitivity")
 """Names of the entry points."""
 
 _PLAIN = ("modes", "layout", "carry", "hermite", "compiling", "dop853_tableau", "nystrom8_tableau")

@@ -1,0 +1,52 @@
+"""The kernel for sensitivities: templates of its own, bound to the laws of a plain kernel.
+
+Apart from the plain kernel, so that runs which do not ask for sensitivities compile nothing for them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.specialise import Kernel, execute, one_at_a_time
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+TEMPLATES = ("influence", "sensitivity")
+
+_made: dict[str, Kernel] = {}
+
+
+def with_sensitivity(plain: Kernel) -> Kernel:
+    """Return the kernel whose entry point `sensitivity` goes by the laws of a plain one.
+
+    See :mod:`printhammer.kernel.sensitivity`.
+    """
+    with one_at_a_time:
+        if plain.digest not in _made:
+            _made[plain.digest] = build(plain)
+        return _made[plain.digest]
+
+
+def build(plain: Kernel) -> Kernel:
+    """Execute the templates for `plain`, whether they were before or not."""
+    here = Path(__file__).parent
+    sources = hashlib.sha256(plain.digest.encode())
+    for name in TEMPLATES:
+        sources.update((here / f"{name}.py").read_bytes())
+    digest = sources.hexdigest()[:16]
+    namespace: dict[str, Any] = {**plain.namespace, "DIGEST": digest}
+    modules: dict[str, ModuleType] = {}
+    for name in TEMPLATES:
+        module = execute(here / f"{name}.py", f"printhammer.kernel.{name}_{digest}", namespace)
+        modules[name] = module
+        namespace.update(
+            {
+                key: value
+                for key, value in vars(module).items()
+                if hasattr(value, "py_func") or getattr(value, "__module__", "") == module.__name__
+            }
+        )
+    return Kernel(modules, f"sensitivities of {plain.label}", namespace, digest)
