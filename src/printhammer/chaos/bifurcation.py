@@ -7,32 +7,17 @@ where it does at every second one, and many for a strange one.
 
 from __future__ import annotations
 
-import itertools
-import math
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
 
-from printhammer.chaos.bifurcation_carry import Table, carry, strands_of
-from printhammer.chaos.bifurcation_columns import (
-    FROM_REST,
-    NOT_RUN,
-    OK,
-    blank_columns,
-    cycles_of,
-    orbit_distance,
-    put,
-    run_columns,
-    scales_of_columns,
-    usable,
-)
+from printhammer.chaos.bifurcation_columns import FROM_REST
+from printhammer.chaos.bifurcation_work import Work
 from printhammer.chaos.regime import PERIOD, RATE, Regime
 from printhammer.chaos.strobe_map import check_phase
-from printhammer.chaos.train import Train, exponents_of
 from printhammer.chaos.verdict import SIGNIFICANT
-from printhammer.drive import PulseTrain
 from printhammer.drive_input import read_count
 from printhammer.ensemble import DISPLAY_TOLERANCE
 from printhammer.errors import InputError
@@ -40,12 +25,9 @@ from printhammer.problem import check_tolerance
 from printhammer.start import initial_state
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.chaos.bifurcation_columns import State
     from printhammer.chaos.bifurcation_windows import Route, Window
     from printhammer.drive import Drive
     from printhammer.drive_base import Overlap
@@ -65,9 +47,6 @@ REFINE: Final = 2
 
 MOST_STATES: Final = 100_000_000
 """Number of states above which a diagram is refused."""
-
-JUMP: Final = 0.2
-"""Distance of the orbits of neighbours with the same period, in half-widths of the window, that is refined."""
 
 Direction = Literal["from rest", "up", "down", "both"]
 DIRECTIONS: Final = get_args(Direction)
@@ -159,7 +138,7 @@ class Bifurcation:
         return names
 
     def windows(self, direction: str | None = None) -> list[Window]:
-        """Return the intervals of the parameter with one verdict; see `printhammer.chaos.bifurcation_windows`."""
+        """Return the intervals of the parameter with one verdict, of one direction."""
         from printhammer.chaos.bifurcation_windows import windows_of
 
         return windows_of(self, direction)
@@ -171,7 +150,7 @@ class Bifurcation:
         return routes_of(self, direction)
 
     def to_dataset(self) -> xr.Dataset:
-        """Return the diagram as a Dataset over `direction`, `column` and `firing`, with units and provenance."""
+        """Return the diagram as a Dataset over `direction`, `column` and `firing`."""
         from printhammer.chaos.bifurcation_tables import bifurcation_dataset
 
         return bifurcation_dataset(self)
@@ -274,7 +253,7 @@ def bifurcation(
     begin = FROM_REST
     if state is not None:
         begin = (*initial_state(hammer, state), -1.0, 0.0)
-    work = _Work(regime, name, ways, (count, skipped, part, tolerance), begin, threads, progress)
+    work = Work(regime, name, ways, (count, skipped, part, tolerance), begin, threads, progress)
     try:
         work.base(grid)
         for level in range(1, halvings + 1):
@@ -282,211 +261,35 @@ def bifurcation(
         if exponents:
             work.measure()
     except KeyboardInterrupt:
-        raise InterruptedDiagram(work.result()) from None
-    return work.result()
+        raise InterruptedDiagram(_result(work)) from None
+    return _result(work)
 
 
-class _Work:
-    """A diagram under way. Trains are numbered as they come: those of all directions at one value in a row."""
-
-    def __init__(
-        self,
-        regime: Regime,
-        name: str,
-        ways: tuple[str, ...],
-        counts: tuple[int, int, float, float],
-        begin: State,
-        threads: int | None,
-        progress: Progress | None,
-    ) -> None:
-        self.regime, self.name, self.ways, self.counts, self.begin = regime, name, ways, counts, begin
-        self.threads, self.progress = threads, progress
-        self.points = counts[0] - counts[1]
-        self.values = np.zeros(0)
-        self.levels = np.zeros(0, np.int64)
-        none = np.zeros(0)
-        self.table = Table(
-            [], blank_columns(0, self.points), np.zeros(0, np.int64), none, np.zeros((0, 3))
-        )
-        self.exponents, self.errors = none.copy(), none.copy()
-        self.done = 0
-        self.known = 0
-
-    def add(self, values: FloatArray, level: int) -> list[int]:
-        """Make room for trains at new values; return the places of the values."""
-        first = len(self.values)
-        regimes = [self.regime.with_(self.name, value) for value in values.tolist()]
-        every = [regime for regime in regimes for _way in self.ways]
-        table = self.table
-        longer = blank_columns(len(table.regimes) + len(every), self.points)
-        put(longer, np.arange(len(table.regimes)), table.columns)
-        scales = np.repeat(scales_of_columns(regimes), len(self.ways), axis=0)
-        nothing = np.full(len(every), np.nan)
-        self.table = Table(
-            [*table.regimes, *every],
-            longer,
-            np.concatenate([table.cycles, np.zeros(len(every), np.int64)]),
-            np.concatenate([table.distances, nothing]),
-            np.concatenate([table.scales, scales]),
-            table.carried,
-        )
-        self.exponents = np.concatenate([self.exponents, nothing])
-        self.errors = np.concatenate([self.errors, nothing])
-        self.values = np.concatenate([self.values, values])
-        self.levels = np.concatenate([self.levels, np.full(len(values), level)])
-        self.known += len(every)
-        return list(range(first, len(self.values)))
-
-    def rows(self, places: Sequence[int], way: int) -> list[int]:
-        """Return the rows of the trains at some values in one direction."""
-        return [len(self.ways) * place + way for place in places]
-
-    def base(self, grid: FloatArray) -> None:
-        """Run the trains at the values that were given."""
-        places = self.add(grid, 0)
-        if self.ways == ("from rest",):
-            self.run(places, np.array([usable(self.table.regimes[row], self.begin) for row in places]))
-            return
-        strands = []
-        for way, name in enumerate(self.ways):
-            order = places if name == "up" else places[::-1]
-            strands += strands_of(self.rows(order, way), len(strands))
-        carry(self.table, strands, self.begin, self.run, self.trial)
-
-    def refine(self, level: int) -> None:
-        """Run trains between neighbours that differ, carrying the state from that neighbour which comes before."""
-        order = np.argsort(self.values, kind="stable").tolist()
-        pairs = [pair for pair in itertools.pairwise(order) if self.differ(*pair)]
-        middles = np.array([0.5 * (self.values[one] + self.values[other]) for one, other in pairs])
-        new = [
-            k
-            for k, (one, other) in enumerate(pairs)
-            if self.values[one] < middles[k] < self.values[other]
-        ]
-        if not new:
-            return
-        places = self.add(middles[new], level)
-        rows: list[int] = []
-        states: list[State] = []
-        for way, name in enumerate(self.ways):
-            for place, k in zip(places, new, strict=True):
-                (row,) = self.rows([place], way)
-                begin = self.begin
-                if name != "from rest":
-                    (before,) = self.rows([pairs[k][0 if name == "up" else 1]], way)
-                    x, v, branch, memory = self.table.columns.last[before].tolist()
-                    begin = (x, v, branch, memory)
-                rows.append(row)
-                states.append(usable(self.table.regimes[row], begin))
-        self.run(rows, np.array(states))
-
-    def differ(self, one: int, other: int) -> bool:
-        """Tell whether the trains at two values differ in a direction: in period, or by a jump of the orbit."""
-        table = self.table
-        for way in range(len(self.ways)):
-            a, b = self.rows([one, other], way)
-            q = int(table.cycles[a])
-            if q != table.cycles[b] or table.columns.status[a] != table.columns.status[b]:
-                return True
-            if q:
-                orbits = [
-                    np.column_stack([table.columns.x[row, -q:], table.columns.v[row, -q:]])
-                    / table.scales[row, :2]
-                    for row in (a, b)
-                ]
-                if orbit_distance(*orbits) > JUMP:
-                    return True
-        return False
-
-    def trial(self, rows: Sequence[int], states: FloatArray) -> tuple[Any, Any, Any]:
-        """Run trains from states; return their states, periods and distances."""
-        regimes = [self.table.regimes[row] for row in rows]
-        begin = self.done
-
-        def tell(part: int, _all: int) -> None:
-            self.tell(begin + part)
-
-        found = run_columns(regimes, states, *self.counts, threads=self.threads, progress=tell)
-        fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
-        cycles, distances = cycles_of(found, fronts, self.table.scales[list(rows)])
-        return found, cycles, distances
-
-    def run(self, rows: Sequence[int], states: FloatArray) -> None:
-        """Run trains from states and keep what is found."""
-        found, cycles, distances = self.trial(rows, states)
-        put(self.table.columns, rows, found)
-        self.table.cycles[list(rows)] = cycles
-        self.table.distances[list(rows)] = distances
-        self.done += len(rows)
-
-    def tell(self, done: int) -> None:
-        """Tell how many trains are done; those that are run again to close joints do not count."""
-        if self.progress is not None:
-            self.progress(min(done, self.known), self.known)
-
-    def measure(self) -> None:
-        """Compute the exponents of the trains without a period, over as many firings as there are points."""
-        columns, table = self.table.columns, self.table
-        rows = [
-            row
-            for row, regime in enumerate(table.regimes)
-            if columns.status[row] == OK
-            and table.cycles[row] == 0
-            and not (regime.hammer.front is not None and columns.x[row, 0] > regime.hammer.front)
-        ]
-        window = (_BEFORE + 1, _BEFORE + self.points)
-        trains = []
-        for row in rows:
-            regime = table.regimes[row]
-            drive = regime.drive or PulseTrain(
-                regime.fired, period=regime.period, pulses=window[1] + 2, overlap=regime.overlap
-            )
-            begin = (float(columns.last[row, 0]), float(columns.last[row, 1]))
-            if columns.last[row, 2] >= 0.0 or math.isnan(begin[0]):
-                continue
-            trains.append((row, Train(regime.hammer, drive, regime.period, begin)))
-        self.known += len(trains)
-        begun = self.done
-        found = exponents_of(
-            [train for _row, train in trains],
-            window,
-            self.counts[3],
-            threads=self.threads,
-            progress=lambda done, _all: self.tell(begun + done),
-        )
-        for (row, _train), exponent in zip(trains, found, strict=True):
-            if exponent.ok and exponent.smooth:
-                self.exponents[row], self.errors[row] = exponent.value, exponent.standard_error
-        self.done += len(trains)
-
-    def result(self) -> Bifurcation:
-        """Return the diagram as far as it is."""
-        order = np.argsort(self.values, kind="stable")
-        rows = (len(self.ways) * order + np.arange(len(self.ways))[:, np.newaxis]).astype(np.int64)
-        table = self.table
-        return Bifurcation(
-            regime=self.regime,
-            parameter=self.name,
-            values=self.values[order],
-            directions=self.ways,
-            firing=np.arange(self.counts[1] + 1, self.counts[0] + 1),
-            phase=self.counts[2],
-            x=table.columns.x[rows],
-            v=table.columns.v[rows],
-            branch=table.columns.branch[rows],
-            status=table.columns.status[rows],
-            cycles=table.cycles[rows],
-            distances=table.distances[rows],
-            exponents=self.exponents[rows],
-            standard_errors=self.errors[rows],
-            levels=self.levels[order],
-            carried=table.carried,
-            tolerance=self.counts[3],
-        )
-
-
-_BEFORE: Final = 100
-"""Firings before an exponent counts."""
+def _result(work: Work) -> Bifurcation:
+    """Return the diagram as far as it is."""
+    order = np.argsort(work.values, kind="stable")
+    rows = (len(work.ways) * order + np.arange(len(work.ways))[:, np.newaxis]).astype(np.int64)
+    table = work.table
+    firings, transient, phase, tolerance = work.counts
+    return Bifurcation(
+        regime=work.regime,
+        parameter=work.name,
+        values=work.values[order],
+        directions=work.ways,
+        firing=np.arange(transient + 1, firings + 1),
+        phase=phase,
+        x=table.columns.x[rows],
+        v=table.columns.v[rows],
+        branch=table.columns.branch[rows],
+        status=table.columns.status[rows],
+        cycles=table.cycles[rows],
+        distances=table.distances[rows],
+        exponents=work.exponents[rows],
+        standard_errors=work.errors[rows],
+        levels=work.levels[order],
+        carried=table.carried,
+        tolerance=tolerance,
+    )
 
 
 def _parameter(

@@ -3,9 +3,9 @@
 Strictly, each train begins where the one before it ended, so that they cannot be run side by side. Here the
 values are cut into strands of `STRAND` successive values. Every strand is begun from rest, and within it the
 state is carried; all strands run side by side. Then the joints are closed: the first train of a strand is run
-again from the state at which the strand before it ended. Where it comes to the same attractor, the rest of the
-strand stands as it is; where it does not, it replaces what was there, and the state is carried on from it,
-until the same attractor is met or the strand ends, in which case the next joint is closed anew.
+again from the state at which the strand before it ended. Where it comes to the same attractor, the rest of
+the strand stands as it is; where it does not, it replaces what was there, and the state is carried on from
+it, until the same attractor is met or the strand ends, in which case the next joint is closed anew.
 
 So every train lies on the attractor to which a strict carrying leads, up to what an attractor is known by
 (`same_attractor`). The strands depend on the values alone, and so does the result: not on threads or chunks.
@@ -35,6 +35,7 @@ SAME: Final = 1e-3
 
 _SHIFTED: Final = 0.5
 """Difference of the means of two clouds, in their standard deviations, up to which they count as the same."""
+
 
 @dataclass
 class Strand:
@@ -79,7 +80,7 @@ class Table:
 
 
 def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
-    """Cut trains, in the order in which the state is carried, into strands; `first` is the number of the first."""
+    """Cut trains, in the order in which the state is carried, into strands numbered from `first` on."""
     cut = [list(rows[k : k + STRAND]) for k in range(0, len(rows), STRAND)]
     return [Strand(part, first + k - 1 if k else None) for k, part in enumerate(cut)]
 
@@ -162,7 +163,7 @@ def same_attractor(table: Table, row: int, columns: Columns, place: int, cycle: 
     must have ended the same way.
     """
     was = table.columns
-    if OK != columns.status[place] or OK != was.status[row]:
+    if columns.status[place] != OK or was.status[row] != OK:
         return bool(columns.status[place] == was.status[row])
     if cycle != table.cycles[row]:
         return False

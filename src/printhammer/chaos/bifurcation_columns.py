@@ -1,4 +1,4 @@
-"""Columns of a bifurcation diagram: many trains at once, their states at successive firings, and their periods."""
+"""Columns of a bifurcation diagram: the states of many trains at successive firings, and their periods."""
 
 from __future__ import annotations
 
@@ -262,7 +262,9 @@ def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
     return np.array(rows)
 
 
-def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def cycles_of(
+    columns: Columns, fronts: FloatArray, scales: FloatArray
+) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """Return the periods of trains, in firings, by the rule of `printhammer.chaos.verdict`.
 
     Parameters
