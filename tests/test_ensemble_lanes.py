@@ -11,6 +11,7 @@ from tests.hammers import STOP, STROKE, made_of
 import printhammer as ph
 from printhammer.ensemble import Ensemble, EnsembleResult
 from printhammer.kernel.lane_layout import LANES
+from printhammer.waveforms import Rectangle
 
 APART = 2e-8
 """Of the stroke: what two runs may differ by of which each may be off by 1e-8."""
@@ -152,6 +153,31 @@ def test_a_range_left(hammer: ph.Hammer) -> None:
     agree(mine, plain)
     assert mine.status_names[0] == "ok"
     assert "range left" in mine.status_names
+
+
+def test_a_member_that_settles_in_the_pack_leaves_the_lanes(hammer: ph.Hammer) -> None:
+    """A spring so strong that it holds the armature in the pack: its last swings never end in the lanes."""
+    strong = hammer.replace(
+        {
+            "mass": 4e-4,
+            "magnet.F0": 4.8783,
+            "magnet.Am": 0.802136,
+            "magnet.Bm": 0.0774851,
+            "spring.Bs": 75.1243,
+            "spring.As": 953.918e-6,
+            "pack.stiffness": 222.0,
+            "backstop.stiffness": 1.16477e10,
+            "backstop.damping": 1.83346e9,
+        }
+    )
+    pulse = Rectangle(amplitude=1.0, width=125.055e-6, rise=40.2539e-6, decay=7.87302e-6)
+    ensemble = Ensemble(strong, ph.PulseTrain(pulse), 1.2e-3, tolerance=2e-10)
+    mine, plain = both(ensemble, strobes=[[1.2e-3]])
+    agree(mine, plain)
+    assert mine.strobes is not None
+    assert mine.strobes.x[0, 0] > strong.constants["pack.front"].si
+    assert abs(mine.strobes.v[0, 0]) < 1e-6
+    np.testing.assert_array_equal(mine.steps, plain.steps)
 
 
 def test_auto_takes_lanes_where_they_are_allowed(hammer: ph.Hammer) -> None:
