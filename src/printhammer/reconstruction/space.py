@@ -1,8 +1,8 @@
 """The space in which the 1983 hammer is sought: ten numbers that decide on its motion.
 
 Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm. Both
-scales are set by what the paper prints of such hammers, "about five pounds per dot", and by the middle of the
-currents of its Fig. 2; the stiffness of the pack follows from the first. The mass follows from the stroke.
+scales are set by what the paper prints of such hammers, "about five pounds per dot", and by the currents of
+its Fig. 2; the stiffness of the pack follows from the first. The mass follows from the stroke.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ PRINT_FORCE: Final = to_si(5.0, "lbf", "N")
 """Force of the single-pulse dot that sets the scale of mass and forces, N (introduction of the paper)."""
 
 CURRENT: Final = 1.0
-"""Largest current of a pulse that sets the scale of Bm, A: the middle of the range of Fig. 2."""
+"""Largest current of a pulse, which sets the scale of Bm, A: the middle of the range of Fig. 2."""
+
+BEYOND: Final = 1.1
+"""By which factor the current that would undo the magnet's field is at least beyond the range of Fig. 2."""
 
 LOADING_EXPONENT: Final = 2.7
 """Exponent of the loading branch of the pack, equation (5)."""
@@ -74,16 +77,16 @@ class Variable:
 
 
 VARIABLES: Final = (
-    Variable("pull", 1.5e4, 3e5, True, "m/s^2", "force of the magnet at the backstop over the mass"),
+    Variable("pull", 7e3, 3e5, True, "m/s^2", "force of the magnet at the backstop over the mass"),
     Variable("bias", 0.0, 0.4, False, "", "F0 over Am^2 / sqrt(b)"),
     Variable("margin", 0.05, 0.8, False, "", "net force over magnet force at the backstop, no current"),
     Variable("reach", 150e-6, 2000e-6, True, "m", "As: way from the backstop to where the spring is slack"),
-    Variable("release", 0.03, 0.45, True, "", "share of the field that the largest current takes away"),
+    Variable("release", 0.03, 0.9, True, "", "share of the field that the largest current takes away"),
     Variable("width", 120e-6, 500e-6, True, "s", "width of the current pulse"),
-    Variable("rise", 3e-6, 400e-6, True, "s", "time constant of its rise"),
+    Variable("rise", 3e-6, 1e-3, True, "s", "time constant of its rise"),
     Variable("decay", 3e-6, 80e-6, True, "s", "time constant of its decay"),
     Variable("depth", 0.2e-6, 10e-6, True, "m", "compression of the backstop at rest"),
-    Variable("damping", 0.05, 2.0, True, "s/m", "l / k of the backstop"),
+    Variable("damping", 0.05, 5.0, True, "s/m", "l / k of the backstop"),
 )
 """What is varied; ranges are those of hammers of this kind and size, generously."""
 
@@ -133,6 +136,7 @@ def constants_at(values: Mapping[str, float], mass: float, stiffness: float) -> 
         Of the pack, N.
     """
     b = geometry()["b"]
+    current = max(CURRENT, values["release"] * BEYOND * largest_current())
     magnet_force = values["pull"] * mass
     field = magnet_force * math.sqrt(b) / (1.0 - values["bias"])
     strength = math.sqrt(field)
@@ -141,13 +145,13 @@ def constants_at(values: Mapping[str, float], mass: float, stiffness: float) -> 
         "mass": mass,
         "magnet.F0": values["bias"] * field / math.sqrt(b),
         "magnet.Am": strength,
-        "magnet.Bm": values["release"] * strength / CURRENT,
+        "magnet.Bm": values["release"] * strength / current,
         "spring.Bs": (1.0 - values["margin"]) * magnet_force,
         "spring.As": values["reach"],
         "pack.stiffness": stiffness,
         "backstop.stiffness": stiff,
         "backstop.damping": values["damping"] * stiff,
-        "waveform.amplitude": CURRENT / _reached(values["width"], values["rise"]),
+        "waveform.amplitude": current / _reached(values["width"], values["rise"]),
         "waveform.width": values["width"],
         "waveform.rise": values["rise"],
         "waveform.decay": values["decay"],
@@ -174,6 +178,11 @@ def values_of(constants: Mapping[str, float]) -> dict[str, float]:
         "depth": (net / constants["backstop.stiffness"]) ** (2.0 / 3.0),
         "damping": constants["backstop.damping"] / constants["backstop.stiffness"],
     }
+
+
+def largest_current() -> float:
+    """Return the largest current of Fig. 2, A."""
+    return float(claims()["current_range"].band["largest_current_A"]["at_most"])
 
 
 def printing_stiffness() -> float:
