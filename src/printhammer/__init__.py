@@ -12,7 +12,12 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from printhammer.chaos.impact_train import impact_train
+    from printhammer.chaos.lyapunov import lyapunov
+    from printhammer.chaos.recurrence import recurrence
+    from printhammer.chaos.sections import section
     from printhammer.chaos.strobe import strobe
+    from printhammer.chaos.zero_one import zero_one
     from printhammer.drive import Burst, PulseTrain, SineForce
     from printhammer.ensemble import Ensemble, EnsembleResult
     from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
@@ -44,13 +49,18 @@ __all__ = [
     "fit",
     "frequency_map",
     "holding_margin",
+    "impact_train",
     "load",
+    "lyapunov",
     "measure",
+    "recurrence",
     "release_current",
     "rest_state",
+    "section",
     "simulate",
     "strobe",
     "sweep",
+    "zero_one",
 ]
 
 _HOME = {
@@ -68,13 +78,18 @@ _HOME = {
     "fit": "identify.fitting",
     "frequency_map": "maps",
     "holding_margin": "equilibrium",
+    "impact_train": "chaos.impact_train",
     "load": "hammer",
+    "lyapunov": "chaos.lyapunov",
     "measure": "identify.laboratory",
+    "recurrence": "chaos.recurrence",
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
+    "section": "chaos.sections",
     "simulate": "simulate",
     "strobe": "chaos.strobe",
     "sweep": "sweep",
+    "zero_one": "chaos.zero_one",
 }
 
 

@@ -1,6 +1,30 @@
 """Chaos: strobe points of trains, and what kind of motion they tell of."""
 
+from printhammer.chaos.impact_train import ImpactTrain, impact_train
+from printhammer.chaos.lyapunov import Lyapunov, lyapunov
+from printhammer.chaos.lyapunov_chart import LyapunovChart, lyapunovs
+from printhammer.chaos.recurrence import Recurrence, recurrence
+from printhammer.chaos.sections import Section, section, sections
 from printhammer.chaos.strobe import Strobe, strobe, strobes
 from printhammer.chaos.verdict import Verdict
+from printhammer.chaos.zero_one import ZeroOne, zero_one
 
-__all__ = ["Strobe", "Verdict", "strobe", "strobes"]
+__all__ = [
+    "ImpactTrain",
+    "Lyapunov",
+    "LyapunovChart",
+    "Recurrence",
+    "Section",
+    "Strobe",
+    "Verdict",
+    "ZeroOne",
+    "impact_train",
+    "lyapunov",
+    "lyapunovs",
+    "recurrence",
+    "section",
+    "sections",
+    "strobe",
+    "strobes",
+    "zero_one",
+]
