@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.lyapunov import lyapunov
     from printhammer.chaos.recurrence import recurrence
     from printhammer.chaos.sections import section
+    from printhammer.chaos.sensitivity import sensitivities
     from printhammer.chaos.strobe import strobe
     from printhammer.chaos.zero_one import zero_one
     from printhammer.drive import Burst, PulseTrain, SineForce
@@ -57,6 +58,7 @@ __all__ = [
     "release_current",
     "rest_state",
     "section",
+    "sensitivities",
     "simulate",
     "strobe",
     "sweep",
@@ -85,6 +87,7 @@ _HOME = {
     "recurrence": "chaos.recurrence",
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
+    "sensitivities": "chaos.sensitivity",
     "section": "chaos.sections",
     "simulate": "simulate",
     "strobe": "chaos.strobe",

@@ -5,6 +5,7 @@ from printhammer.chaos.lyapunov import Lyapunov, lyapunov
 from printhammer.chaos.lyapunov_chart import LyapunovChart, lyapunovs
 from printhammer.chaos.recurrence import Recurrence, recurrence
 from printhammer.chaos.sections import Section, section, sections
+from printhammer.chaos.sensitivity import Sensitivities, Spread, sensitivities
 from printhammer.chaos.strobe import Strobe, strobe, strobes
 from printhammer.chaos.verdict import Verdict
 from printhammer.chaos.zero_one import ZeroOne, zero_one
@@ -15,6 +16,8 @@ __all__ = [
     "LyapunovChart",
     "Recurrence",
     "Section",
+    "Sensitivities",
+    "Spread",
     "Strobe",
     "Verdict",
     "ZeroOne",
@@ -24,6 +27,7 @@ __all__ = [
     "recurrence",
     "section",
     "sections",
+    "sensitivities",
     "strobe",
     "strobes",
     "zero_one",
