@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.kernel.influence import MIDDLE, ROWS, SPACING, VARIED, width
-from printhammer.kernel.modes import OK, RELOADING, RESTING, STATUS_NAMES, UNLOADING
+from printhammer.kernel.layout import BACKSTOP_PART, FRONT, PACK, POSITION
+from printhammer.kernel.modes import HELD_UNLOADING, LOADING, OK, RELOADING, RESTING, STATUS_NAMES, UNLOADING
 from printhammer.kernel.specialise_sensitivity import with_sensitivity
 from printhammer.parameters import as_arrays, parameters, rest_changes
 from printhammer.problem import TOLERANCE, Problem, check_tolerance
@@ -156,7 +158,7 @@ def constant_map(
     found = flow(problem, record, wanted, marks, np.zeros((3, len(wanted))))
     ok = record.status == OK
     scales = np.array([parameter.scale for parameter in wanted])
-    three = [code in (UNLOADING, RELOADING) for code in found.states[:, 2]]
+    three = [code in (UNLOADING, RELOADING, HELD_UNLOADING) for code in found.states[:, 2]]
     rows = 3 if three[1] else 2
     changes = found.changes[1, :rows] / scales if ok else np.full((2, len(wanted)), np.nan)
     rates = _rates(problem, record, marks, found.states) if ok else np.full((2, 3), np.nan)
@@ -275,6 +277,55 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
         for k, parameter in enumerate(wanted):
             found[1, k] = -push / problem.hammer.mass * float(parameter.firings[begun].sum())
     return found
+
+
+def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
+    """Return the changes [m] of the front of the pack and of the position of the backstop, by surface."""
+    moves = as_arrays(wanted)["hammer"]
+    return {"pack": moves[:, FRONT], "backstop": moves[:, POSITION]}
+
+
+def pack_push_changes(
+    problem: Problem, wanted: Sequence[Parameter], state: FloatArray, changes: FloatArray
+) -> FloatArray:
+    """Return the changes [N] of the push of the pack on the armature, shape (n,).
+
+    Parameters
+    ----------
+    problem : Problem
+        A hammer with a pack.
+    wanted : sequence of Parameter
+        The constants.
+    state : array, shape (4,)
+        Displacement, m, velocity, m/s, mode inside the pack, latest local maximum, m.
+    changes : array, shape (3 or more, n)
+        Changes of displacement, velocity and latest local maximum.
+    """
+    moves = as_arrays(wanted)["hammer"]
+    x, v, mode, peak = (float(number) for number in state)
+    found = np.zeros(len(wanted))
+    for k in range(len(wanted)):
+        dx, dv, dp = (float(number) for number in changes[:3, k])
+        # No point may leave the pack, and no depth may change much.
+        sink = max(abs(dx - moves[k, FRONT]), abs(dp - moves[k, FRONT]))
+        depth = x - problem.constants[FRONT]
+        share = SPACING * min(1.0, depth / sink if sink > 0.0 and depth > 0.0 else 1.0)
+        share *= min(1.0, problem.scales[1] / abs(dv) if dv else 1.0)
+        total = 0.0
+        for offset, weight in zip((-2, -1, 1, 2), (1.0, -8.0, 8.0, -1.0), strict=True):
+            e = offset * share
+            c = (problem.constants + e * moves[k])[PACK:BACKSTOP_PART]
+            total += weight * _push(problem, c, (x + e * dx, v + e * dv, mode, peak + e * dp))
+        found[k] = total / (12.0 * share)
+    return found
+
+
+def _push(problem: Problem, c: FloatArray, state: tuple[float, float, float, float]) -> float:
+    x, v, mode, peak = state
+    part: Any = import_module(problem.laws.pack)
+    if mode == LOADING or not getattr(part, "MEMORY", False):
+        return -float(part.pack_loading(c, x, v))
+    return -float(part.pack_unloading(c, x, v, part.pack_memory(c, peak)))
 
 
 def kernel_of(problem: Problem) -> Kernel:

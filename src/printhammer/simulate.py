@@ -83,7 +83,7 @@ def simulate(
     if scheme not in SCHEMES:
         raise InputError(f"scheme = {scheme!r}, expected one of {', '.join(SCHEMES)}")
     check_tolerance(tolerance)
-    end = _end(drive, duration)
+    end = end_of_run(drive, duration)
     start = initial_state(hammer, state)
     if scheme == "default":
         problem = Problem(hammer, drive, start, 0.0, tolerance)
@@ -106,7 +106,14 @@ def announce_compiling(callback: Callable[[str], None] | None) -> None:
     specialise.announce = callback
 
 
-def _end(drive: Drive, duration: float | str | None) -> float:
+def end_of_run(drive: Drive, duration: float | str | None) -> float:
+    """Return the end of a run, s: `duration`, or 4 ms after the last firing.
+
+    Raises
+    ------
+    InputError
+        Not a positive number or a time with a unit; none for a drive that does not end.
+    """
     if duration is None:
         if not math.isfinite(drive.end):
             raise InputError("duration is missing, and the drive does not end")

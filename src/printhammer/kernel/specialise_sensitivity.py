@@ -5,6 +5,7 @@ Apart from the plain kernel, so that runs which do not ask for sensitivities com
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
 
 TEMPLATES = ("influence", "sensitivity")
 
-_made: dict[str, Kernel] = {}
-
 
 def with_sensitivity(plain: Kernel) -> Kernel:
     """Return the kernel whose entry point `sensitivity` goes by the laws of a plain one.
@@ -25,13 +24,11 @@ def with_sensitivity(plain: Kernel) -> Kernel:
     See :mod:`printhammer.kernel.sensitivity`.
     """
     with one_at_a_time:
-        if plain.digest not in _made:
-            _made[plain.digest] = build(plain)
-        return _made[plain.digest]
+        return _built(plain)
 
 
-def build(plain: Kernel) -> Kernel:
-    """Execute the templates for `plain`, whether they were before or not."""
+@functools.cache
+def _built(plain: Kernel) -> Kernel:
     here = Path(__file__).parent
     sources = hashlib.sha256(plain.digest.encode())
     for name in TEMPLATES:

@@ -1,0 +1,282 @@
+"""How what each firing did changes with the constants: from the columns of constants at contacts and peaks.
+
+A touch is earlier or later by dt = -(dx - dg) / v, dx the change of the displacement at a fixed time and dg
+that of the surface; its speed changes by dv + a dt. Losses are integrals of power, whose changes the columns
+hold.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.constant_flow import Flow, flow, pack_push_changes, surface_moves
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.contacts import Contact
+    from printhammer.motion import Motion
+    from printhammer.parameters import Parameter
+    from printhammer.problem import Problem, Record
+    from printhammer.segments import FloatArray
+
+DOT_QUANTITIES: Final = {
+    "flight_time": ("s", "from firing to touch"),
+    "impact_speed": ("m/s", "speed at touch"),
+    "peak_force": ("N", "largest pack force"),
+    "indentation": ("m", "largest indentation"),
+    "contact_time": ("s", "from touch to leaving"),
+    "loading_work": ("J", "work done on the pack up to its largest indentation"),
+    "net_loss": ("J", "energy that the pack kept"),
+    "return_time": ("s", "from firing to the first touch of the backstop after the dot"),
+    "return_speed": ("m/s", "speed at that touch"),
+}
+"""Unit and meaning of what is told of each dot."""
+
+RUN_QUANTITIES: Final = {
+    "coil_work": ("J", "work of the coil"),
+    "drive_work": ("J", "work of a drive that is a force"),
+    "pack_loss": ("J", "energy that the pack took"),
+    "backstop_loss": ("J", "energy that the backstop took"),
+}
+"""Unit and meaning of what is told of the whole run."""
+
+_ENERGY: Final = 3
+_PACK_LOSS: Final = 5
+_SAMPLES: Final = 65
+_NEAR: Final = 1e-6
+
+
+@dataclass(frozen=True)
+class Struck:
+    """One dot that was struck: its contacts, by their rows, and the instants at which to look.
+
+    Attributes
+    ----------
+    index : int
+        Number of the firing.
+    touch : int
+        Row of the contact with the pack.
+    back : int or None
+        Row of the first touch of the backstop after it.
+    t_peak, t_force : float
+        Times of the largest indentation and of the largest force, s.
+    """
+
+    index: int
+    touch: int
+    back: int | None
+    t_peak: float
+    t_force: float
+
+
+def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck]:
+    """Find contacts and instants of all dots that were struck."""
+    found: list[Struck] = []
+    contacts = motion.contacts
+    for row in _touches(contacts):
+        contact = contacts[row]
+        t_peak = _peak_time(problem, record, contact)
+        t_force = _force_time(problem, record, contact, t_peak)
+        found.append(Struck(contact.firing or 0, row, _back(contacts, row), t_peak, t_force))
+    return found
+
+
+def dot_values(motion: Motion) -> FloatArray:
+    """Return the values of `DOT_QUANTITIES` for each firing, SI, shape (dots, q); NaN where not known."""
+    found = np.full((len(motion.dots), len(DOT_QUANTITIES)), np.nan)
+    names = list(DOT_QUANTITIES)
+    for dot in motion.dots:
+        for place, name in enumerate(names):
+            value = getattr(dot, name, None)
+            found[dot.index, place] = math.nan if value is None else value
+    for row in _touches(motion.contacts):
+        back, firing = _back(motion.contacts, row), motion.contacts[row].firing or 0
+        if back is not None:
+            contact = motion.contacts[back]
+            found[firing, names.index("return_time")] = contact.t_in - motion.dots[firing].fired_at
+            found[firing, names.index("return_speed")] = -contact.v_in
+    return found
+
+
+def _touches(contacts: Sequence[Contact]) -> list[int]:
+    """Return the rows of the contacts that make a dot."""
+    return [
+        row
+        for row, contact in enumerate(contacts)
+        if contact.surface == "pack" and not (contact.initial or contact.extra or contact.firing is None)
+    ]
+
+
+def _back(contacts: Sequence[Contact], row: int) -> int | None:
+    """Return the row of the backstop contact that follows a dot and its extra contacts, if one does."""
+    following = next((k for k in range(row + 1, len(contacts)) if not contacts[k].extra), None)
+    return following if following is not None and contacts[following].surface == "backstop" else None
+
+
+def _end(record: Record, contact: Contact) -> float:
+    return float(record.nodes[-1, 0]) if contact.t_out is None else contact.t_out
+
+
+def _peak_time(problem: Problem, record: Record, contact: Contact) -> float:
+    """Return the time of the largest indentation, s, where the velocity is zero to the last digits."""
+    t = contact.t_peak
+    for _ in range(3):
+        row = problem.resample(record, np.array([t]))[0]
+        a = _acceleration(problem, row)
+        if a == 0.0 or row[1] == 0.0:
+            break
+        t = min(max(t - row[1] / a, contact.t_in), _end(record, contact))
+    return t
+
+
+def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: float) -> float:
+    """Return the time of the largest force of the pack, s; one that jumps at touch may be largest there."""
+    from scipy.optimize import minimize_scalar
+
+    t_in, t_out = contact.t_in, _end(record, contact)
+    nodes = record.nodes[:, 0]
+    times = np.unique(
+        np.concatenate([np.linspace(t_in, t_out, _SAMPLES), nodes[(nodes >= t_in) & (nodes < t_out)]])
+    )
+    times = times[times < t_out]
+    best = int(np.argmin(problem.resample(record, times)[:, 5]))
+    if best == 0:
+        return t_in
+    low, high = float(times[best - 1]), float(times[min(best + 1, len(times) - 1)])
+    scale = t_out - t_in
+    found = minimize_scalar(
+        lambda s: float(problem.resample(record, np.array([t_in + s * scale]))[0, 5]),
+        bounds=((low - t_in) / scale, (high - t_in) / scale),
+        method="bounded",
+        options={"xatol": 1e-10},
+    )
+    t = t_in + float(found.x) * scale
+    # Without damping the force is largest where the indentation is, which is known better.
+    return t_peak if abs(t - t_peak) < _NEAR * scale else t
+
+
+def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
+    """Return the acceleration, m/s^2, of a row of `Problem.resample`, without some of its forces."""
+    forces = {k: float(row[k]) for k in range(3, 8) if k not in without}
+    drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
+    return (math.fsum(forces.values()) + drive) / problem.hammer.mass
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Changes with ``value / scale`` of each constant.
+
+    Attributes
+    ----------
+    dots : array, shape (dots, quantities, n)
+        Of `DOT_QUANTITIES`; NaN where a dot is lost or a quantity is not known.
+    run : array, shape (4, n)
+        Of `RUN_QUANTITIES`.
+    smooth : bool
+        Whether the motion is differentiable throughout.
+    """
+
+    dots: FloatArray
+    run: FloatArray
+    smooth: bool
+
+
+def changes_of(
+    motion: Motion, problem: Problem, record: Record, wanted: Sequence[Parameter], initial: FloatArray
+) -> Changes:
+    """Return the changes of all quantities of a run.
+
+    Parameters
+    ----------
+    motion, problem, record
+        The run.
+    wanted : sequence of Parameter
+        The constants.
+    initial : array, shape (3, n)
+        Changes of the state at time 0.
+    """
+    struck = struck_dots(motion, problem, record)
+    times = record.nodes[:, 0]
+    end = float(times[-1])
+    marks = np.unique([0.0, end, *(dot.t_peak for dot in struck), *(dot.t_force for dot in struck)])
+    nodes: set[int] = set()
+    for dot in struck:
+        nodes.add(int(record.contacts[dot.touch, 5]))
+        t_out = motion.contacts[dot.touch].t_out
+        if t_out is not None:
+            nodes.add(int(np.searchsorted(times, t_out, side="left")))
+        if dot.back is not None:
+            nodes.add(int(record.contacts[dot.back, 5]))
+    chosen = sorted(nodes)
+    found = flow(problem, record, wanted, marks, initial, chosen)
+    look = _Look(problem, record, wanted, found, marks, {node: row for row, node in enumerate(chosen)})
+    result = np.full((len(motion.dots), len(DOT_QUANTITIES), len(wanted)), np.nan)
+    for dot in struck:
+        told = look.dot(dot, motion.contacts)
+        for place, name in enumerate(DOT_QUANTITIES):
+            if name in told:
+                result[dot.index, place] = told[name]
+    return Changes(result, found.changes[-1, _ENERGY:], found.smooth)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What is needed to turn columns into changes of quantities."""
+
+    problem: Problem
+    record: Record
+    wanted: Sequence[Parameter]
+    found: Flow
+    marks: FloatArray
+    rows: dict[int, int]
+
+    def columns(self, t: float) -> tuple[FloatArray, FloatArray]:
+        """Return state and columns at a mark."""
+        row = int(np.searchsorted(self.marks, t))
+        return self.found.states[row], self.found.changes[row]
+
+    def later(self, columns: FloatArray, surface: str, v: float) -> FloatArray:
+        """Return by how much later a surface is passed, s."""
+        return np.asarray(-(columns[0] - surface_moves(self.wanted)[surface]) / v)
+
+    def dot(self, dot: Struck, contacts: Sequence[Contact]) -> dict[str, FloatArray]:
+        """Return the changes of what is known of a dot, by name."""
+        contact = contacts[dot.touch]
+        fired = np.array([parameter.firings[dot.index] for parameter in self.wanted])
+        touch = self.found.passed[self.rows[int(self.record.contacts[dot.touch, 5])], 0]
+        later = self.later(touch, "pack", contact.v_in)
+        row = self.problem.resample(self.record, np.array([contact.t_in]))[0]
+        told: dict[str, Any] = {
+            "flight_time": later - fired,
+            "impact_speed": touch[1] + _acceleration(self.problem, row, 5) * later,
+        }
+        state, at_peak = self.columns(dot.t_peak)
+        told["indentation"] = at_peak[0] - surface_moves(self.wanted)["pack"]
+        told["loading_work"] = at_peak[_PACK_LOSS] - touch[_PACK_LOSS]
+        state, at_force = self.columns(dot.t_force)
+        total = at_force[:3].copy()
+        if dot.t_force == contact.t_in:
+            # The largest force is that at touch, whenever that is.
+            total[0] = surface_moves(self.wanted)["pack"]
+            total[1] = told["impact_speed"]
+        told["peak_force"] = pack_push_changes(self.problem, self.wanted, state, total)
+        if contact.t_out is None:
+            gone = self.columns(float(self.record.nodes[-1, 0]))[1]
+        else:
+            node = int(np.searchsorted(self.record.nodes[:, 0], contact.t_out, side="left"))
+            leave, gone = self.found.passed[self.rows[node]]
+            told["contact_time"] = self.later(leave, "pack", contact.v_out or math.nan) - later
+        told["net_loss"] = gone[_PACK_LOSS] - touch[_PACK_LOSS]
+        if dot.back is not None:
+            back = contacts[dot.back]
+            touch = self.found.passed[self.rows[int(self.record.contacts[dot.back, 5])], 0]
+            later = self.later(touch, "backstop", back.v_in)
+            row = self.problem.resample(self.record, np.array([back.t_in]))[0]
+            told["return_time"] = later - fired
+            told["return_speed"] = -(touch[1] + _acceleration(self.problem, row, 6, 7) * later)
+        return told
