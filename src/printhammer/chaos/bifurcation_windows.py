@@ -13,10 +13,14 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from printhammer.chaos.bifurcation_carry import SAME
+from printhammer.chaos.bifurcation_columns import orbit_distance
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import numpy.typing as npt
 
     from printhammer.chaos.bifurcation import Bifurcation
     from printhammer.segments import FloatArray
@@ -171,6 +175,28 @@ def routes_of(diagram: Bifurcation, direction: str | None = None) -> tuple[Route
         return Route(way, tuple(before), first, "exponent" if measured else "no period")
 
     return route("rising", found), route("falling", found[::-1])
+
+
+def hysteresis(diagram: Bifurcation) -> npt.NDArray[np.bool_]:
+    """Return at which values the directions of a diagram lead to different attractors, shape (C,).
+
+    Periodic ones are different if their periods are, or if their orbits lie further apart than
+    `printhammer.chaos.bifurcation_carry.SAME`; trains without a period are only told from periodic ones. All
+    false where there is but one direction.
+    """
+    found = np.zeros(len(diagram.values), np.bool_)
+    if len(diagram.directions) < 2:
+        return found
+    half = diagram.regime.window.half_widths
+    for k, (one, other) in enumerate(diagram.cycles.T.tolist()):
+        if one != other:
+            found[k] = True
+        elif one:
+            orbits = [
+                np.column_stack([diagram.x[way, k, -one:], diagram.v[way, k, -one:]]) / half for way in (0, 1)
+            ]
+            found[k] = orbit_distance(*orbits) > SAME
+    return found
 
 
 def _row(diagram: Bifurcation, direction: str | None) -> int:
