@@ -40,7 +40,7 @@ MAP_TOLERANCE: Final = 1e-13
 IN_PACK: Final = "in the pack"
 """Status where the state at a section has a memory of the pack beside displacement and velocity."""
 
-_WITH_MEMORY: Final = (UNLOADING, RELOADING, HELD_UNLOADING)
+WITH_MEMORY: Final = (UNLOADING, RELOADING, HELD_UNLOADING)
 _RANGE_LEFT: Final = "range left"
 _TURN_STEPS: Final = 60
 _STILL: Final = 1e-9
@@ -266,7 +266,7 @@ def image_of(
     followed = follow(problem, moments[[0, -1]], np.eye(3), renormalise=False)
     if followed.status != OK:
         return _no_image(STATUS_NAMES[followed.status])
-    if int(followed.found[-1, 2]) in _WITH_MEMORY:
+    if int(followed.found[-1, 2]) in WITH_MEMORY:
         return _no_image(IN_PACK)
     touched: tuple[tuple[str, float], ...] = ()
     margin = math.nan

@@ -1,0 +1,257 @@
+"""Newton's method for periodic orbits: many at once, each with several states along the orbit.
+
+A small error of the state grows from firing to firing on an unstable orbit, by the power of the number of its
+firings. So not one state is looked for, but one at the start of each of several segments, such that the end
+of each is the start of the next (multiple shooting; H. B. Keller, Numerical Methods for Two-Point
+Boundary-Value Problems, Blaisdell 1968).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.segments import FloatArray
+
+CLOSED: Final = ""
+"""What is told of an orbit that closes; of others it is the reason why it does not."""
+
+STUCK: Final = "comes no closer"
+TOO_LONG: Final = "too many iterations"
+SINGULAR: Final = "singular derivative"
+
+_LONGEST_STEP: Final = 1.0
+_LEAST_SHARE: Final = 2.0**-7
+"""Longest step, in half-widths of the window, and the least share of a step that is tried."""
+
+
+@dataclass(frozen=True)
+class Images:
+    """Images of many states, one row each: states, derivatives, differentiability, reasons of failure."""
+
+    states: FloatArray
+    jacobians: FloatArray
+    smooth: npt.NDArray[np.bool_]
+    reasons: npt.NDArray[np.str_]
+
+    @classmethod
+    def empty(cls, count: int) -> Images:
+        """Return images of which nothing is known yet."""
+        return cls(
+            np.full((count, 2), np.nan),
+            np.full((count, 2, 2), np.nan),
+            np.zeros(count, np.bool_),
+            np.full(count, CLOSED, dtype="U32"),
+        )
+
+
+class StrobeMaps(Protocol):
+    """Makes the images of states, shape (n, 2), each after its own number of firings, shape (n,)."""
+
+    def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
+        """Return the images."""
+
+
+@dataclass(frozen=True)
+class Closing:
+    """What Newton's method made of one guess.
+
+    Attributes
+    ----------
+    states : array, shape (m, 2)
+        States at the starts of the segments.
+    firings : int array, shape (m,)
+        Number of firings in each segment.
+    jacobians : array, shape (m, 2, 2)
+        Derivative of the end of each segment with respect to its start.
+    residual : float
+        Largest distance of an end from the start that follows, in half-widths of the window.
+    smooth : bool
+        Whether the orbit has a derivative.
+    reason : str
+        Why it does not close; empty where it does.
+    """
+
+    states: FloatArray
+    firings: npt.NDArray[np.int64]
+    jacobians: FloatArray
+    residual: float
+    smooth: bool
+    reason: str
+
+    @property
+    def closed(self) -> bool:
+        """Whether the orbit closes."""
+        return self.reason == CLOSED
+
+
+def close_orbits(
+    maps: StrobeMaps,
+    guesses: FloatArray,
+    firings: npt.NDArray[np.int64],
+    scales: FloatArray,
+    *,
+    goal: float,
+    enough: float,
+    iterations: int,
+) -> list[Closing]:
+    """Make guesses of orbits, all of as many segments, close by Newton's method with shortened steps.
+
+    Parameters
+    ----------
+    maps : callable
+        Makes the images.
+    guesses : array, shape (n, m, 2)
+        States at the starts of the segments of each orbit.
+    firings : int array, shape (n, m)
+        Numbers of firings in the segments.
+    scales : array, shape (2,)
+        Half-widths of the window, m and m/s.
+    goal : float
+        Residual, in half-widths, at which no more is asked for.
+    enough : float
+        Residual which will do where it gets no smaller.
+    iterations : int
+        Largest number of evaluations of each orbit.
+
+    Returns
+    -------
+    list of Closing
+        One for each guess.
+    """
+    search = _Search(maps, guesses, firings, scales)
+    search.start()
+    for _ in range(iterations):
+        rows = search.step(goal, enough)
+        if not rows.size:
+            break
+    return search.result(enough)
+
+
+class _Search:
+    """The state of Newton's method for many guesses; all distances in half-widths."""
+
+    def __init__(
+        self, maps: StrobeMaps, guesses: FloatArray, firings: npt.NDArray[np.int64], scales: FloatArray
+    ) -> None:
+        count, self.segments = guesses.shape[:2]
+        self.maps, self.firings, self.scales = maps, firings, scales
+        self.z = guesses / scales
+        self.jacobians = np.full((count, self.segments, 2, 2), np.nan)
+        self.defects = np.full((count, self.segments, 2), np.nan)
+        self.residual = np.full(count, np.inf)
+        self.smooth = np.zeros(count, np.bool_)
+        self.reasons = np.full(count, TOO_LONG, dtype="U32")
+        self.share = np.ones(count)
+        self.direction = np.zeros_like(self.z)
+        self.open = np.ones(count, np.bool_)
+
+    def start(self) -> None:
+        """Evaluate the guesses."""
+        every = np.arange(len(self.z))
+        self._take(every, *self._evaluate(self.z, every))
+        failed = ~np.isfinite(self.residual)
+        self.open &= ~failed
+
+    def step(self, goal: float, enough: float) -> npt.NDArray[np.int64]:
+        """Try one step of every orbit that is open; return which those were."""
+        self._end(self.open & (self.residual <= goal), CLOSED)
+        rows = np.flatnonzero(self.open)
+        if not rows.size:
+            return rows
+        trial = self.z[rows] + self.share[rows, np.newaxis, np.newaxis] * self.direction[rows]
+        images, defects, residual, reasons = self._evaluate(trial, rows)
+        better = residual < self.residual[rows] * (1.0 - 0.1 * self.share[rows])
+        taken = rows[better]
+        self.z[taken] = trial[better]
+        self._take(taken, images, defects, residual, reasons, better)
+        self.share[taken] = np.minimum(2.0 * self.share[taken], 1.0)
+        left = rows[~better]
+        self.share[left] *= 0.5
+        close = self.residual[left] <= enough
+        self._end_rows(left[close], CLOSED)
+        given_up = ~close & (self.share[left] < _LEAST_SHARE)
+        why = np.where(reasons[~better] == CLOSED, STUCK, reasons[~better])
+        for row, reason in zip(left[given_up], why[given_up], strict=True):
+            self._end_rows(np.array([row]), str(reason))
+        return rows
+
+    def result(self, enough: float) -> list[Closing]:
+        """Return what has become of all guesses."""
+        self._end(self.open & (self.residual <= enough), CLOSED)
+        return [
+            Closing(
+                self.z[i] * self.scales,
+                self.firings[i],
+                self.jacobians[i] * self.scales[:, np.newaxis] / self.scales,
+                float(self.residual[i]),
+                bool(self.smooth[i]),
+                str(self.reasons[i]),
+            )
+            for i in range(len(self.z))
+        ]
+
+    def _end(self, which: npt.NDArray[np.bool_], reason: str) -> None:
+        self._end_rows(np.flatnonzero(which), reason)
+
+    def _end_rows(self, rows: npt.NDArray[np.int64], reason: str) -> None:
+        self.reasons[rows] = reason
+        self.open[rows] = False
+
+    def _evaluate(
+        self, z: FloatArray, rows: npt.NDArray[np.int64]
+    ) -> tuple[Images, FloatArray, FloatArray, npt.NDArray[np.str_]]:
+        """Return the images of all starts, the gaps to the starts that follow, their size, and reasons."""
+        images = self.maps((z * self.scales).reshape(-1, 2), self.firings[rows].reshape(-1))
+        ends = images.states.reshape(z.shape) / self.scales
+        defects = ends - np.roll(z, -1, axis=1)
+        why = images.reasons.reshape(z.shape[:2])
+        fine = (why == CLOSED).all(axis=1)
+        residual = np.where(fine, np.abs(defects).max(axis=(1, 2)), np.inf)
+        first = np.argmax(why != CLOSED, axis=1)
+        return images, defects, residual, np.where(fine, CLOSED, why[np.arange(len(why)), first])
+
+    def _take(
+        self,
+        rows: npt.NDArray[np.int64],
+        images: Images,
+        defects: FloatArray,
+        residual: FloatArray,
+        reasons: npt.NDArray[np.str_],
+        which: npt.NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Keep what was found at the new places, and find out where to go next."""
+        chosen = np.ones(len(residual), np.bool_) if which is None else which
+        shape = (len(residual), self.segments, 2, 2)
+        jacobians = images.jacobians.reshape(shape) * self.scales / self.scales[:, np.newaxis]
+        self.jacobians[rows] = jacobians[chosen]
+        self.defects[rows] = defects[chosen]
+        self.residual[rows] = residual[chosen]
+        self.smooth[rows] = images.smooth.reshape(shape[:2]).all(axis=1)[chosen]
+        bad = reasons[chosen] != CLOSED
+        self.reasons[rows[bad]] = reasons[chosen][bad]
+        self._aim(rows[~bad])
+
+    def _aim(self, rows: npt.NDArray[np.int64]) -> None:
+        """Solve the linear equations of the full step, and shorten it to the longest allowed."""
+        m = self.segments
+        matrix = np.zeros((len(rows), 2 * m, 2 * m))
+        for i in range(m):
+            here, ahead = slice(2 * i, 2 * i + 2), slice(2 * ((i + 1) % m), 2 * ((i + 1) % m) + 2)
+            matrix[:, here, here] += self.jacobians[rows, i]
+            matrix[:, here, ahead] -= np.eye(2)
+        for row, equations in zip(rows, matrix, strict=True):
+            try:
+                step = np.linalg.solve(equations, -self.defects[row].reshape(-1))
+            except np.linalg.LinAlgError:
+                step = np.full(2 * m, np.nan)
+            size = float(np.abs(step).max())
+            if not np.isfinite(size):
+                self._end_rows(np.array([row]), SINGULAR)
+                continue
+            self.direction[row] = (step * min(1.0, _LONGEST_STEP / size if size else 1.0)).reshape(m, 2)
