@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from printhammer.chaos.arclength import Curve, Follower, MapFamily, MapValue, Steps, follow
 from printhammer.chaos.branch_points import birth_of, follow_doubled, iterated, points_of
 
-STEPS = Steps(precision=1e-12)
+STEPS = Steps(precision=1e-12, most=200)
 SHARP = 1e-9
 
 

@@ -43,6 +43,10 @@ _ROUNDS: Final = 60
 _SHARE: Final = 1e-13
 """Share of a step to which a point is located."""
 _REAL: Final = 1e-9
+_SHARE_OF_CHANGE: Final = 1e-10
+_SMALL_MARGIN: Final = 0.05
+_CLOSE_MARGIN: Final = 1e-7
+"""Share of a step to which a change is bisected; margins from which and to which it is met by them."""
 _NEAR: Final = 1e-4
 """Shares of a step within which a fold and a branching are one point."""
 _BRACKET: Final = 1e-5
@@ -70,6 +74,8 @@ class BranchPoint:
         Labels of the motion before and after it.
     sharp : bool
         False where it could not be located to the precision of the curve; it is then between two nodes.
+    sides : tuple of Node or None
+        Of a change: fixed points close before and behind it.
     """
 
     kind: Kind
@@ -77,6 +83,7 @@ class BranchPoint:
     after: int
     labels: tuple[Hashable, Hashable]
     sharp: bool = True
+    sides: tuple[Node, Node] | None = None
 
     @property
     def parameter(self) -> float:
@@ -101,7 +108,13 @@ def fold_test(jacobian: FloatArray) -> float:
     return float(np.linalg.det(jacobian - np.eye(len(jacobian))))
 
 
-def points_of(family: MapFamily, curve: Curve, scales: npt.ArrayLike, precision: float) -> list[BranchPoint]:
+def points_of(
+    family: MapFamily,
+    curve: Curve,
+    scales: npt.ArrayLike,
+    precision: float,
+    margin: Callable[[Node], float] | None = None,
+) -> list[BranchPoint]:
     """Return what happens along a curve, in order.
 
     Parameters
@@ -112,6 +125,9 @@ def points_of(family: MapFamily, curve: Curve, scales: npt.ArrayLike, precision:
         Its fixed points, from `printhammer.chaos.arclength.follow`.
     scales, precision
         Those with which the curve was followed.
+    margin : callable, optional
+        Near a change of the label, passes through 0 where it changes. Changes are then met by interpolation,
+        and the map is not evaluated too close to them.
 
     Returns
     -------
@@ -151,7 +167,7 @@ def points_of(family: MapFamily, curve: Curve, scales: npt.ArrayLike, precision:
             places = {kind: share for share, kind, _ in here_found}
             if abs(places["fold"] - places["branching"]) < _NEAR:
                 here_found = [entry for entry in here_found if entry[1] != "fold"]
-        here_found += _changes(follower, here, ahead, after)
+        here_found += _changes(follower, here, ahead, after, margin)
         found += [point for *_, point in sorted(here_found, key=lambda entry: entry[0])]
     return found
 
@@ -239,29 +255,72 @@ def _branching(
 
 
 def _changes(
-    follower: Follower, here: Node, ahead: Node, after: int
+    follower: Follower, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
-    """Return the places between two nodes at which the label changes, by bisection."""
+    """Return the places between two nodes at which the label changes."""
     found: list[tuple[float, Kind, BranchPoint]] = []
-    begin, label = 0.0, here.value.label
-    while label != ahead.value.label and len(found) < _ROUNDS:
-        low, high = begin, 1.0
-        inside, beyond, sharp = here, ahead, True
-        while high - low > 1e-10:
-            middle = 0.5 * (low + high)
-            node = between(follower, here, ahead, middle)
-            if node is None:
-                sharp = False
-                break
-            if node.value.label == label:
-                low, inside = middle, node
-            else:
-                high, beyond = middle, node
-        nearer = beyond if beyond is not ahead or inside is here else inside
-        labels = (label, beyond.value.label)
-        found.append((high, "change", BranchPoint("change", nearer, after, labels, sharp)))
-        begin, label = high, beyond.value.label
+    begin, first = 0.0, here
+    while first.value.label != ahead.value.label and len(found) < _ROUNDS:
+        share, sides, sharp = _change(follower, here, ahead, (begin, first), margin)
+        middle = replace(
+            sides[0],
+            state=0.5 * (sides[0].state + sides[1].state),
+            parameter=0.5 * (sides[0].parameter + sides[1].parameter),
+        )
+        low, high = sides[0].arc, sides[1].arc
+        if sharp and high > low:
+            place = here.arc + share * (ahead.arc - here.arc)
+            part = min(max((place - low) / (high - low), 0.0), 1.0)
+            middle = replace(
+                middle,
+                state=sides[0].state + part * (sides[1].state - sides[0].state),
+                parameter=sides[0].parameter + part * (sides[1].parameter - sides[0].parameter),
+                arc=place,
+            )
+        labels = (first.value.label, sides[1].value.label)
+        found.append((share, "change", BranchPoint("change", middle, after, labels, sharp, sides)))
+        begin, first = (sides[1].arc - here.arc) / (ahead.arc - here.arc), sides[1]
     return found
+
+
+def _change(
+    follower: Follower,
+    here: Node,
+    ahead: Node,
+    start: tuple[float, Node],
+    margin: Callable[[Node], float] | None,
+) -> tuple[float, tuple[Node, Node], bool]:
+    """Return the share of the way at which the label first changes, nodes on both sides, and sharpness."""
+    low, inside = start
+    high, beyond = 1.0, ahead
+    m_low = m_high = math.nan
+    if margin is not None:
+        m_low, m_high = margin(inside), margin(beyond)
+    weights = [1.0, 1.0]
+    for turn in range(_ROUNDS):
+        crossing = m_low * m_high < 0.0 and max(abs(m_low), abs(m_high)) < _SMALL_MARGIN
+        if high - low <= (_SHARE_OF_CHANGE if not crossing else _SHARE):
+            break
+        if crossing and min(abs(m_low), abs(m_high)) < _CLOSE_MARGIN:
+            break
+        by_margin = crossing and turn % 3 != 2
+        a, b = m_low * weights[0], m_high * weights[1]
+        share = low + (high - low) * a / (a - b) if by_margin else 0.5 * (low + high)
+        node = between(follower, here, ahead, share)
+        if node is None:
+            return 0.5 * (low + high), (inside, beyond), False
+        if node.value.label == inside.value.label:
+            low, inside = share, node
+            m_low = margin(node) if margin is not None else math.nan
+            weights = [1.0, 0.5 * weights[1]]
+        else:
+            high, beyond = share, node
+            m_high = margin(node) if margin is not None else math.nan
+            weights = [0.5 * weights[0], 1.0]
+    share = 0.5 * (low + high)
+    if m_low * m_high < 0.0:
+        share = low + (high - low) * m_low / (m_low - m_high)
+    return share, (inside, beyond), True
 
 
 def iterated(family: MapFamily, times: int) -> MapFamily:
