@@ -12,7 +12,19 @@ from typing import TYPE_CHECKING, Annotated, Final, NoReturn
 import typer
 
 from printhammer import __version__
-from printhammer.cli import bench, figure, fit, hammer, measure, paper, reconstruct, run, strobe, sweep
+from printhammer.cli import (
+    bench,
+    figure,
+    fit,
+    hammer,
+    lyapunov,
+    measure,
+    paper,
+    reconstruct,
+    run,
+    strobe,
+    sweep,
+)
 from printhammer.cli import map as frequency_map
 from printhammer.cli.terminal import complain
 from printhammer.errors import PrinthammerError
@@ -40,6 +52,7 @@ app.command("figure", epilog=figure.EXAMPLE)(figure.figure)
 app.command("paper", epilog=paper.EXAMPLE)(paper.paper)
 app.command("map", epilog=frequency_map.EXAMPLE)(frequency_map.map_)
 app.command("strobe", epilog=strobe.EXAMPLE)(strobe.strobe)
+app.command("lyapunov", epilog=lyapunov.EXAMPLE)(lyapunov.lyapunov)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)
 app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)
 app.command("measure", epilog=measure.EXAMPLE)(measure.measure)
