@@ -43,6 +43,8 @@ TRANSIENT: Final = 1000
 """Number of firings left out before them."""
 
 _COUNTS: Final = 100
+_CYCLES: Final = 8
+"""Number of cycles below which their scatter says nothing."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,11 @@ class Lyapunov:
         return self.exponents / self.period
 
     @property
+    def cycle(self) -> int:
+        """Number of firings over which growth is averaged first: the period of a periodic train, else 1."""
+        return cycle_of(self.verdict.period, len(self.factors))
+
+    @property
     def growth(self) -> str:
         """What the largest exponent alone says: "chaotic", "regular", or "undecided" within three errors."""
         return _growth(float(self.exponents[0]), float(self.standard_errors[0]), self.smooth)
@@ -135,7 +142,8 @@ class Lyapunov:
         Parameters
         ----------
         counts : int array, optional
-            Numbers of firings, from 1 to all; by default about a hundred, evenly spaced in their logarithm.
+            Numbers of firings, from 1 to all, of which whole cycles are taken; by default about a hundred,
+            evenly spaced in their logarithm.
 
         Returns
         -------
@@ -151,14 +159,18 @@ class Lyapunov:
         InputError
             A number that there is not.
         """
-        n = len(self.factors)
-        chosen = np.unique(np.geomspace(1, n, _COUNTS).round()) if counts is None else np.atleast_1d(counts)
-        some = np.asarray(chosen).astype(np.int64)
-        if some.size and (some.min() < 1 or some.max() > n):
+        q = self.cycle
+        whole = whole_cycles(self.factors, q)
+        n = q * len(whole)
+        if counts is None:
+            counts = np.geomspace(q, n, min(_COUNTS, len(whole)))
+        asked = np.atleast_1d(np.asarray(counts, dtype=np.float64))
+        if asked.size and not (asked.min() >= 1.0 and asked.max() <= n):
             raise InputError(f"counts = {counts!r}, expected numbers of firings from 1 to {n}")
-        means = np.cumsum(self.factors, axis=0)[some - 1] / some[:, np.newaxis]
-        errors = [[standard_error(self.factors[:count, k]) for k in (0, 1)] for count in some]
-        return some, means, np.array(errors).reshape(-1, 2)
+        some = np.unique(np.maximum((asked / q).round(), 1.0).astype(np.int64))
+        means = np.cumsum(whole, axis=0)[some - 1] / some[:, np.newaxis]
+        errors = [[standard_error(whole[:cycles, k]) for k in (0, 1)] for cycles in some]
+        return q * some, means, np.array(errors).reshape(-1, 2)
 
     def to_dataset(self) -> xr.Dataset:
         """Return growth and states over `firing`, running estimates over `count`."""
@@ -190,7 +202,8 @@ def lyapunov(
     Two changes of the state are carried along with the motion and made orthonormal again at every step (G.
     Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21); they begin up to a
     hundred firings earlier, to find their directions. Standard errors are those of the means of
-    autocorrelated series, from overlapping batch means (`printhammer.tangent.standard_error`).
+    autocorrelated series, from overlapping batch means (`printhammer.tangent.standard_error`); of
+    a periodic train, of whole cycles.
 
     Parameters
     ----------
@@ -264,6 +277,16 @@ def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
     return 1.0 - one / two, standard_error(one / two**2 * factors[:, 1] - factors[:, 0] / two)
 
 
+def cycle_of(period: int | None, firings: int) -> int:
+    """Return over how many firings to average growth first, so that a cycle does not count as scatter."""
+    return period if period is not None and firings >= _CYCLES * period else 1
+
+
+def whole_cycles(factors: FloatArray, cycle: int) -> FloatArray:
+    """Return means over whole cycles, shape (n // cycle, 2), the first few firings left out if need be."""
+    return np.asarray(factors[len(factors) % cycle :].reshape(-1, cycle, 2).mean(axis=1))
+
+
 def _growth(value: float, error: float, smooth: bool) -> str:
     if math.isnan(value) or not smooth:
         return "undecided"
@@ -288,19 +311,23 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
     )
     points = _points(train, first, last, found, tolerance)
     factors = np.column_stack([found.factors, found.second_factors])
-    total = factors.sum(axis=1)
-    errors = np.full(2, np.nan)
+    judged = points.verdict
+    whole = whole_cycles(factors, cycle_of(None if judged is None else judged.period, len(factors)))
+    total = whole.sum(axis=1)
+    values, errors, total_error = np.full(2, np.nan), np.full(2, np.nan), math.nan
     dimension = math.nan, math.nan
     if found.ok:
-        errors = np.array([found.standard_error, standard_error(factors[:, 1])])
+        values = whole.mean(axis=0)
+        errors = np.array([standard_error(whole[:, k]) for k in (0, 1)])
+        total_error = standard_error(total)
     if found.ok and found.smooth:
-        dimension = kaplan_yorke(factors)
+        dimension = kaplan_yorke(whole)
     return Lyapunov(
         points=points,
-        exponents=np.array([found.value, found.second]),
+        exponents=values,
         standard_errors=errors,
-        total=found.total,
-        total_error=standard_error(total) if found.ok else math.nan,
+        total=float(values.sum()),
+        total_error=total_error,
         dimension=dimension[0],
         dimension_error=dimension[1],
         factors=factors,

@@ -119,7 +119,9 @@ class ZeroOne:
     @property
     def phrase(self) -> str:
         """The outcome in one line."""
-        return f"K = {self.k:.3f}, median of {len(self.angles)} angles over {self.length} numbers"
+        # Without the sign of a zero.
+        k = round(self.k, 3) + 0.0
+        return f"K = {k:.3f}, median of {len(self.angles)} angles over {self.length} numbers"
 
     def to_dataset(self) -> xr.Dataset:
         """Return correlations over `angle`, displacements over `step` and the path over `number`."""

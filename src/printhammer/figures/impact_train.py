@@ -75,8 +75,8 @@ def _lags(ax: Axes, train: ImpactTrain) -> None:
         ax.plot(at, train.autocorrelation, ls="none", marker="o", ms=2.2, mew=0.0, color=BLUE)
         for level in (-train.significant, train.significant):
             ax.axhline(level, color=MUTED, lw=HAIR, ls=(0, (4, 3)))
-        ax.set_xlim(-0.5, len(at) - 0.5)
     else:
         note(ax, "all intervals are the same", (0.5, 0.6), ha="center", va="center")
+    ax.set_xlim(-0.5, len(train.autocorrelation) - 0.5)
     ax.axhline(0.0, color=MUTED, lw=HAIR)
     ax.set(xlabel="Lag", ylabel="Autocorrelation", ylim=(-1.1, 1.1))

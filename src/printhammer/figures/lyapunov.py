@@ -75,9 +75,10 @@ def plot(found: Lyapunov) -> Figure:
 def _title(found: Lyapunov) -> str:
     told = [shown_period(found.period), found.verdict.name.replace("-", " ")]
     if not math.isnan(found.dimension):
-        told.append(f"dimension {found.dimension:.3f} ± {found.dimension_error:.1g}")
+        error = f" ± {found.dimension_error:.1g}" if found.dimension_error else ""
+        told.append(f"dimension {found.dimension:.4g}{error}")
     if found.zero_one is not None:
-        told.append(f"0-1 test: K = {found.zero_one.k:.2f}, {found.zero_one.verdict}")
+        told.append(f"0-1 test: {found.zero_one.verdict}")
     return ", ".join(told)
 
 
