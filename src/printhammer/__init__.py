@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from printhammer.chaos.impact_train import impact_train
     from printhammer.chaos.lyapunov import lyapunov
+    from printhammer.chaos.orbit_search import orbits
     from printhammer.chaos.recurrence import recurrence
     from printhammer.chaos.sections import section
     from printhammer.chaos.sensitivity import sensitivities
@@ -54,6 +55,7 @@ __all__ = [
     "load",
     "lyapunov",
     "measure",
+    "orbits",
     "recurrence",
     "release_current",
     "rest_state",
@@ -84,6 +86,7 @@ _HOME = {
     "load": "hammer",
     "lyapunov": "chaos.lyapunov",
     "measure": "identify.laboratory",
+    "orbits": "chaos.orbit_search",
     "recurrence": "chaos.recurrence",
     "release_current": "equilibrium",
     "rest_state": "equilibrium",

@@ -3,7 +3,10 @@
 from printhammer.chaos.impact_train import ImpactTrain, impact_train
 from printhammer.chaos.lyapunov import Lyapunov, lyapunov
 from printhammer.chaos.lyapunov_chart import LyapunovChart, lyapunovs
+from printhammer.chaos.orbit_result import Orbit
+from printhammer.chaos.orbit_search import Orbits, orbit, orbits
 from printhammer.chaos.recurrence import Recurrence, recurrence
+from printhammer.chaos.regime import Regime
 from printhammer.chaos.sections import Section, section, sections
 from printhammer.chaos.sensitivity import Sensitivities, Spread, sensitivities
 from printhammer.chaos.strobe import Strobe, strobe, strobes
@@ -14,7 +17,10 @@ __all__ = [
     "ImpactTrain",
     "Lyapunov",
     "LyapunovChart",
+    "Orbit",
+    "Orbits",
     "Recurrence",
+    "Regime",
     "Section",
     "Sensitivities",
     "Spread",
@@ -24,6 +30,8 @@ __all__ = [
     "impact_train",
     "lyapunov",
     "lyapunovs",
+    "orbit",
+    "orbits",
     "recurrence",
     "section",
     "sections",

@@ -128,7 +128,7 @@ class Orbits:
             "starts": self.starts,
             "guesses": list(self.guesses),
             "repeats": self.repeats,
-            "failures": [f"{reason}: {number}" for reason, number in sorted(self.failures.items())],
+            "failures": "; ".join(f"{number}: {reason}" for reason, number in sorted(self.failures.items())),
             "search": self.message,
         }
 
