@@ -157,7 +157,7 @@ def spread(regime: Regime, count: int, seen: FloatArray) -> FloatArray:
     number = np.arange(1, count + 1)[:, np.newaxis]
     share = (0.5 + number * np.array([1.0 / _PLASTIC, 1.0 / _PLASTIC**2])) % 1.0
     odd = (number % 2).astype(bool)
-    states = np.where(odd, wide_low + share * (wide_high - wide_low), low + share * (high - low))
+    states: FloatArray = np.where(odd, wide_low + share * (wide_high - wide_low), low + share * (high - low))
     least, most = _domain(regime.hammer)
     states[:, 0] = np.clip(states[:, 0], least, most)
     return states

@@ -233,7 +233,7 @@ class _Search:
         self.defects[rows] = defects[chosen]
         self.residual[rows] = residual[chosen]
         self.smooth[rows] = images.smooth.reshape(shape[:2]).all(axis=1)[chosen]
-        bad = reasons[chosen] != CLOSED
+        bad = np.not_equal(reasons[chosen], CLOSED)
         self.reasons[rows[bad]] = reasons[chosen][bad]
         self._aim(rows[~bad])
 

@@ -46,9 +46,9 @@ _LONG: Final = 400
 """Firings of the train from rest in which close returns are looked for."""
 _SAME: Final = 1e-6
 """Distance, in half-widths of the window, up to which states of two orbits are one."""
-_FAST: Final = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
-_EXACT: Final = {"goal": 1e-13, "enough": 1e-9, "iterations": 8}
-_LONE: Final = {"goal": 1e-13, "enough": 1e-9, "iterations": 60}
+_FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
+_EXACT: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 8}
+_LONE: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 60}
 
 
 @dataclass(frozen=True)

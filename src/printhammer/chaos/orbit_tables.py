@@ -129,8 +129,8 @@ def _dataset(found: Sequence[Orbit], attributes: dict[str, Any]) -> xr.Dataset:
     data["branch"][2]["codes"] = ", ".join(f"{code} {name}" for code, name in enumerate(MODE_NAMES))
     multipliers = np.array([orbit.multipliers for orbit in found], np.complex128).reshape(-1, 2)
     for name, part in zip(_MULTIPLIERS, (multipliers.real, multipliers.imag), strict=True):
-        meaning = {"units": "1", "long_name": f"{name.partition('_')[2]} part of the multipliers"}
-        data[name] = (("orbit", "multiplier"), part.copy(), meaning)
+        told = {"units": "1", "long_name": f"{name.partition('_')[2]} part of the multipliers"}
+        data[name] = (("orbit", "multiplier"), part.copy(), told)
     number = {"units": "1", "long_name": "number of the orbit, of the firing, of the multiplier"}
     coordinates = {
         "orbit": ("orbit", np.arange(len(found), dtype=np.int32), number),

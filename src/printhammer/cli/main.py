@@ -19,6 +19,7 @@ from printhammer.cli import (
     hammer,
     lyapunov,
     measure,
+    orbits,
     paper,
     reconstruct,
     run,
@@ -52,6 +53,7 @@ app.command("figure", epilog=figure.EXAMPLE)(figure.figure)
 app.command("paper", epilog=paper.EXAMPLE)(paper.paper)
 app.command("map", epilog=frequency_map.EXAMPLE)(frequency_map.map_)
 app.command("strobe", epilog=strobe.EXAMPLE)(strobe.strobe)
+app.command("orbits", epilog=orbits.EXAMPLE)(orbits.orbits)
 app.command("lyapunov", epilog=lyapunov.EXAMPLE)(lyapunov.lyapunov)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)
 app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)
