@@ -10,6 +10,7 @@ import pytest
 from tests.identify import shots
 
 import printhammer as ph
+from printhammer.errors import InputError
 from printhammer.identify.motion import fit_motion
 from printhammer.waveforms import HalfSine, Rectangle
 
@@ -38,6 +39,33 @@ def test_starts_30_percent_off_lead_to_the_same_constants(
     for key in ("mass", "backstop.damping"):
         assert far[key].value == pytest.approx(near[key].value, abs=0.01 * near[key].standard_error)
         assert far[key].standard_error == pytest.approx(near[key].standard_error, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.7, 1.3])
+@pytest.mark.parametrize(
+    "free",
+    [
+        ("spring.As",),
+        ("mass", "backstop.damping", "backstop.stiffness", "pack.stiffness"),
+    ],
+)
+def test_other_constants_may_be_30_percent_off_too(
+    tmp_path: Path, free: tuple[str, ...], factor: float
+) -> None:
+    path = shots.write(tmp_path / "shot.csv", HAMMER, seed=3)
+    start = HAMMER.replace({key: factor * truth(key) for key in free})
+    near, far = fit_motion([path], HAMMER, free=free), fit_motion([path], start, free=free)
+    for key in free:
+        assert far[key].value == pytest.approx(near[key].value, abs=0.01 * near[key].standard_error)
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.3])
+def test_a_magnet_too_far_off_is_told(tmp_path: Path, factor: float) -> None:
+    path = shots.write(tmp_path / "shot.csv", HAMMER, seed=3)
+    start = HAMMER.replace("magnet.Am", factor * truth("magnet.Am"))
+    with pytest.raises(InputError, match=r"does not converge|does not move so that"):
+        fit_motion([path], start, free=["magnet.Am"])
 
 
 def test_two_fits_agree_to_the_bit(tmp_path: Path) -> None:
