@@ -30,8 +30,8 @@ def gauge() -> str:
     return (
         "Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm:"
         f" the dot of a single pulse is given the {pounds:.0f} lb that the paper calls typical, and the"
-        f" current {CURRENT:g} A, the middle of the range of its Fig. 2. Only the typical claims depend"
-        " on the first, and on the second only how fast a burst the limit of 2 A allows."
+        f" largest current of a pulse {CURRENT:g} A, the middle of the range of its Fig. 2. Only the typical"
+        " claims depend on the first, and on the second only how fast a burst the limit of 2 A allows."
     )
 
 
