@@ -155,8 +155,8 @@ def _progress() -> Any:
 @app.command("base-rates", epilog="Example: printhammer reconstruct base-rates base_rates.json --hammers 10")
 def base_rates(
     out: Annotated[Path, typer.Argument(metavar="FILE", help="JSON file to write.", show_default=False)],
-    hammers: Annotated[int, typer.Option(min=1, help="Number of random hammers.")] = 200,
-    slow: Annotated[int, typer.Option(min=0, help="For how many of them slow claims are judged too.")] = 50,
+    hammers: Annotated[int, typer.Option(min=1, help="Number of random hammers.")] = 100,
+    slow: Annotated[int, typer.Option(min=0, help="For how many of them slow claims are judged too.")] = 3,
     seed: SeedOption = 1,
     workers: WorkersOption = 2,
 ) -> None:
