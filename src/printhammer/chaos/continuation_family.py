@@ -105,10 +105,23 @@ class Passage:
 
 
 @dataclass(frozen=True)
-class Energies:
-    """Energies of an orbit in one period of it, J: work of coil or force, losses in pack and backstop."""
+class Course:
+    """What a periodic orbit does in one period of it.
 
-    work: float
+    Attributes
+    ----------
+    states : array, shape (firings, 2)
+        Displacement, m, and velocity, m/s, at the sections.
+    peak_forces : array, shape (firings,)
+        Largest pack force of the contacts of each firing, N; NaN without one.
+    coil_work, drive_work, pack_loss, backstop_loss : float
+        Energies, J.
+    """
+
+    states: FloatArray
+    peak_forces: FloatArray
+    coil_work: float
+    drive_work: float
     pack_loss: float
     backstop_loss: float
 
@@ -228,20 +241,22 @@ class RegimeFamily:
         touches = _touches(problem.hammer, record, zero, end - problem.start)
         return Passage(touches, period, self.firings)
 
-    def peaks(self, state: FloatArray, parameter: float) -> tuple[list[float], Energies]:
-        """Return the largest pack force of each firing's dot, N, 0 for a lost one, and the energies."""
+    def course(self, state: FloatArray, parameter: float) -> Course:
+        """Return what an orbit does, given its state at the section."""
         regime = self.regime.with_(self.name, parameter)
         problem, end = self._problem(regime, state)
         record = problem.run(end)
         increments = increments_of(problem, record)
-        forces = [0.0] * self.firings
+        forces = np.full(self.firings, np.nan)
         zero = problem.start - self.phase * regime.period
         for contact in contacts_of(problem, record, increments, rigid_backstop(regime)):
             if contact.surface == "pack" and not contact.initial and contact.peak_force is not None:
                 fired = math.floor((contact.t_in - zero) / regime.period) % self.firings
-                forces[fired] = max(forces[fired], contact.peak_force)
+                forces[fired] = np.fmax(forces[fired], contact.peak_force)
+        sections = np.array([problem.start + regime.period * k for k in range(self.firings)])
+        states = problem.resample(record, sections)[:, :2].copy()
         coil, drive, pack, backstop = (float(total) for total in increments.sum(axis=0))
-        return forces, Energies(coil + drive, pack, backstop)
+        return Course(states, forces, coil, drive, pack, backstop)
 
 
 def rigid_backstop(regime: Regime) -> bool:

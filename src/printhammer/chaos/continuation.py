@@ -1,0 +1,151 @@
+"""Continuation: a periodic orbit followed through the values of a constant, stable or not, to where it ends.
+
+A branch is a curve of periodic orbits. Along it the multipliers tell where the orbit loses its stability and
+how; the sequence of contacts tells where one appears or vanishes, a grazing. The contact forces of the
+paper's pack and backstop begin smoothly, with the powers 2.7 and 1.5 of the depth, so that the strobe map has
+a derivative at a grazing and the branch goes on. On a rigid backstop it has none: there a branch ends at its
+first grazing, and the stop says so.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.arclength import Steps
+from printhammer.chaos.continuation_branch import MOST, Branch
+from printhammer.chaos.continuation_work import PRECISION, Work, read_bounds
+from printhammer.chaos.orbit_result import Orbit
+from printhammer.chaos.regime import Regime
+from printhammer.chaos.strobe_map import MAP_TOLERANCE, check_phase
+from printhammer.drive_input import read_count
+from printhammer.errors import InputError
+from printhammer.problem import check_tolerance
+
+if TYPE_CHECKING:
+    from printhammer.drive import Drive
+    from printhammer.drive_base import Overlap
+    from printhammer.hammer import Hammer
+    from printhammer.segments import FloatArray
+    from printhammer.threads import Progress
+    from printhammer.waveforms import Waveform
+
+__all__ = ["Branch", "continuation"]
+
+_SETTLE: Final = 500
+"""Firings after which a train from rest is taken to have settled."""
+
+
+def continuation(
+    start: Hammer | Orbit,
+    parameter: str,
+    bounds: tuple[float | str, float | str],
+    *,
+    period: float | str | None = None,
+    rate: float | str | None = None,
+    firings: SupportsIndex | None = None,
+    state: tuple[float, float] | None = None,
+    phase: float | None = None,
+    waveform: Waveform | None = None,
+    drive: Drive | None = None,
+    overlap: Overlap = "add",
+    most: SupportsIndex = MOST,
+    steps: Steps | None = None,
+    tolerance: float = MAP_TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Branch:
+    """Follow a periodic orbit of a hammer through the values of one constant.
+
+    Parameters
+    ----------
+    start : Hammer or Orbit
+        A periodic orbit from `printhammer.orbits`; or a hammer, whose orbit is that to which a train from
+        rest settles, or that near `state`.
+    parameter : str
+        "period", "rate", or the dotted key of a constant of the hammer, such as "backstop.damping", of the
+        waveform or of an endless force, such as "waveform.amplitude" or "drive.amplitude".
+    bounds : tuple
+        Least and largest value, SI or text with a unit.
+    period, rate, waveform, drive, overlap
+        Of a hammer: as for `printhammer.strobe`.
+    firings : int, optional
+        Of a hammer: number of firings after which the orbit repeats; by default that of the verdict on the
+        train, 1 where a state is given.
+    state : tuple of float, optional
+        Of a hammer: displacement, m, and velocity, m/s, at a section, near the orbit.
+    phase : float, optional
+        Part of the period between a firing and the section; by default that of the orbit, or 0. The armature
+        must not be on its way out of the pack there.
+    most : int, optional
+        Number of steps in either direction.
+    steps : Steps, optional
+        Instead: how the curve is followed, in units of half-widths of the strobe window and of a fifth of the
+        range of the constant.
+    tolerance : float, optional
+        Error allowed in one step of the runs.
+    threads : int, optional
+        By default as many as there are cores; the branch does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of steps that are done and the largest that may be.
+
+    Returns
+    -------
+    Branch
+        In both directions from the start to the bounds or to another stop, which is named. Folds are located
+        to about 1e-10 of the range or better, grazings to about 1e-8.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; the start lies out of bounds; the train from rest does not
+        settle to a periodic orbit; there is no orbit near the start.
+    """
+    check_tolerance(tolerance)
+    if isinstance(start, Orbit):
+        if any(given is not None for given in (period, rate, waveform, drive, state, firings)):
+            raise InputError("an orbit is given, expected no period, rate, waveform, drive, firings or state")
+        if not start.ok:
+            raise InputError(f"the orbit to start from is none: {start.status}")
+        regime, point, count = start.regime, np.array(start.section), start.firings
+        part = start.phase
+        if phase is not None and phase != part:
+            raise InputError(f"phase = {phase!r}, expected that of the orbit, {part!r}, or none")
+    else:
+        regime = Regime.of(start, period=period, rate=rate, waveform=waveform, drive=drive, overlap=overlap)
+        part = check_phase(0.0 if phase is None else phase)
+        given = None if firings is None else read_count(firings, "firings")
+        point, count = _settled(regime, part, given) if state is None else (np.array(state), given or 1)
+    work = Work(regime, parameter, read_bounds(regime, parameter, bounds), part, tolerance, threads)
+    chosen = steps or Steps(most=read_count(most, "most"), precision=PRECISION)
+    return work.branch(point, count, chosen, progress)
+
+
+def _settled(regime: Regime, phase: float, firings: int | None) -> tuple[FloatArray, int]:
+    """Return the strobe point to which a train from rest settles, and after how many firings it repeats."""
+    from printhammer.chaos.strobe import strobes
+
+    ((found),) = strobes(
+        regime.hammer,
+        None if regime.drive is not None else [regime.period],
+        points=1,
+        transient=_SETTLE,
+        phase=phase,
+        waveform=regime.waveform,
+        drives=None if regime.drive is None else [regime.drive],
+        overlap=regime.overlap,
+        firings=(_SETTLE // 2, _SETTLE),
+        verdict=firings is None,
+    )
+    if not found.ok:
+        raise InputError(f"the train from rest ended early: {found.status}; expected a state to start from")
+    if firings is None:
+        judged = found.verdict
+        if judged is None or judged.period is None:
+            raise InputError(
+                f"the train from rest at a period of {regime.period:.9g} s is not periodic,"
+                " expected a state or an orbit to start from"
+            )
+        firings = judged.period
+    return np.array([found.x[0], found.v[0]]), firings

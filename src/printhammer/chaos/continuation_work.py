@@ -1,0 +1,228 @@
+"""How a branch of periodic orbits is followed and described."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.arclength import Curve, Follower, Steps, Stop, follow
+from printhammer.chaos.branch_points import BIRTH, birth_of, follow_doubled, points_of
+from printhammer.chaos.continuation_branch import Branch
+from printhammer.chaos.continuation_events import event_of
+from printhammer.chaos.continuation_family import RegimeFamily, rigid_backstop
+from printhammer.chaos.regime import PERIOD, RATE
+from printhammer.drive_input import read_number
+from printhammer.errors import InputError
+from printhammer.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from printhammer.chaos.arclength import Node
+    from printhammer.chaos.continuation_events import BranchEvent
+    from printhammer.chaos.continuation_family import Course, Passage
+    from printhammer.chaos.regime import Regime
+    from printhammer.segments import FloatArray
+    from printhammer.threads import Progress
+
+PRECISION: Final = 1e-10
+"""Scaled correction of Newton's method below which an orbit is found; see `printhammer.chaos.arclength`."""
+
+_PARTS: Final = 5.0
+"""Parts of the range of the constant that count as much as half a width of the strobe window."""
+_DIGITS: Final = ".9g"
+
+
+def unit_of(regime: Regime, parameter: str) -> str:
+    """Return the SI unit of a constant of a regime.
+
+    Raises
+    ------
+    InputError
+        There is no such constant.
+    """
+    regime.value(parameter)
+    own = {PERIOD: "s", RATE: "Hz", "drive.amplitude": "N", "drive.phase": "rad"}
+    if parameter in own:
+        return own[parameter]
+    if parameter.startswith("waveform.") and regime.waveform is not None:
+        from printhammer.constants import quantities
+
+        note = quantities(type(regime.waveform))[parameter.removeprefix("waveform.")]
+        return note.also[0] if note.also and regime.waveform.quantity == "force" else note.si
+    return regime.hammer.constants[parameter].si_unit
+
+
+def read_bounds(
+    regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
+) -> tuple[float, float]:
+    """Return the ends of a range of a constant, SI.
+
+    Raises
+    ------
+    InputError
+        There is no such constant, or the ends are not two ascending numbers.
+    """
+    unit = unit_of(regime, parameter)
+    try:
+        low, high = bounds
+    except (TypeError, ValueError):
+        raise InputError(f"bounds = {bounds!r}, expected the least and the largest {parameter}") from None
+    ends = read_number(low, unit, parameter), read_number(high, unit, parameter)
+    if not ends[0] < ends[1]:
+        raise InputError(f"bounds = {bounds!r}, expected the least and the largest {parameter}, ascending")
+    return ends
+
+
+class Work:
+    """What all branches along one constant of one regime have in common."""
+
+    def __init__(
+        self,
+        regime: Regime,
+        parameter: str,
+        bounds: tuple[float, float],
+        phase: float,
+        tolerance: float,
+        threads: int | None,
+    ) -> None:
+        self.regime, self.parameter, self.bounds = regime, parameter, bounds
+        self.phase, self.tolerance, self.threads = phase, tolerance, threads
+        self.scales = np.append(regime.window.half_widths, (bounds[1] - bounds[0]) / _PARTS)
+
+    def family(self, firings: int) -> RegimeFamily:
+        """Return the strobe map over so many firings."""
+        return RegimeFamily(self.regime, self.parameter, firings, self.phase, self.tolerance)
+
+    def branch(self, state: FloatArray, firings: int, steps: Steps, progress: Progress | None) -> Branch:
+        """Return the branch through an orbit."""
+        family = self.family(firings)
+        curve = follow(
+            family,
+            state,
+            self.regime.value(self.parameter),
+            scales=self.scales,
+            bounds=self.bounds,
+            steps=steps,
+            watch=self.watch(firings, steps, progress),
+        )
+        return self.described(family, curve, steps)
+
+    def doubled(self, firings: int, event: BranchEvent, most: int) -> Branch:
+        """Return the branch born at a period doubling of an orbit of so many firings."""
+        family = self.family(2 * firings)
+        steps = Steps(most=most, precision=PRECISION)
+        curve = follow_doubled(
+            family,
+            event.point,
+            scales=self.scales,
+            bounds=self.bounds,
+            steps=steps,
+            watch=self.watch(2 * firings, steps, None),
+        )
+        value, state = event.value, event.point.node.state
+        told = f"the orbit is born at {self.told(value)}, where one of half its period doubles"
+        born = Stop(BIRTH, value, state, told)
+        return self.described(family, Curve(curve.nodes, (born, curve.stops[1])), steps)
+
+    def told(self, value: float) -> str:
+        """Return a value of the constant with name and unit."""
+        return f"{self.parameter} = {value:{_DIGITS}} {unit_of(self.regime, self.parameter)}"
+
+    def watch(self, firings: int, steps: Steps, progress: Progress | None) -> Any:
+        """Return what is asked between any two nodes: whether the branch ends there."""
+        half = None
+        if firings % 2 == 0:
+            half = Follower(self.family(firings // 2), self.scales, steps.precision)
+        rigid = rigid_backstop(self.regime)
+        taken = 0
+
+        def watched(here: Node, ahead: Node) -> Stop | None:
+            nonlocal taken
+            taken += 1
+            if progress is not None:
+                progress(min(taken, 2 * steps.most), 2 * steps.most)
+            if rigid and here.value.label != ahead.value.label:
+                told = "its sequence of contacts changes in a grazing, where the strobe map has no derivative"
+                return Stop("grazing", here.parameter, here.state, told, here)
+            return None if half is None else birth_of(half, here, ahead)
+
+        return watched
+
+    def described(self, family: RegimeFamily, curve: Curve, steps: Steps) -> Branch:
+        """Return a branch with all about its orbits."""
+        nodes = curve.nodes
+        courses: dict[int, Course] = {}
+
+        def work(begin: int, end: int) -> None:
+            for i in range(begin, end):
+                courses[i] = family.course(nodes[i].state, nodes[i].parameter)
+
+        in_threads([work], [len(nodes)], thread_count(self.threads))
+        count = len(nodes)
+        passages: list[Passage] = [node.value.extra for node in nodes]
+        dots = [passage.dots for passage in passages]
+
+        def of_dots(place: int) -> FloatArray:
+            rows = [[math.nan if dot is None else dot[place] for dot in row] for row in dots]
+            return np.array(rows, dtype=np.float64).reshape(count, family.firings)
+
+        def of_courses(name: str) -> FloatArray:
+            return np.array([getattr(courses[i], name) for i in range(count)], dtype=np.float64)
+
+        states = of_courses("states").reshape(count, family.firings, 2)
+        found = points_of(
+            family,
+            curve,
+            self.scales,
+            steps.precision,
+            lambda node: family.margin(node.state, node.parameter),
+        )
+        lost = np.array([sum(dot is None for dot in row) for row in dots], dtype=np.int64)
+        stops = curve.stops
+        return Branch(
+            regime=self.regime,
+            parameter=self.parameter,
+            unit=unit_of(self.regime, self.parameter),
+            bounds=self.bounds,
+            firings=family.firings,
+            phase=self.phase,
+            tolerance=self.tolerance,
+            values=np.array([node.parameter for node in nodes]),
+            x=states[:, :, 0],
+            v=states[:, :, 1],
+            multipliers=np.array([node.multipliers for node in nodes]).reshape(count, 2),
+            backstop_contacts=np.array([len(row.of("backstop")) for row in passages], dtype=np.int64),
+            pack_contacts=np.array([len(row.of("pack")) for row in passages], dtype=np.int64),
+            printed=family.firings - lost,
+            lost=lost,
+            flight_time=of_dots(0),
+            impact_speed=of_dots(1),
+            peak_force=of_courses("peak_forces").reshape(count, family.firings),
+            coil_work=of_courses("coil_work"),
+            drive_work=of_courses("drive_work"),
+            pack_loss=of_courses("pack_loss"),
+            backstop_loss=of_courses("backstop_loss"),
+            residual=np.array([node.residual for node in nodes]),
+            contacts=tuple(row.sequence for row in passages),
+            events=tuple(event_of(point) for point in found),
+            stops=(self.retold(stops[0]), self.retold(stops[1])),
+            curve=curve,
+        )
+
+    def retold(self, stop: Stop) -> Stop:
+        """Return a stop whose sentence names the constant and its unit."""
+        at = self.told(stop.parameter)
+        why = stop.sentence.rpartition(": ")[2]
+        sentences = {
+            "bound": f"{at} is the bound",
+            "closed": f"the branch closes upon itself at {at}",
+            "no value": f"beyond {at} there is no strobe map: {why}",
+            "lost": f"beyond {at} Newton's method does not converge",
+            "length": f"the number of steps was used up at {at}",
+            "grazing": f"at {at} {why}",
+            BIRTH: f"at {at} it is born from an orbit of half its period, which doubles",
+            "not asked": f"it was not followed beyond {at}",
+        }
+        sentence = sentences.get(stop.reason, stop.sentence)
+        return Stop(stop.reason, stop.parameter, stop.state, sentence, stop.node)
