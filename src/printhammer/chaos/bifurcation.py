@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
 
-from printhammer.chaos.bifurcation_columns import FROM_REST
+from printhammer.chaos.bifurcation_columns import FROM_REST, TOLERANCE
 from printhammer.chaos.bifurcation_work import Work
 from printhammer.chaos.regime import PERIOD, RATE, Regime
 from printhammer.chaos.strobe_map import check_phase
 from printhammer.chaos.verdict import SIGNIFICANT
 from printhammer.drive_input import read_count
-from printhammer.ensemble import DISPLAY_TOLERANCE
 from printhammer.errors import InputError
 from printhammer.problem import check_tolerance
 from printhammer.start import initial_state
@@ -180,7 +179,7 @@ def bifurcation(
     state: tuple[float, float] | None = None,
     refine: SupportsIndex = REFINE,
     exponents: bool = False,
-    tolerance: float = DISPLAY_TOLERANCE,
+    tolerance: float = TOLERANCE,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Bifurcation:
@@ -215,7 +214,7 @@ def bifurcation(
         Compute the exponents of trains without a period, which tell strange ones from undecided ones; takes
         many times as long.
     tolerance : float, optional
-        As for `printhammer.simulate`; by default that for pictures.
+        As for `printhammer.simulate`; with one for pictures, trains that settle slowly pass for undecided.
     threads : int, optional
         By default as many as there are cores; the diagram does not depend on it.
     progress : callable, optional

@@ -33,11 +33,17 @@ State = tuple[float, float, float, float]
 FROM_REST: Final[State] = (math.nan, math.nan, -1.0, 0.0)
 """Row of a state that stands for a train that begins at rest, with nothing fired before."""
 
+TOLERANCE: Final = 1e-9
+"""Tolerance of diagrams and basins unless told otherwise: noise far below what a period is judged by.
+
+With `printhammer.ensemble.DISPLAY_TOLERANCE` weakly stable orbits never settle to within 1e-6 of the window.
+"""
+
 OK: Final = "ok"
 NOT_RUN: Final = "not run"
 _STATUS: Final = "U16"
 
-MOST_STATES: Final = 1 << 18
+MOST_STATES: Final = 1 << 19
 """States that are integrated in one piece; with it memory is bounded."""
 
 _PACK_BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
@@ -165,7 +171,10 @@ def _run(
     """Run trains that begin alike: all from rest, all inside the pack, or all elsewhere."""
     firings, transient, phase, tolerance = counts
     rest = bool(np.isnan(states[0, 0]))
-    trains = [_train(regime, firings, rest) for regime in regimes]
+    # Cells of a basin share one regime, columns of a diagram have one each.
+    known = {id(regime): regime for regime in regimes}
+    made = {key: _train(regime, firings, rest) for key, regime in known.items()}
+    trains = [made[id(regime)] for regime in regimes]
     moments = [
         np.append(times[transient:-1] + phase * regime.period, times[-1])
         for regime, (_drive, times) in zip(regimes, trains, strict=True)
