@@ -135,3 +135,4 @@ def test_what_the_report_tells_can_be_read(some_fail: None, tmp_path: Path) -> N
 def test_the_gauge_is_told_in_the_units_of_the_paper() -> None:
     assert "5 lb" in gauge()
     assert "1 A" in gauge()
+    assert "1.1 times" in gauge()
