@@ -30,8 +30,8 @@ def gauge() -> str:
     return (
         "Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm:"
         f" the dot of a single pulse is given the {pounds:.0f} lb that the paper calls typical, and the"
-        f" largest current of a pulse {CURRENT:g} A, the middle of the range of its Fig. 2, or what it takes for"
-        f" the current that would undo the field of the magnet to be {BEYOND:g} times the largest of that"
+        f" largest current of a pulse {CURRENT:g} A, the middle of the range of its Fig. 2, or what it takes"
+        f" for the current that would undo the field of the magnet to be {BEYOND:g} times the largest of that"
         " figure. Only the typical claims depend on the first, and on the second only the one about the range"
         " of currents, and how fast a burst that range allows."
     )
