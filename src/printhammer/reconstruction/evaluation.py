@@ -31,16 +31,17 @@ STATED: Final = {
     "poincare": 4.0,
 }
 SHAPE: Final = {
-    "release_margin": 1.0,
-    "settle_out": 1.0,
-    "low_restitution": 0.5,
-    "backstop_force_dominates": 1.0,
-    "poincare_window": 1.0,
-    "hang_up_at_high_rate": 0.5,
-    "weak_prints_when_hung_up": 1.0,
+    "release_margin": 0.4,
+    "settle_out": 0.4,
+    "low_restitution": 0.3,
+    "backstop_force_dominates": 0.4,
+    "poincare_window": 0.4,
+    "hang_up_at_high_rate": 0.2,
+    "weak_prints_when_hung_up": 0.3,
 }
 WEIGHTS: Final[dict[str, dict[str, float]]] = {"stated": STATED, "all": {**STATED, **SHAPE}}
-"""Weights of the losses: one for a claim, more for what hides several or is a condition of all others."""
+"""Weights of the losses: what is stated comes first, and above all what is a condition of other claims; a claim
+of kind "shape" counts as one panel of Fig. 11 or so."""
 
 PIECE: Final = 64
 """Points that one process looks at together."""
