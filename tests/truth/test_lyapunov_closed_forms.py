@@ -113,11 +113,11 @@ def test_the_exponent_of_the_logistic_map() -> None:
 
 @pytest.mark.slow
 def test_stable_orbits_have_the_logarithms_of_their_multipliers(hammer: "ph.Hammer") -> None:
-    judged = strobes(hammer, list(printed_verdicts()), points=2, transient=1000)
+    judged = strobes(hammer, list(printed_verdicts()), points=2, firings=(901, 1100))
     stable = [found for found in judged if found.verdict.period is not None]
     assert stable
     for train in stable:
-        found = ph.lyapunov(hammer, period=train.period, firings=400, transient=1000, tolerance=1e-13)
+        found = ph.lyapunov(hammer, period=train.period, firings=200, transient=900, tolerance=1e-13)
         q = found.verdict.period
         t = found.points.t
         assert found.ok
