@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.kernel import specialise
+from printhammer import constant_flow
+from printhammer.kernel import specialise, specialise_sensitivity
 from printhammer.kernel.reference import ReferenceRun, reference
 from printhammer.parts.backstop_elastomer import ElastomerBackstop
 from printhammer.parts.backstop_hertz import HertzBackstop
@@ -269,6 +270,7 @@ def interpreted() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Problem, "kernel", property(lambda problem: _plain(problem.laws)))
+        patch.setattr(constant_flow, "with_sensitivity", _plain_sensitivity)
         yield
 
 
@@ -280,6 +282,13 @@ def _plain(laws: Any) -> specialise.Kernel:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numba.config, "DISABLE_JIT", True)
         return specialise._specialised.__wrapped__(laws)
+
+
+@functools.cache
+def _plain_sensitivity(plain: specialise.Kernel) -> specialise.Kernel:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(numba.config, "DISABLE_JIT", True)
+        return specialise_sensitivity._built.__wrapped__(plain)
 
 
 def magnet_table(folder: Path) -> dict[str, str]:

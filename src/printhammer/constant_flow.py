@@ -14,8 +14,17 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.kernel.influence import MIDDLE, ROWS, SPACING, VARIED, width
-from printhammer.kernel.layout import BACKSTOP_PART, FRONT, PACK, POSITION
+from printhammer.kernel.influence import (
+    BACKSTOP_MOVES,
+    FIELD_MOVES,
+    MIDDLE,
+    PACK_MOVES,
+    ROWS,
+    SPACING,
+    VARIED,
+    width,
+)
+from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING
 from printhammer.kernel.modes import HELD_UNLOADING, LOADING, OK, RELOADING, RESTING, STATUS_NAMES, UNLOADING
 from printhammer.kernel.specialise_sensitivity import with_sensitivity
 from printhammer.parameters import as_arrays, parameters, rest_changes
@@ -242,7 +251,7 @@ def flow(
         problem.bounds,
         varied,
         arrays["hammer"],
-        arrays["hammer"].any(axis=1).astype(np.int64),
+        _laws_moved(arrays["hammer"]),
         arrays["firings"],
         arrays["pieces"],
         np.zeros((count, 5 * problem.firings.size)),
@@ -258,6 +267,17 @@ def flow(
         passed,
     )
     return Flow(states, changes, passed, bool(smooth))
+
+
+def _laws_moved(moves: FloatArray) -> npt.NDArray[np.int64]:
+    """Tell which laws each constant changes, as the kernel wants it."""
+    pack = moves[:, PACK:BACKSTOP_PART].any(axis=1) | (moves[:, FRONT] != 0.0)
+    return np.asarray(
+        FIELD_MOVES * (moves[:, SPRING:PACK].any(axis=1) | moves[:, MAGNET:].any(axis=1))
+        + PACK_MOVES * pack
+        + BACKSTOP_MOVES * moves[:, BACKSTOP_PART:MAGNET].any(axis=1),
+        dtype=np.int64,
+    )
 
 
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:

@@ -230,11 +230,13 @@ def _difference(function: Callable[[float], FloatArray], value: float, scale: fl
     """Return the change of an array with ``value / scale``; zero where it is infinite."""
     for offsets, weights in _STENCILS:
         try:
+            middle = function(value)
             found = [function(value + offset * _SPACING * scale) for offset in offsets]
         except InputError:
             continue
+        # From the middle, so that what does not depend on the constant is exactly zero.
         with np.errstate(invalid="ignore"):
-            change = sum(weight * array for weight, array in zip(weights, found, strict=True))
+            change = sum(weight * (array - middle) for weight, array in zip(weights, found, strict=True))
         change = np.asarray(change) / (12.0 * _SPACING)
         return np.where(np.isfinite(change), change, 0.0)
     raise InputError(

@@ -75,7 +75,9 @@ def plot(
     columns = min(_COLUMNS, len(quantities))
     for place, name in enumerate(quantities):
         ax = figure.add_subplot(rows, columns, place + 1)
-        _panel(ax, found, name, _sensitivities(found, name, number), bars)
+        _panel(ax, found, _sensitivities(found, name, number), bars)
+        of_dot = f", dot {number + 1}" if name in found.quantities and len(found.dots) > 1 else ""
+        ax.set_title(name.replace("_", " ") + of_dot, loc="left", fontsize=SMALL)
         if place >= len(quantities) - columns:
             ax.set_xlabel("change in % for 1 % of the constant", fontsize=SMALL)
     remarks = [] if found.ok else [f"The run ended early: {found.status}."]
@@ -110,11 +112,10 @@ def _sensitivities(found: Sensitivities, name: str, dot: int) -> FloatArray:
     raise InputError(f"quantity = {name!r} is not known, expected one of {known}")
 
 
-def _panel(ax: Axes, found: Sensitivities, name: str, values: FloatArray, bars: int) -> None:
+def _panel(ax: Axes, found: Sensitivities, values: FloatArray, bars: int) -> None:
     """Draw one quantity; what is zero to the digits shown is left out."""
     sizes = np.where(np.isfinite(values), np.abs(values), 0.0)
     order = [int(k) for k in np.argsort(-sizes, kind="stable")[:bars] if sizes[k] >= 5e-4]
-    ax.set_title(name.replace("_", " "), loc="left", fontsize=SMALL)
     if not order:
         ax.text(0.5, 0.5, "no sensitivity", transform=ax.transAxes, ha="center", color=MUTED, fontsize=SMALL)
         ax.set_yticks([])
@@ -125,7 +126,7 @@ def _panel(ax: Axes, found: Sensitivities, name: str, values: FloatArray, bars: 
         colour = BLUE if value > 0.0 else ORANGE
         ax.barh(height, value, height=_BAR, color=colour, gid=f"bar-{found.constants[k]}")
         ax.annotate(
-            f"{value:+.3g}",
+            f"{value:+.3g}".replace("-", "−"),
             (value, height),
             xytext=(3.0 if value > 0.0 else -3.0, 0.0),
             textcoords="offset points",

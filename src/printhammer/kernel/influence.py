@@ -70,6 +70,8 @@ MIDDLE = 4
 VARIED = 9
 """Rows of `varied`: five points to either side."""
 ENERGIES = 4
+FIELD_MOVES, PACK_MOVES, BACKSTOP_MOVES = 1, 2, 4
+"""Bits of `of_hammer`: which laws a column changes; mass and position of the backstop are no law's."""
 ROWS = 3 + ENERGIES
 """Rows of a column: displacement, velocity, latest local maximum, energies."""
 CHANGING = 2 + ENERGIES
@@ -147,7 +149,7 @@ def field_changes(x: float, value: float, k: int, varied: Any) -> tuple[float, f
 def note_changed_memories(memories: Any, peak: float, varied: Any, moves: Any, of_hammer: Any) -> None:
     """Fill `memories` with what the unloading branch needs of `peak` [m], at a fixed depth."""
     for k in range(of_hammer.size):
-        if of_hammer[k]:
+        if of_hammer[k] & PACK_MOVES:
             for j in range(VARIED):
                 at = peak + (j - MIDDLE) * SPACING * moves[k, FRONT]
                 memories[k, j] = pack_memory(varied[k, j][PACK:BACKSTOP_PART], at)
@@ -233,7 +235,7 @@ def released_loss(
     for i in range(POINTS[side]):
         at = w + OFFSETS[side, i] * spacing
         with_w += WEIGHTS[side, i] * backstop_elastic(hammer[BACKSTOP_PART:MAGNET], at) / spacing
-    if of_hammer[k]:
+    if of_hammer[k] & BACKSTOP_MOVES:
         for i in range(POINTS[CENTRAL]):
             c = varied[k, MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
             change += WEIGHTS[CENTRAL, i] * backstop_elastic(c, w) / SPACING
@@ -299,13 +301,13 @@ def influence_rates(
         dx, dv = y[j], y[j + 1]
         value_change = drive_change(t, drive, live_moves[k]) if live else 0.0
         field, coil_change = 0.0, 0.0
-        if of_hammer[k]:
+        if of_hammer[k] & FIELD_MOVES:
             field, coil_change = field_changes(x, value, k, varied)
         change = pace * (field_x * dx + field + with_value * value_change)
         pack_power, backstop_power = 0.0, 0.0
         if compressed:
             push_change, viscous_change = 0.0, 0.0
-            if of_hammer[k]:
+            if of_hammer[k] & BACKSTOP_MOVES:
                 push_change, viscous_change = contact_changes(w, v, k, varied)
             sink = moves[k, POSITION] - dx
             change += pace * (with_v * dv + push_change) + with_w * sink
@@ -316,7 +318,7 @@ def influence_rates(
             push_change = with_x * (dx - front) + with_v * dv
             if MEMORY and mode != LOADING:
                 push_change += with_peak * (columns[2, k] - front)
-            if of_hammer[k]:
+            if of_hammer[k] & PACK_MOVES:
                 push_change += pack_change(x, v, mode, k, varied, front, memories)
             change += push_change
             pack_power = -push_change * v - push * dv

@@ -10,7 +10,17 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled, entry
-from printhammer.kernel.influence import CHANGING, DELAYED, ENERGIES, MIDDLE, ROWS, SPACING
+from printhammer.kernel.influence import (
+    BACKSTOP_MOVES,
+    CHANGING,
+    DELAYED,
+    ENERGIES,
+    FIELD_MOVES,
+    MIDDLE,
+    PACK_MOVES,
+    ROWS,
+    SPACING,
+)
 from printhammer.kernel.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, POSITION
 from printhammer.kernel.modes import (
     BACKSTOP,
@@ -114,8 +124,9 @@ def rest_in_pack(
     value = drive_value(t, drive)
     with_x, _with_v = pack_slopes(x, 0.0, LOADING, 0.0, scales, hammer)
     change = -with_x * moves[k, FRONT]
-    if of_hammer[k]:
+    if of_hammer[k] & FIELD_MOVES:
         change += field_changes(x, value, k, varied)[0]
+    if of_hammer[k] & PACK_MOVES:
         change += pack_change(x, 0.0, LOADING, k, varied, moves[k, FRONT], memories)
     if drive[0] > 0.0:
         change += force_with_value(x, value, spacing, hammer) * drive_change(t, drive, live_moves[k])
@@ -136,8 +147,10 @@ def rest_in_backstop(
     for sign in (-1.0, 1.0):
         for k in range(columns.shape[1]):
             change = with_w * moves[k, POSITION] / (2.0 * w)
-            if of_hammer[k]:
-                change += field_changes(x, 0.0, k, varied)[0] + contact_changes(w, 0.0, k, varied)[0]
+            if of_hammer[k] & FIELD_MOVES:
+                change += field_changes(x, 0.0, k, varied)[0]
+            if of_hammer[k] & BACKSTOP_MOVES:
+                change += contact_changes(w, 0.0, k, varied)[0]
             columns[0, k] -= sign * change / by_x
         if sign < 0.0:
             factor = math.exp(held_in_backstop(pause, x, w, columns, scales, bounds, hammer))
@@ -161,7 +174,7 @@ def setting_in(
     value = drive_value(t, drive)
     force = field_at(x, value, hammer) + (value if FORCE_DRIVE else 0.0)
     for k in range(columns.shape[1]):
-        change = field_changes(x, value, k, varied)[0] if of_hammer[k] else 0.0
+        change = field_changes(x, value, k, varied)[0] if of_hammer[k] & FIELD_MOVES else 0.0
         if drive[0] > 0.0:
             change += force_with_value(x, value, spacing, hammer) * drive_change(t, drive, live_moves[k])
         columns[0, k] += pause * columns[1, k]
@@ -264,7 +277,7 @@ def pass_impact(node: Any, after: Any, columns: Any, hammer: Hammer, drive: Driv
     pass_rebound(node, after, columns, hammer, drive)
     for k in range(columns.shape[1]):
         later = -columns[0, k] / v_out if v_out > 0.0 else 0.0
-        if of_hammer[k]:
+        if of_hammer[k] & BACKSTOP_MOVES:
             change = 0.0
             for i in range(POINTS[CENTRAL]):
                 c = varied[k, MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
@@ -487,7 +500,7 @@ def sensitivity(
     varied, moves : float64 arrays, shapes (n, 9, h) and (n, h)
         The hammer's constants moved by -4 to 4 times `SPACING` of their changes, and the changes.
     of_hammer : int64 array, shape (n,)
-        Whether a column changes the hammer at all, 1 or 0.
+        Which laws a column changes, sum of the bits of :mod:`printhammer.kernel.influence`.
     fire_moves, piece_moves : float64 arrays, shapes (n, f) and (n, m + 1, 6)
         Changes of the firing times [s] and of the waveform's table.
     live_moves, memories : float64 arrays, shapes (n, 5 f) and (n, 9)
