@@ -40,8 +40,8 @@ SHAPE: Final = {
     "weak_prints_when_hung_up": 0.3,
 }
 WEIGHTS: Final[dict[str, dict[str, float]]] = {"stated": STATED, "all": {**STATED, **SHAPE}}
-"""Weights of the losses: what is stated comes first, and above all what is a condition of other claims; a claim
-of kind "shape" counts as one panel of Fig. 11 or so."""
+"""Weights of the losses: what is stated comes first, and above all what is a condition of other claims; a
+claim of kind "shape" counts as one panel of Fig. 11 or so."""
 
 PIECE: Final = 64
 """Points that one process looks at together."""
