@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.chaos.strobe_map import WITH_MEMORY
+from printhammer.chaos.strobe_map import WITH_MEMORY, front_with_memory
 from printhammer.ensemble import Ensemble
 from printhammer.equilibrium import rest_state
 from printhammer.errors import InputError
@@ -118,8 +118,7 @@ def record(
     for phase, own in moments.items():
         columns = np.searchsorted(times, own)
         x, v, branch = (part[:, columns] for part in (table.x, table.v, table.branch))
-        front = regime.hammer.front
-        out = (x > front) & (v <= 0.0) if front is not None else np.zeros(x.shape, np.bool_)
+        out = (x > front_with_memory(regime.hammer)) & (v <= 0.0)
         usable = np.isfinite(x) & ~np.isin(branch, WITH_MEMORY) & ~out
         found.append(Records(phase, np.stack([x, v], axis=2), usable))
     return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -290,7 +291,14 @@ def image_of(
 
 def usable(hammer: Hammer, x: float, v: float) -> bool:
     """Whether displacement, m, and velocity, m/s, alone are a state: not so on the way out of the pack."""
-    return hammer.front is None or not (x > hammer.front and v <= 0.0)
+    return not (v <= 0.0 and x > front_with_memory(hammer))
+
+
+def front_with_memory(hammer: Hammer) -> float:
+    """Return the front of the pack, m; infinite without a pack that has a memory."""
+    if hammer.pack is None or not getattr(import_module(hammer.pack.module), "MEMORY", False):
+        return math.inf
+    return hammer.pack.front
 
 
 def _no_image(status: str) -> Image:
