@@ -331,12 +331,13 @@ def pack_push_changes(
         depth = x - problem.constants[FRONT]
         share = SPACING * min(1.0, depth / sink if sink > 0.0 and depth > 0.0 else 1.0)
         share *= min(1.0, problem.scales[1] / abs(dv) if dv else 1.0)
-        total = 0.0
-        for offset, weight in zip((-2, -1, 1, 2), (1.0, -8.0, 8.0, -1.0), strict=True):
-            e = offset * share
+
+        def moved(e: float, k: int = k, dx: float = dx, dv: float = dv, dp: float = dp) -> float:
             c = (problem.constants + e * moves[k])[PACK:BACKSTOP_PART]
-            total += weight * _push(problem, c, (x + e * dx, v + e * dv, mode, peak + e * dp))
-        found[k] = total / (12.0 * share)
+            return _push(problem, c, (x + e * dx, v + e * dv, mode, peak + e * dp))
+
+        near, far = moved(share) - moved(-share), moved(2.0 * share) - moved(-2.0 * share)
+        found[k] = (8.0 * near - far) / (12.0 * share)
     return found
 
 
