@@ -174,16 +174,15 @@ class Regime:
             return self.period
         if name == RATE:
             return self.rate
-        if name.startswith(_DRIVE) and self.drive is not None:
-            found = getattr(self.drive.waveform, self._of_force(name), None)
-        elif name.startswith(_WAVEFORM) and self.waveform is not None:
-            found = getattr(self.waveform, self._of_waveform(name), None)
-        else:
-            constant = self.hammer.constants.get(name)
-            found = None if constant is None else constant.si
-        if not isinstance(found, float):
+        if name not in self.names:
             raise InputError(f"{name} is not known, expected one of {', '.join(self.names)}")
-        return found
+        if name.startswith(_DRIVE) and self.drive is not None:
+            found = getattr(self.drive.waveform, self._of_force(name))
+        elif name.startswith(_WAVEFORM) and self.waveform is not None:
+            found = getattr(self.waveform, self._of_waveform(name))
+        else:
+            found = self.hammer.constants[name].si
+        return float(found)
 
     def with_(self, name: str, value: float) -> Self:
         """Return a regime with one constant replaced.
@@ -220,7 +219,8 @@ class Regime:
         own = self.waveform
         found = [name for name in self.hammer.constants if own is None or not name.startswith(_WAVEFORM)]
         if own is not None:
-            found += [f"{_WAVEFORM}{name}" for name in quantities(type(own))]
+            given = [name for name in quantities(type(own)) if getattr(own, name) is not None]
+            found += [f"{_WAVEFORM}{name}" for name in given]
         if self.drive is not None:
             found = [name for name in found if not name.startswith(_WAVEFORM)]
             found += [f"{_DRIVE}{name}" for name in _FORCE if isinstance(self.drive, SineForce)]
