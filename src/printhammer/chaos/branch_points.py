@@ -43,6 +43,8 @@ _ROUNDS: Final = 60
 _SHARE: Final = 1e-13
 """Share of a step to which a point is located."""
 _REAL: Final = 1e-9
+_ROUNDING: Final = 1e-8
+"""Imaginary part of a real multiplier, and test function of nothing, but for rounding."""
 _SHARE_OF_CHANGE: Final = 1e-10
 _SMALL_MARGIN: Final = 0.05
 _CLOSE_MARGIN: Final = 1e-7
@@ -148,7 +150,7 @@ def points_of(
     found: list[BranchPoint] = []
     last = len(curve.nodes) - 2
     for after, (here, ahead) in enumerate(zip(curve.nodes[:-1], curve.nodes[1:], strict=True)):
-        kinds = [kind for kind, test in tests.items() if test(here) * test(ahead) < 0.0]
+        kinds = [kind for kind, test in tests.items() if _changes_sign(test(here), test(ahead))]
         # At the period doubling from which an orbit comes its curve turns back; that is no fold.
         ends = (
             after == 0 and curve.stops[0].reason == BIRTH,
@@ -170,6 +172,11 @@ def points_of(
         here_found += _changes(follower, here, ahead, after, margin)
         found += [point for *_, point in sorted(here_found, key=lambda entry: entry[0])]
     return found
+
+
+def _changes_sign(before: float, after: float) -> bool:
+    """Return whether a test function changes sign by more than rounding, as where areas are preserved."""
+    return before * after < 0.0 and max(abs(before), abs(after)) > _ROUNDING
 
 
 def _point(kind: Kind, here: Node, ahead: Node, after: int, share: float, node: Node | None) -> BranchPoint:

@@ -30,6 +30,9 @@ PRECISION: Final = 1e-10
 
 _PARTS: Final = 5.0
 """Parts of the range of the constant that count as much as half a width of the strobe window."""
+_MARGIN_STEP: Final = 1e-6
+_NEAR: Final = 1e-4
+"""Change of the margin from which its slope is known; part of the range within which its zero is a stop."""
 _DIGITS: Final = ".9g"
 
 
@@ -106,7 +109,36 @@ class Work:
             steps=steps,
             watch=self.watch(firings, steps, progress),
         )
-        return self.described(family, curve, steps)
+        return self.described(family, self.grazed(family, curve), steps)
+
+    def grazed(self, family: RegimeFamily, curve: Curve) -> Curve:
+        """Return a curve that is lost where it grazes a rigid backstop with that as the reason.
+
+        The margin passes through 0 there, linearly on this side; its zero is the place.
+        """
+        if not rigid_backstop(self.regime):
+            return curve
+        stops = []
+        for stop, nodes in zip(curve.stops, (curve.nodes, curve.nodes[::-1]), strict=True):
+            place = self.zero_margin(family, nodes) if stop.reason in ("lost", "no value") else None
+            told = "it grazes the rigid backstop, where the strobe map has no derivative"
+            grazed = stop if place is None else Stop("grazing", place, nodes[0].state, told)
+            stops.append(grazed)
+        return Curve(curve.nodes, (stops[0], stops[1]))
+
+    def zero_margin(self, family: RegimeFamily, nodes: list[Node]) -> float | None:
+        """Return where the margin of the first node goes to 0, continued from a later one; None if far."""
+        last = family.margin(nodes[0].state, nodes[0].parameter)
+        for node in nodes[1:]:
+            margin = family.margin(node.state, node.parameter)
+            if abs(margin - last) > _MARGIN_STEP:
+                break
+        else:
+            return None
+        slope = (nodes[0].parameter - node.parameter) / (last - margin)
+        place = nodes[0].parameter - last * slope
+        near = abs(place - nodes[0].parameter) < _NEAR * (self.bounds[1] - self.bounds[0])
+        return place if abs(last) < abs(margin) and near else None
 
     def doubled(self, firings: int, event: BranchEvent, most: int) -> Branch:
         """Return the branch born at a period doubling of an orbit of so many firings."""

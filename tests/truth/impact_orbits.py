@@ -1,0 +1,149 @@
+"""Periodic orbits of two rigid impact oscillators in closed form: bouncing ball and linear oscillator.
+
+Plain formulas, derived here; they share nothing with the program.
+
+*Bouncing ball.* A table moves as A sin(w t); a ball under gravity g bounces on it with restitution e.
+Relative to the table it feels m (A w^2 sin(w t) - g). On an orbit with one impact in n periods T = 2 pi / w
+it meets the table each time at the same height, so it leaves at g n T / 2 and arrives at minus that, in the
+frame of the ground. The law of impact gives the velocity c of the table then, and with Gamma = A w^2 / g and
+the phase p of the impact
+
+    c = (g n T / 2) (1 - e) / (1 + e),   Gamma cos p = n pi (1 - e) / (1 + e).
+
+With a = -A w^2 sin p the map from impact to impact, linearised, has the determinant e^2 and the trace
+1 + e^2 + (1 + e)^2 a / g. A multiplier is 1 where a = 0, and -1 where Gamma sin p = 2 (1 + e^2) / (1 + e)^2.
+
+*Linear oscillator.* x'' + x = F cos(w t) for x > b, restitution e at b (S. W. Shaw and P. J. Holmes, J. Sound
+Vib. 90 (1983) 129, without damping). After an impact at t0
+
+    x = A cos(t - t0) + B sin(t - t0) + G cos(w t),   G = F / (1 - w^2).
+
+For one impact in n periods T, x is b at both ends, so B = A tan(T/2) and A = b - G cos(w t0); the velocities
+at both ends give G w sin(w t0) = B (1 - e) / (1 + e), and the impact leaves with 2 e B / (1 + e). From
+cos^2 + sin^2 = 1 follows a quadratic equation for B. The map from impact to impact has the determinant e^2
+and the trace -2 e cos T - (1 + e)^2 a sin T / (2 B), a = -b + F cos(w t0).
+"""
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class BouncingBall:
+    """n: periods of the table between impacts."""
+
+    gravity: float
+    restitution: float
+    frequency: float
+    n: int = 1
+
+    @property
+    def omega(self) -> float:
+        return 2.0 * math.pi * self.frequency
+
+    @property
+    def fold(self) -> float:
+        """Gamma at which the two orbits with one impact in n periods appear."""
+        return self.n * math.pi * (1.0 - self.restitution) / (1.0 + self.restitution)
+
+    @property
+    def doubling(self) -> float:
+        """Gamma at which the stable one of them doubles its period."""
+        e = self.restitution
+        return math.hypot(self.fold, 2.0 * (1.0 + e * e) / (1.0 + e) ** 2)
+
+    def impact_phase(self, gamma: float, stable: bool = True) -> float:
+        """Phase of the impacts, rad; the stable orbit meets the table while it slows down."""
+        p = math.acos(self.fold / gamma)
+        return p if stable else -p
+
+    def trace(self, gamma: float, stable: bool = True) -> float:
+        e = self.restitution
+        return 1.0 + e * e - (1.0 + e) ** 2 * gamma * math.sin(self.impact_phase(gamma, stable))
+
+    def state(self, gamma: float, t: float, stable: bool = True) -> tuple[float, float]:
+        """Height above the table and its rate, at a time between the impact near 0 and the next."""
+        height = gamma * self.gravity / self.omega**2
+        t0 = self.impact_phase(gamma, stable) / self.omega
+        up, dt = 0.5 * self.gravity * self.n / self.frequency, t - t0
+        y = height * (math.sin(self.omega * t0) - math.sin(self.omega * t)) + up * dt
+        v = up - self.gravity * dt - height * self.omega * math.cos(self.omega * t)
+        return y - 0.5 * self.gravity * dt * dt, v
+
+
+@dataclass(frozen=True)
+class LinearImpacts:
+    """n: periods of the force between impacts; mass and stiffness are 1."""
+
+    omega: float
+    stop: float
+    restitution: float
+    n: int = 1
+
+    @property
+    def period(self) -> float:
+        return 2.0 * math.pi * self.n / self.omega
+
+    @property
+    def _tangent(self) -> float:
+        return math.tan(0.5 * self.period)
+
+    @property
+    def _share(self) -> float:
+        return (1.0 - self.restitution) / ((1.0 + self.restitution) * self.omega)
+
+    def gain(self, force: float) -> float:
+        return force / (1.0 - self.omega**2)
+
+    @property
+    def fold(self) -> float:
+        """Amplitude of the force at which the quadratic equation has one root."""
+        kt = self._share * abs(self._tangent)
+        return abs(1.0 - self.omega**2) * abs(self.stop) * kt / math.sqrt(1.0 + kt * kt)
+
+    @property
+    def grazing(self) -> float:
+        """Amplitude of the force at which the oscillation without impact touches the stop."""
+        return abs(1.0 - self.omega**2) * abs(self.stop)
+
+    @property
+    def doubling(self) -> tuple[float, float]:
+        """Amplitude of the force at which a multiplier is -1, and B there."""
+        e, period = self.restitution, self.period
+        k = 2.0 * (1.0 + e * e - 2.0 * e * math.cos(period)) / ((1.0 + e) ** 2 * math.sin(period))
+        b = -(self.omega**2) * self.stop / (k + (1.0 - self.omega**2) / self._tangent)
+        gain = math.hypot(self.stop - b / self._tangent, b * self._share)
+        return abs(1.0 - self.omega**2) * gain, b
+
+    def roots(self, force: float) -> list[tuple[float, float]]:
+        """B and the phase of the impact, rad, of the orbits under a force, if any."""
+        gain = self.gain(force)
+        square = 1.0 / self._tangent**2 + self._share**2
+        half, rest = -self.stop / self._tangent, self.stop**2 - gain**2
+        inside = half * half - square * rest
+        if inside < 0.0:
+            return []
+        found = []
+        for sign in (1.0, -1.0):
+            b = (-half + sign * math.sqrt(inside)) / square
+            sine = b * self._share / gain
+            found.append((b, math.atan2(sine, (self.stop - b / self._tangent) / gain)))
+        return found
+
+    def trace(self, b: float) -> float:
+        e = self.restitution
+        a = -(self.omega**2) * self.stop - (1.0 - self.omega**2) * b / self._tangent
+        return -2.0 * e * math.cos(self.period) - (1.0 + e) ** 2 * a * math.sin(self.period) / (2.0 * b)
+
+    def state(self, force: float, b: float, phase: float, t: float) -> tuple[float, float]:
+        """Displacement and velocity a time t after the impact."""
+        gain = self.gain(force)
+        a = self.stop - gain * math.cos(phase)
+        x = a * math.cos(t) + b * math.sin(t) + gain * math.cos(self.omega * t + phase)
+        v = b * math.cos(t) - a * math.sin(t) - gain * self.omega * math.sin(self.omega * t + phase)
+        return x, v
+
+    def possible(self, force: float, b: float, phase: float) -> bool:
+        """Whether it leaves the stop and stays off it until the next impact."""
+        times = [self.period * i / 1000.0 for i in range(1, 1000)]
+        return b > 0.0 and all(self.state(force, b, phase, t)[0] > self.stop for t in times)

@@ -1,0 +1,195 @@
+"""Branches and branch points of rigid impact oscillators, and of a grazing, against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from tests.truth.impact_orbits import BouncingBall, LinearImpacts
+
+import printhammer as ph
+from printhammer.chaos.continuation import Branch, continuation
+
+SHARP = 1e-8
+MASS, GRAVITY, FREQUENCY = 1e-3, 9.80665, 50.0
+
+
+def ball_of(case: BouncingBall) -> "ph.Hammer":
+    return ph.Hammer.build(
+        MASS,
+        spring={"law": "preload", "preload": -MASS * case.gravity, "stiffness": 0.0},
+        backstop={"law": "rigid", "position": 0.0, "restitution": case.restitution},
+    )
+
+
+def bounces(case: BouncingBall, gamma: float, bounds: tuple[float, float], stable: bool = True) -> Branch:
+    weight = MASS * case.gravity
+    return continuation(
+        ball_of(case),
+        "drive.amplitude",
+        (bounds[0] * weight, bounds[1] * weight),
+        drive=ph.SineForce(gamma * weight, case.frequency),
+        state=case.state(gamma, 0.5 / case.frequency, stable),
+        firings=case.n,
+        phase=0.5,
+    )
+
+
+def values(branch: Branch, kind: str) -> list[float]:
+    assert all(event.sharp for event in branch.events)
+    return [event.value for event in branch.events if event.kind == kind]
+
+
+def oscillator_of(case: LinearImpacts) -> "ph.Hammer":
+    return ph.Hammer.build(
+        1.0,
+        spring={"law": "preload", "preload": -case.stop, "stiffness": 1.0},
+        backstop={"law": "rigid", "position": case.stop, "restitution": case.restitution},
+    )
+
+
+def impacts(
+    case: LinearImpacts, force: float, root: int, phase: float, bounds: tuple[float, float]
+) -> Branch:
+    b, angle = case.roots(force)[root]
+    assert case.possible(force, b, angle)
+    late = ((2.0 * math.pi * phase - angle) / case.omega) % case.period
+    return continuation(
+        oscillator_of(case),
+        "drive.amplitude",
+        bounds,
+        drive=ph.SineForce(force, case.omega / (2.0 * math.pi), phase=0.5 * math.pi),
+        state=case.state(force, b, angle, late),
+        firings=case.n,
+        phase=phase,
+    )
+
+
+@pytest.mark.parametrize(("restitution", "n", "gamma"), [(0.8, 1, 0.8), (0.5, 1, 1.3), (0.8, 2, 1.0)])
+def test_bouncing_ball(restitution: float, n: int, gamma: float) -> None:
+    case = BouncingBall(GRAVITY, restitution, FREQUENCY, n)
+    branch = bounces(case, gamma, (0.5 * case.fold, 1.3 * case.doubling))
+    weight = MASS * GRAVITY
+    assert [stop.reason for stop in branch.stops] == ["bound", "bound"]
+    assert {event.kind for event in branch.events} == {"fold", "period doubling"}
+    assert values(branch, "fold") == [pytest.approx(case.fold * weight, rel=SHARP)]
+    assert values(branch, "period doubling") == [pytest.approx(case.doubling * weight, rel=SHARP)]
+    (limits,) = branch.stable_ranges
+    assert limits == pytest.approx((case.fold * weight, case.doubling * weight), rel=SHARP)
+
+
+def test_bouncing_ball_orbits_and_multipliers() -> None:
+    case = BouncingBall(GRAVITY, 0.8, FREQUENCY)
+    branch = bounces(case, 0.8, (0.9 * case.fold, 1.1))
+    seen = set()
+    for value, x, v, multipliers in zip(branch.values, branch.x, branch.v, branch.multipliers, strict=True):
+        gamma = value / (MASS * GRAVITY)
+        if gamma - case.fold < 1e-4:
+            continue
+        exact = {stable: case.state(gamma, 0.5 / FREQUENCY, stable) for stable in (True, False)}
+        stable = bool(abs(x[0] - exact[True][0]) < abs(x[0] - exact[False][0]))
+        seen.add(stable)
+        np.testing.assert_allclose((x[0], v[0]), exact[stable], rtol=1e-8)
+        assert multipliers.sum() == pytest.approx(case.trace(gamma, stable), abs=1e-6)
+        assert multipliers.prod() == pytest.approx(case.restitution**2, rel=1e-8)
+    assert seen == {True, False}
+    assert set(branch.contacts) == {"B"}
+    np.testing.assert_allclose(branch.drive_work, branch.backstop_loss, rtol=1e-7)
+
+
+def test_bouncing_ball_doubled() -> None:
+    case = BouncingBall(GRAVITY, 0.5, FREQUENCY)
+    weight = MASS * GRAVITY
+    branch = bounces(case, 1.3, (0.9 * case.fold, 1.05 * case.doubling))
+    (event,) = [event for event in branch.events if event.kind == "period doubling"]
+    doubled = branch.doubled(event)
+    assert doubled.firings == 2
+    assert doubled.stops[0].reason == "period doubling"
+    assert doubled.stops[0].parameter == pytest.approx(case.doubling * weight, rel=SHARP)
+    assert doubled.values[0] == pytest.approx(case.doubling * weight, rel=1e-3)
+    # Supercritical: the doubled orbit is stable at first.
+    assert doubled.stable[0]
+    assert doubled.values[-1] == branch.bounds[1]
+    # Two different flights, together two periods; both impacts leave as fast as they arrived, times e.
+    assert abs(doubled.x[-1, 0] - doubled.x[-1, 1]) > 1e-5
+    assert set(doubled.contacts) == {"BB"}
+
+
+@pytest.mark.parametrize(
+    ("omega", "stop", "restitution"), [(3.2, 0.1, 0.5), (3.2, 0.1, 0.8), (2.6, 0.1, 0.8), (1.7, -0.1, 0.5)]
+)
+def test_linear_impact_oscillator_folds(omega: float, stop: float, restitution: float) -> None:
+    case = LinearImpacts(omega, stop, restitution)
+    (_, angle), *_ = case.roots(1.0000001 * case.fold)
+    phase = (0.5 * angle / math.pi + 0.5) % 1.0
+    branch = impacts(case, 1.05 * case.fold, 0, phase, (0.5 * case.fold, 1.1 * case.fold))
+    assert values(branch, "fold") == [pytest.approx(case.fold, rel=SHARP)]
+    for value, x, v, multipliers in zip(branch.values, branch.x, branch.v, branch.multipliers, strict=True):
+        exact = []
+        for b, place in case.roots(value):
+            late = ((2.0 * math.pi * phase - place) / omega) % case.period
+            exact.append((*case.state(value, b, place, late), case.trace(b)))
+        nearest = min(exact, key=lambda found: abs(found[0] - x[0]), default=None)
+        if nearest is None or value < 1.0001 * case.fold:
+            continue
+        np.testing.assert_allclose((x[0], v[0]), nearest[:2], atol=1e-8)
+        assert multipliers.sum().real == pytest.approx(nearest[2], abs=1e-5)
+        assert multipliers.prod().real == pytest.approx(restitution**2, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("omega", "stop", "restitution"), [(3.2, 0.1, 0.5), (3.2, 0.1, 0.8), (2.2, -0.1, 0.8), (0.8, -0.1, 0.5)]
+)
+def test_linear_impact_oscillator_doubles(omega: float, stop: float, restitution: float) -> None:
+    case = LinearImpacts(omega, stop, restitution)
+    force, b = case.doubling
+    which = int(np.argmin([abs(root[0] - b) for root in case.roots(force)]))
+    assert case.trace(b) == pytest.approx(-1.0 - restitution**2, rel=1e-12)
+    phase = (0.5 * case.roots(force)[which][1] / math.pi + 0.5) % 1.0
+    branch = impacts(case, 1.02 * force, which, phase, (0.95 * force, 1.05 * force))
+    assert values(branch, "period doubling") == [pytest.approx(force, rel=SHARP)]
+
+
+def test_an_oscillation_ends_where_it_grazes_a_rigid_stop() -> None:
+    case = LinearImpacts(1.7, -0.1, 0.8)
+    force = 0.5 * case.grazing
+    branch = continuation(
+        oscillator_of(case),
+        "drive.amplitude",
+        (0.1 * case.grazing, 2.0 * case.grazing),
+        drive=ph.SineForce(force, case.omega / (2.0 * math.pi), phase=0.5 * math.pi),
+        state=(0.0, -case.gain(force) * case.omega),
+        phase=0.25,
+    )
+    assert [stop.reason for stop in branch.stops] == ["bound", "grazing"]
+    assert branch.stops[1].parameter == pytest.approx(case.grazing, rel=1e-6)
+    assert "grazes" in branch.message
+    speeds = [-case.gain(value) * case.omega for value in branch.values]
+    np.testing.assert_allclose(branch.v[:, 0], speeds, atol=1e-9)
+
+
+def test_an_oscillation_goes_on_where_it_grazes_a_pack() -> None:
+    # x'' + x = F cos(w t) is F / (1 - w^2) cos(w t), and meets the pack where that gets to its front.
+    omega, front = 1.7, 0.1
+    limit = front * (omega**2 - 1.0)
+    hammer = ph.Hammer.build(
+        1.0,
+        spring={"law": "preload", "preload": 0.0, "stiffness": 1.0},
+        pack={"law": "power", "front": front, "thickness": 0.05, "stiffness": 50.0},
+    )
+    force = 0.95 * limit
+    branch = continuation(
+        hammer,
+        "drive.amplitude",
+        (0.9 * limit, 1.1 * limit),
+        drive=ph.SineForce(force, omega / (2.0 * math.pi), phase=0.5 * math.pi),
+        state=(force / (1.0 - omega**2), 0.0),
+        most=60,
+    )
+    (event,) = [event for event in branch.events if event.kind == "grazing"]
+    assert event.value == pytest.approx(limit, rel=1e-6)
+    assert (event.surface, event.change, event.contacts) == ("pack", "appears", ("", "P"))
+    assert branch.values.max() > 1.0001 * limit
+    assert set(branch.contacts) == {"", "P"}
+    np.testing.assert_array_equal(branch.pack_contacts, [int(word == "P") for word in branch.contacts])
+    # Without contact areas are preserved, and both multipliers stay on the unit circle: no event.
+    assert [event.kind for event in branch.events if event.contacts == ("", "")] == []
