@@ -280,7 +280,7 @@ def _key(attractor: Attractor) -> tuple[int, float, float]:
     return LARGEST_PERIOD + 1 if attractor.period is None else attractor.period, x, v
 
 
-def _axis(given: Range | None, name: str, unit: str, window: tuple[float, float]) -> FloatArray:
+def _axis(given: Any, name: str, unit: str, window: tuple[float, float]) -> FloatArray:
     if given is None:
         return np.linspace(*window, CELLS)
     if not isinstance(given, tuple | list) or len(given) != 3:

@@ -20,6 +20,7 @@ from printhammer.figures.style import (
     MUTED,
     ORANGE,
     SMALL,
+    THIN,
     YELLOW,
     new_figure,
     sign,
@@ -73,8 +74,9 @@ def plot(
     show : str, optional
         "x": displacements at the firings; "v": velocities.
     orbits : iterable, optional
-        Periodic orbits of `printhammer.orbits`, or collections of them, drawn over: filled circles for
-        stable ones, open ones for unstable ones. Their regime tells at which value they lie.
+        Drawn over in green: periodic orbits of `printhammer.orbits`, filled circles for stable and open ones
+        for unstable ones, and branches of `printhammer.continuation`, drawn out for stable and dotted for
+        unstable orbits; also collections of them.
     limits : tuple of float, optional
         Least and largest displacement or velocity shown, SI; by default all but one in a thousand at
         either end are shown, and the others counted.
@@ -88,7 +90,7 @@ def plot(
     Raises
     ------
     InputError
-        There is nothing to draw.
+        There is nothing to draw, or an orbit belongs to another parameter or phase.
     """
     if show not in ("x", "v"):
         raise InputError(f"show = {show!r}, expected 'x' or 'v'")
@@ -174,27 +176,48 @@ def _points(ax: Axes, diagram: Bifurcation, states: FloatArray, across: Scale, u
 
 
 def _each(orbits: Iterable[Any]) -> Iterable[Any]:
-    for entry in orbits:
-        if hasattr(entry, "states") and hasattr(entry, "regime"):
+    """Return orbits and branches one by one, whatever collections they come in."""
+    for entry in [orbits] if hasattr(orbits, "multipliers") else orbits:
+        if hasattr(entry, "multipliers"):
             yield entry
         else:
             yield from _each(entry)
 
 
-def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale, up: Scale) -> None:
-    value = float(across.shown(orbit.regime.value(diagram.parameter)))
-    states = np.asarray(orbit.states, dtype=np.float64)[:, 0 if show == "x" else 1]
+def _orbit(ax: Axes, diagram: Bifurcation, found: Any, show: str, across: Scale, up: Scale) -> None:
+    """Draw a periodic orbit as circles, or a branch of them as curves."""
+    states = up.shown(getattr(found, show))
+    if states.ndim == 2:
+        if found.parameter != diagram.parameter or found.phase != diagram.phase:
+            raise InputError(
+                f"orbits: a branch in {found.parameter} at phase {found.phase:g}, expected one in"
+                f" {diagram.parameter} at phase {diagram.phase:g}"
+            )
+        values = across.shown(found.values)
+        stable = np.abs(found.multipliers[:, 0]) < 1.0
+        for kind, style in ((stable, "-"), (~stable, (0, (1.5, 1.5)))):
+            # A curve goes on to the first orbit of the other kind, so that no gap is left.
+            shown = kind | np.append(False, kind[:-1])
+            line = np.where(shown[:, np.newaxis], states, np.nan)
+            gid = "stable branch" if kind is stable else "unstable branch"
+            ax.plot(values, line, color=GREEN, lw=THIN, ls=style, zorder=5.0, gid=gid)
+        return
+    if diagram.phase:
+        raise InputError(
+            f"orbits: their states are at the firings, expected a diagram of phase 0 for {found!r}"
+        )
+    stable = found.kind == "stable"
     ax.plot(
-        np.full(len(states), value),
-        up.shown(states),
+        np.full(len(states), float(across.shown(found.regime.value(diagram.parameter)))),
+        states,
         ls="none",
         marker="o",
-        ms=2.6,
-        mew=0.6,
+        ms=3.2,
+        mew=0.8,
         mec=GREEN,
-        mfc=GREEN if orbit.stable else "white",
+        mfc=GREEN if stable else "white",
         zorder=6.0,
-        gid="stable orbit" if orbit.stable else "unstable orbit",
+        gid="stable orbit" if stable else "unstable orbit",
     )
 
 

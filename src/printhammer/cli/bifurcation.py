@@ -1,0 +1,286 @@
+"""The verb `bifurcation`: the states at the firings against a parameter, windows, and the way into chaos."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from io import BytesIO
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from printhammer.cli.numbers import number, whole
+from printhammer.cli.run import HAMMER, HammerArgument, Overlap
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from printhammer.chaos.bifurcation import Bifurcation
+    from printhammer.hammer import Hammer
+
+EXAMPLE: Final = (
+    "Example: printhammer bifurcation hendriks-1983 --from '1.2 ms' --to '1.35 ms' --values 60"
+    " --direction both --out bifurcation.png"
+)
+
+_PICTURES: Final = (".svg", ".png", ".pdf")
+_RANGE: Final = ("0.8 ms", "1.35 ms")
+_VALUES: Final = 500
+_PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
+_ROWS: Final = 12
+
+
+class Direction(StrEnum):
+    """How the state at the beginning of a train comes about."""
+
+    REST = "from-rest"
+    UP = "up"
+    DOWN = "down"
+    BOTH = "both"
+
+
+def _of(flag: str, metavar: str, text: str) -> Any:
+    return typer.Option(flag, metavar=metavar, help=text, rich_help_panel=_PARAMETER)
+
+
+def bifurcation(
+    hammer: HammerArgument = HAMMER,
+    parameter: Annotated[
+        str, _of("--parameter", "NAME", "period, rate, or any constant such as backstop.damping.")
+    ] = "period",
+    lowest: Annotated[str | None, _of("--from", "VALUE", "Least value, with its unit.")] = None,
+    highest: Annotated[str | None, _of("--to", "VALUE", "Largest value, with its unit.")] = None,
+    values: Annotated[str, _of("--values", "N", "Number of values.")] = str(_VALUES),
+    period: Annotated[
+        str | None, _of("--period", "TIME", "Time between firings, where another constant is changed.")
+    ] = None,
+    rate: Annotated[str | None, _of("--rate", "RATE", "Firings per second, likewise.")] = None,
+    firings: Annotated[str, typer.Option(metavar="N", help="Firings at each value.")] = "300",
+    transient: Annotated[str, typer.Option(metavar="N", help="Of these, left out at the beginning.")] = "100",
+    direction: Annotated[
+        Direction,
+        typer.Option(
+            metavar="from-rest|up|down|both",
+            help="Begin at rest (default), or where the train at the value before, or after, ended.",
+        ),
+    ] = Direction.REST,
+    refine: Annotated[
+        str, typer.Option(metavar="N", help="Halve the steps between neighbours that differ so often.")
+    ] = "2",
+    exponents: Annotated[
+        bool, typer.Option("--exponents", help="Tell strange trains from undecided ones; takes long.")
+    ] = False,
+    overlap: Annotated[
+        Overlap,
+        typer.Option(metavar="add|replace", help="Overlapping pulses add up, or the latest replaces."),
+    ] = Overlap.ADD,
+    show: Annotated[str, typer.Option(metavar="x|v", help="What a picture shows.")] = "x",
+    tolerance: Annotated[str | None, typer.Option(metavar="X", help="Error allowed in one step.")] = None,
+    threads: Annotated[str | None, typer.Option(metavar="N", help="Threads (all cores).")] = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="States (.nc), verdicts (.csv) or picture (.svg, .png, .pdf); may be given repeatedly.",
+        ),
+    ] = None,
+) -> None:
+    """Fire trains at many values of a parameter and tell which are periodic, and what leads to chaos.
+
+    Ends with status 1 where a run stopped before its end. Ctrl-C writes what is done.
+    """
+    from rich.markup import escape
+
+    from printhammer.chaos.bifurcation import InterruptedDiagram
+    from printhammer.cli import run_files
+    from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
+    from printhammer.drive import PulseTrain
+    from printhammer.errors import InputError
+    from printhammer.outputs import check_outputs
+
+    wanted = out or []
+    _check(wanted, show)
+    check_outputs(wanted, [Path(hammer)])
+    options: dict[str, Any] = {
+        "firings": whole(firings, "firings"),
+        "transient": whole(transient, "transient"),
+        "refine": whole(refine, "refine"),
+        "direction": direction.value.replace("-", " "),
+        "overlap": overlap.value,
+        "exponents": exponents,
+        "threads": whole(threads, "threads"),
+    }
+    if tolerance is not None:
+        options["tolerance"] = number(tolerance, "tolerance")
+    loaded = load_checked(hammer)
+    if loaded.waveform is None:
+        raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
+    named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
+    check_outputs(wanted, [Path(hammer), *named])
+    options |= _values(loaded, parameter, (lowest, highest), whole(values, "values") or 0, period, rate)
+    announce_compiling()
+    screen = console()
+    begin = perf_counter()
+    stopped = None
+    try:
+        found = _computed(loaded, options)
+    except InterruptedDiagram as interrupt:
+        stopped, found = interrupt, interrupt.diagram
+    done = int((found.status != "not run").sum())
+    screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
+    screen.print(
+        f"[dim]{escape(found.parameter)}: {len(found.values)} values, {done} trains of"
+        f" {int(found.firing[-1])} firings, tolerance {found.tolerance:g}; computed in"
+        f" {perf_counter() - begin:.2g} s[/dim]\n"
+    )
+    if done:
+        for name in found.directions:
+            screen.print(summary(found, name))
+        for line in sentences(found):
+            screen.print(escape(line), soft_wrap=True)
+        for path in wanted:
+            _write(found, path, show)
+            screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    if stopped is not None:
+        raise KeyboardInterrupt from stopped
+    failed = found.status[found.status != "ok"]
+    if failed.size:
+        kinds = ", ".join(sorted(set(failed.tolist())))
+        complain(f"{failed.size} of {found.status.size} runs ended early: {kinds}")
+        raise typer.Exit(1)
+
+
+def _check(wanted: list[Path], show: str) -> None:
+    from printhammer.chaos.bifurcation_tables import SUFFIXES
+    from printhammer.errors import InputError
+
+    for path in wanted:
+        if path.suffix.lower() not in (*SUFFIXES, *_PICTURES):
+            known = ", ".join((*SUFFIXES, *_PICTURES))
+            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    if show not in ("x", "v"):
+        raise InputError(f"--show {show}: expected x or v")
+
+
+def _values(
+    hammer: Hammer,
+    parameter: str,
+    ends: tuple[str | None, str | None],
+    count: int,
+    period: str | None,
+    rate: str | None,
+) -> dict[str, Any]:
+    """Return the parameter and its values as arguments of `printhammer.bifurcation`."""
+    import numpy as np
+
+    from printhammer.chaos.bifurcation_tables import meaning_of
+    from printhammer.chaos.regime import Regime
+    from printhammer.drive_input import read_number
+    from printhammer.errors import InputError
+
+    timed = parameter in ("period", "rate")
+    if timed and (period is not None or rate is not None):
+        raise InputError(f"--period and --rate: expected none of them where the {parameter} is changed")
+    given = {"period": _RANGE[0]} if timed else {"period": period, "rate": rate}
+    regime = Regime.of(hammer, **given)  # type: ignore[arg-type]
+    regime.value(parameter)
+    unit, _meaning = meaning_of(regime, parameter)
+    if parameter == "period":
+        ends = (ends[0] or _RANGE[0], ends[1] or _RANGE[1])
+    if ends[0] is None or ends[1] is None:
+        raise InputError(f"--from and --to: expected both of them for {parameter}, in {unit}")
+    low, high = (
+        read_number(end, unit, name) if unit != "1" else number(end, name) or 0.0
+        for end, name in zip(ends, ("--from", "--to"), strict=True)
+    )
+    if count < 2 or not low < high:
+        raise InputError(
+            f"--from {ends[0]}, --to {ends[1]} and --values {count}: expected the second to be the higher"
+            " one, and at least 2 values"
+        )
+    grid = np.linspace(low, high, count)
+    if timed:
+        return {f"{parameter}s": grid}
+    return {"parameter": parameter, "values": grid, "period": period, "rate": rate}
+
+
+def _computed(hammer: Hammer, options: dict[str, Any]) -> Bifurcation:
+    """Compute the diagram and show how far it is."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from printhammer.chaos.bifurcation import bifurcation as computed
+
+    with Progress(
+        TextColumn("trains"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as shown:
+        task = shown.add_task("trains", total=None)
+        return computed(
+            hammer,
+            progress=lambda done, total: shown.update(task, completed=done, total=total),
+            **options,
+        )
+
+
+def summary(found: Bifurcation, direction: str) -> Table:
+    """Return the verdicts of one direction: how many windows, how wide together, the widest one."""
+    from printhammer.cli.terminal import plain_table
+
+    windows = found.windows(direction)
+    table = plain_table(
+        ("verdict", "left"),
+        ("windows", "right"),
+        ("share", "right"),
+        ("widest from", "right"),
+        ("to", "right"),
+        title=direction,
+    )
+    whole_width = sum(window.width for window in windows) or 1.0
+    kinds = sorted({(window.period or 1000, window.verdict) for window in windows})
+    for _period, verdict in kinds[:_ROWS]:
+        some = [window for window in windows if window.verdict == verdict]
+        widest = max(some, key=lambda window: window.width)
+        table.add_row(
+            verdict.replace("-", " "),
+            str(len(some)),
+            f"{100.0 * sum(window.width for window in some) / whole_width:.2f} %",
+            f"{widest.low:.7g}",
+            f"{widest.high:.7g}",
+        )
+    if len(kinds) > _ROWS:
+        table.add_row(f"and {len(kinds) - _ROWS} more", "", "", "", "")
+    return table
+
+
+def sentences(found: Bifurcation) -> list[str]:
+    """Return what the diagram tells: the routes to the first strange train, and hysteresis."""
+    from printhammer.chaos.bifurcation_windows import cells, hysteresis
+
+    told = [""]
+    for direction in found.directions:
+        said = f"{direction}: " if len(found.directions) > 1 else ""
+        told += [f"{said}{route.sentence}" for route in found.routes(direction)]
+    if len(found.directions) > 1:
+        apart = hysteresis(found)
+        widths = cells(found.values)
+        share = float(widths[apart].sum() / (widths.sum() or 1.0))
+        told.append(f"Up and down lead to different attractors at {100.0 * share:.2f} % of the range.")
+    return told
+
+
+def _write(found: Bifurcation, path: Path, show: str) -> None:
+    from printhammer.chaos.bifurcation_tables import save_bifurcation
+    from printhammer.outputs import write_file
+
+    if path.suffix.lower() in _PICTURES:
+        buffer = BytesIO()
+        found.plot(show=show).savefig(buffer, format=path.suffix[1:].lower(), dpi=200.0)
+        write_file(path, buffer.getvalue())
+    else:
+        save_bifurcation(found, path)
