@@ -148,6 +148,7 @@ def test_the_claims_for_machines(folder: Path) -> None:
 def test_what_the_reconstruction_found_is_told(page: Page) -> None:
     for told in (
         "1 %",  # of random hammers settle_out holds for
+        ", of 900",  # fewer than there are random hammers
         "15 % 3 of 20",  # and of those found on the stated claims alone
         "4 000 on the stated claims alone (seed 7), 9 000 on all claims (seed 8)",
         "4.5 hours of one core",

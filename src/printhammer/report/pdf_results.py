@@ -76,7 +76,7 @@ def rates_pages(sheet: Sheet, report: Report) -> None:
     sheet.write(
         body(
             f"The share of {rates.hammers} random plausible hammers (seed {rates.seed}) for which each claim"
-            " holds, with its 95 % interval, on a logarithmic scale."
+            " holds, with its 95 % interval, on a logarithmic scale; where fewer were judged, of how many."
         ),
         after=8.0,
     )
@@ -97,7 +97,9 @@ def rates_pages(sheet: Sheet, report: Report) -> None:
         sheet.box(place - 3.0, y + 1.9, 6.0, 6.0, COLORS[result.verdict])
         if result.verdict != "holds":
             sheet.box(place - 1.7, y + 3.2, 3.4, 3.4, "white")
-        sheet.put(Words(f"{row['rate']}   ({row['interval']})", 7.0), left + span + 12.0, y)
+        measured = row["share"].measured
+        fewer = f", of {measured}" if measured != rates.hammers else ""
+        sheet.put(Words(f"{row['rate']}   ({row['interval']}{fewer})", 7.0), left + span + 12.0, y)
         sheet.y += 12.0
 
 
