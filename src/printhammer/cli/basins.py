@@ -119,7 +119,9 @@ def basins(
     check_outputs(wanted, [Path(hammer), *named])
     announce_compiling()
     given = {"tolerance": number(tolerance, "tolerance"), "threads": whole(threads, "threads")}
-    options = {key: value for key, value in {**given, **of_basins, **of_quench}.items() if value is not None}
+    options: dict[str, Any] = {
+        key: value for key, value in {**given, **of_basins, **of_quench}.items() if value is not None
+    }
     screen = console()
     begin = perf_counter()
     found: Basins | QuenchMap

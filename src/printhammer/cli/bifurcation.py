@@ -182,21 +182,18 @@ def _values(
     timed = parameter in ("period", "rate")
     if timed and (period is not None or rate is not None):
         raise InputError(f"--period and --rate: expected none of them where the {parameter} is changed")
-    given = {"period": _RANGE[0]} if timed else {"period": period, "rate": rate}
-    regime = Regime.of(hammer, **given)  # type: ignore[arg-type]
+    regime = Regime.of(hammer, period=_RANGE[0] if timed else period, rate=rate)
     regime.value(parameter)
     unit, _meaning = meaning_of(regime, parameter)
+    first, last = ends
     if parameter == "period":
-        ends = (ends[0] or _RANGE[0], ends[1] or _RANGE[1])
-    if ends[0] is None or ends[1] is None:
+        first, last = first or _RANGE[0], last or _RANGE[1]
+    if first is None or last is None:
         raise InputError(f"--from and --to: expected both of them for {parameter}, in {unit}")
-    low, high = (
-        read_number(end, unit, name) if unit != "1" else number(end, name) or 0.0
-        for end, name in zip(ends, ("--from", "--to"), strict=True)
-    )
+    low, high = (read_number(end, unit, name) for end, name in ((first, "--from"), (last, "--to")))
     if count < 2 or not low < high:
         raise InputError(
-            f"--from {ends[0]}, --to {ends[1]} and --values {count}: expected the second to be the higher"
+            f"--from {first}, --to {last} and --values {count}: expected the second to be the higher"
             " one, and at least 2 values"
         )
     grid = np.linspace(low, high, count)
