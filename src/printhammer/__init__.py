@@ -12,9 +12,12 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from printhammer.chaos.basins import basins
+    from printhammer.chaos.bifurcation import bifurcation
     from printhammer.chaos.impact_train import impact_train
     from printhammer.chaos.lyapunov import lyapunov
     from printhammer.chaos.orbit_search import orbits
+    from printhammer.chaos.quench import quench_map
     from printhammer.chaos.recurrence import recurrence
     from printhammer.chaos.sections import section
     from printhammer.chaos.sensitivity import sensitivities
@@ -47,6 +50,8 @@ __all__ = [
     "SineForce",
     "Waveform",
     "__version__",
+    "basins",
+    "bifurcation",
     "equilibria",
     "fit",
     "frequency_map",
@@ -56,6 +61,7 @@ __all__ = [
     "lyapunov",
     "measure",
     "orbits",
+    "quench_map",
     "recurrence",
     "release_current",
     "rest_state",
@@ -78,6 +84,8 @@ _HOME = {
     "PulseTrain": "drive",
     "SineForce": "drive",
     "Waveform": "waveforms",
+    "basins": "chaos.basins",
+    "bifurcation": "chaos.bifurcation",
     "equilibria": "equilibrium",
     "fit": "identify.fitting",
     "frequency_map": "maps",
@@ -88,6 +96,7 @@ _HOME = {
     "measure": "identify.laboratory",
     "orbits": "chaos.orbit_search",
     "recurrence": "chaos.recurrence",
+    "quench_map": "chaos.quench",
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
     "sensitivities": "chaos.sensitivity",

@@ -1,10 +1,14 @@
 """Chaos: strobe points of trains, and what kind of motion they tell of."""
 
+from printhammer.chaos.basins import Basins, basins
+from printhammer.chaos.basins_entropy import BasinEntropy, basin_entropy
+from printhammer.chaos.bifurcation import Bifurcation, bifurcation
 from printhammer.chaos.impact_train import ImpactTrain, impact_train
 from printhammer.chaos.lyapunov import Lyapunov, lyapunov
 from printhammer.chaos.lyapunov_chart import LyapunovChart, lyapunovs
 from printhammer.chaos.orbit_result import Orbit
 from printhammer.chaos.orbit_search import Orbits, orbit, orbits
+from printhammer.chaos.quench import QuenchMap, quench_map
 from printhammer.chaos.recurrence import Recurrence, recurrence
 from printhammer.chaos.regime import Regime
 from printhammer.chaos.sections import Section, section, sections
@@ -14,11 +18,15 @@ from printhammer.chaos.verdict import Verdict
 from printhammer.chaos.zero_one import ZeroOne, zero_one
 
 __all__ = [
+    "BasinEntropy",
+    "Basins",
+    "Bifurcation",
     "ImpactTrain",
     "Lyapunov",
     "LyapunovChart",
     "Orbit",
     "Orbits",
+    "QuenchMap",
     "Recurrence",
     "Regime",
     "Section",
@@ -27,11 +35,15 @@ __all__ = [
     "Strobe",
     "Verdict",
     "ZeroOne",
+    "basin_entropy",
+    "basins",
+    "bifurcation",
     "impact_train",
     "lyapunov",
     "lyapunovs",
     "orbit",
     "orbits",
+    "quench_map",
     "recurrence",
     "section",
     "sections",

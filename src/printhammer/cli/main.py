@@ -13,7 +13,9 @@ import typer
 
 from printhammer import __version__
 from printhammer.cli import (
+    basins,
     bench,
+    bifurcation,
     figure,
     fit,
     hammer,
@@ -54,6 +56,8 @@ app.command("paper", epilog=paper.EXAMPLE)(paper.paper)
 app.command("map", epilog=frequency_map.EXAMPLE)(frequency_map.map_)
 app.command("strobe", epilog=strobe.EXAMPLE)(strobe.strobe)
 app.command("orbits", epilog=orbits.EXAMPLE)(orbits.orbits)
+app.command("bifurcation", epilog=bifurcation.EXAMPLE)(bifurcation.bifurcation)
+app.command("basins", epilog=basins.EXAMPLE)(basins.basins)
 app.command("lyapunov", epilog=lyapunov.EXAMPLE)(lyapunov.lyapunov)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)
 app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)
