@@ -1,4 +1,4 @@
-"""The quench map: where the second dot is lost and how high the hammer comes; elsewhere how hard it prints."""
+"""The quench map: where the second dot is lost and how high the hammer comes; else how hard it prints."""
 
 from __future__ import annotations
 
