@@ -77,7 +77,8 @@ def _stretches(
     """Do as `touches_of` in stretches; None where one of them has more contacts than `capacity`."""
     arrays = problem.drive_arrays()
     nodes, contacts = np.empty((1, 5)), np.empty((capacity, 7))
-    state = fresh_carry(capacity // 2)
+    # A contact begins with a node, so that contacts fit; two nodes are the least that is a step.
+    state = fresh_carry(max(capacity // 2, 2))
     kept: list[FloatArray] = []
     count, status = 0, PAUSED
     while status == PAUSED and count < most:
