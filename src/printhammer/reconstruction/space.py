@@ -29,7 +29,7 @@ PRINT_FORCE: Final = to_si(5.0, "lbf", "N")
 CURRENT: Final = 1.0
 """Largest current of a pulse, which sets the scale of Bm, A: the middle of the range of Fig. 2."""
 
-BEYOND: Final = 1.1
+BEYOND: Final = 1.05
 """By which factor the current that would undo the magnet's field is at least beyond the range of Fig. 2."""
 
 LOADING_EXPONENT: Final = 2.7
@@ -81,12 +81,12 @@ VARIABLES: Final = (
     Variable("bias", 0.0, 0.4, False, "", "F0 over Am^2 / sqrt(b)"),
     Variable("margin", 0.05, 0.8, False, "", "net force over magnet force at the backstop, no current"),
     Variable("reach", 150e-6, 2000e-6, True, "m", "As: way from the backstop to where the spring is slack"),
-    Variable("release", 0.03, 0.9, True, "", "share of the field that the largest current takes away"),
+    Variable("release", 0.03, 0.94, True, "", "share of the field that the largest current takes away"),
     Variable("width", 120e-6, 500e-6, True, "s", "width of the current pulse"),
     Variable("rise", 3e-6, 1e-3, True, "s", "time constant of its rise"),
     Variable("decay", 3e-6, 80e-6, True, "s", "time constant of its decay"),
-    Variable("depth", 0.2e-6, 10e-6, True, "m", "compression of the backstop at rest"),
-    Variable("damping", 0.05, 5.0, True, "s/m", "l / k of the backstop"),
+    Variable("depth", 0.05e-6, 10e-6, True, "m", "compression of the backstop at rest"),
+    Variable("damping", 0.05, 8.0, True, "s/m", "l / k of the backstop"),
 )
 """What is varied; ranges are those of hammers of this kind and size, generously."""
 
