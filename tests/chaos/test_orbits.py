@@ -12,7 +12,7 @@ from printhammer.chaos.orbit_tables import save_orbits
 from printhammer.chaos.strobe_map import strobe_map
 
 PERIOD = 1.3e-3
-SMALL = {"longest": 2, "starts": 100, "guesses_each": 8}
+SMALL = {"longest": 2, "starts": 100, "guesses": 8}
 
 
 @pytest.fixture(scope="module")
@@ -221,7 +221,7 @@ def test_files(found: Orbits, tmp_path: Path) -> None:
         ({"period": 1e-3, "longest": 65}, "longest = 65, expected at most 64"),
         ({"period": 1e-3, "longest": 1.5}, "longest"),
         ({"period": 1e-3, "starts": 0}, "starts"),
-        ({"period": 1e-3, "guesses_each": "many"}, "guesses_each"),
+        ({"period": 1e-3, "guesses": "many"}, "guesses"),
         ({"period": 1e-3, "tolerance": 1.0}, "tolerance"),
         ({"period": 1e-3, "threads": 0}, "threads"),
     ],

@@ -161,7 +161,7 @@ def test_the_linear_impact_oscillator(omega: float, stop: float, e: float, kind:
 def test_a_search_finds_the_orbit_of_the_linear_impact_oscillator() -> None:
     omega, stop, e = 2.6, -0.1, 0.8
     drive = ph.SineForce("1 N", omega / (2.0 * math.pi), phase="90 deg")
-    found = ph.orbits(oscillator(stop, e), drive=drive, longest=1, starts=60, guesses_each=8)
+    found = ph.orbits(oscillator(stop, e), drive=drive, longest=1, starts=60, guesses=8)
     state, multipliers, _speed = one_impact_orbit(omega, stop, e)
     assert len(found) == 1
     np.testing.assert_allclose([found[0].x[0], found[0].v[0]], state, rtol=0.0, atol=1e-11)

@@ -16,7 +16,7 @@ TIGHT = 1e-14
 
 def found_at(period: float, overlap: str, longest: int, starts: int) -> Orbits:
     hammer = ph.load("hendriks-1983")
-    found = ph.orbits(hammer, period=period, overlap=overlap, longest=longest, starts=starts, guesses_each=12)
+    found = ph.orbits(hammer, period=period, overlap=overlap, longest=longest, starts=starts, guesses=12)
     assert found.regime.memory == 1 or period > hammer.waveform.support
     return found
 

@@ -179,7 +179,7 @@ def first_state(regime: Regime) -> tuple[float, float]:
         return 0.5 * (window.x[0] + window.x[1]), 0.0
 
 
-def guesses(records: Records, period: int, most: int, scales: FloatArray) -> list[Guess]:
+def close_returns(records: Records, period: int, most: int, scales: FloatArray) -> list[Guess]:
     """Return the closest returns of records after so many firings that are not alike.
 
     Parameters

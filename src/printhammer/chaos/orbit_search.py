@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.chaos.orbit_guesses import PHASES, first_state, guesses, record, spread
+from printhammer.chaos.orbit_guesses import PHASES, close_returns, first_state, record, spread
 from printhammer.chaos.orbit_maps import ExactMaps, FastMaps
 from printhammer.chaos.orbit_newton import Closing, close_orbits
 from printhammer.chaos.orbit_result import KINDS, STABLE, Orbit, no_orbit, orbit_of
@@ -111,7 +111,8 @@ class Orbits:
         """What was found and what became of the other guesses, in one line."""
         what = ", ".join(f"{number} {kind}" for kind, number in self.counts.items())
         count = len(self.found)
-        head = f"{count or 'no'} orbit{'' if count == 1 else 's'} of up to {self.longest} firings"
+        most = "1 firing" if self.longest == 1 else f"up to {self.longest} firings"
+        head = f"{count or 'no'} orbit{'' if count == 1 else 's'} of {most}"
         tried = f"{sum(self.guesses)} guesses in motions from {self.starts} states"
         ends = [f"{self.repeats} led to one of these again"] if self.repeats else []
         ends += [f"{number}: {reason}" for reason, number in sorted(self.failures.items())]
@@ -151,7 +152,7 @@ def orbits(
     rate: float | str | None = None,
     longest: SupportsIndex = LONGEST,
     starts: SupportsIndex = STARTS,
-    guesses_each: SupportsIndex = GUESSES,
+    guesses: SupportsIndex = GUESSES,
     waveform: Waveform | None = None,
     drive: Drive | None = None,
     overlap: Overlap = "add",
@@ -175,7 +176,7 @@ def orbits(
         Largest number of firings of an orbit, at most 64.
     starts : int, optional
         Number of states from which motions are followed beside that from rest.
-    guesses_each : int, optional
+    guesses : int, optional
         Number of guesses for each number of firings.
     waveform : Waveform, optional
         What every firing does; by default the waveform of the hammer.
@@ -205,7 +206,7 @@ def orbits(
         regime,
         longest=longest,
         starts=starts,
-        guesses_each=guesses_each,
+        guesses=guesses,
         tolerance=tolerance,
         threads=threads,
         progress=progress,
@@ -217,13 +218,13 @@ def orbits_of(
     *,
     longest: SupportsIndex = LONGEST,
     starts: SupportsIndex = STARTS,
-    guesses_each: SupportsIndex = GUESSES,
+    guesses: SupportsIndex = GUESSES,
     tolerance: float = MAP_TOLERANCE,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Orbits:
     """Search for the periodic orbits of a regime; see `orbits`."""
-    most, several = read_count(longest, "longest"), read_count(guesses_each, "guesses_each")
+    most, several = read_count(longest, "longest"), read_count(guesses, "guesses")
     count = read_count(starts, "starts")
     if most > MOST_FIRINGS:
         raise InputError(f"longest = {most}, expected at most {MOST_FIRINGS} firings")
@@ -372,7 +373,7 @@ class _Search:
         fast = FastMaps(self.regime, phase, TOLERANCE, self.longest, self.threads)
         different: list[Closing] = []
         for period in range(1, self.longest + 1):
-            tried = guesses(records, period, self.several, self.scales)
+            tried = close_returns(records, period, self.several, self.scales)
             self.tried[period - 1] += len(tried)
             for closing in _closed(fast, tried, self.scales, _FAST):
                 if closing.closed:

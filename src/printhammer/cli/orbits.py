@@ -92,7 +92,7 @@ def orbits(
         overlap=overlap.value,
         longest=whole(longest, "longest") or 0,
         starts=whole(starts, "starts") or 0,
-        guesses_each=whole(guesses, "guesses") or 0,
+        guesses=whole(guesses, "guesses") or 0,
         tolerance=number(tolerance, "tolerance"),
     )
     screen = console()

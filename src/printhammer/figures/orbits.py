@@ -247,9 +247,12 @@ def _traces(ax: Axes, orbits: list[Orbit]) -> None:
 def _from_firing(orbit: Orbit, motion: Motion) -> tuple[FloatArray, FloatArray]:
     """Return times since the first firing, s, and displacements, m, of a period that begins at it."""
     since = motion.t - motion.start + orbit.phase * orbit.regime.period
-    late = int(np.searchsorted(since, orbit.period))
-    times = np.concatenate([since[late:] - orbit.period, since[:late]])
-    return times, np.concatenate([motion.x[late:], motion.x[:late]])
+    if orbit.phase == 0.0:
+        return since, motion.x
+    late = int(np.searchsorted(since, (1.0 - 1e-9) * orbit.period))
+    # The last point is the first one again.
+    times = np.concatenate([since[late:-1] - orbit.period, since[:late]])
+    return times, np.concatenate([motion.x[late:-1], motion.x[:late]])
 
 
 def _room(ax: Axes, x: FloatArray, v: FloatArray) -> None:
