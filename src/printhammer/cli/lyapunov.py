@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
-EXAMPLE: Final = "Example: printhammer lyapunov hendriks-1983 --period '1.05 ms, 1.30 ms' --out exponents.csv"
+EXAMPLE: Final = "Example: printhammer lyapunov hendriks-1983 --period '1.05 ms, 1.30 ms' --firings 300"
 
 _PICTURES: Final = (".svg", ".png", ".pdf")
 _FIRINGS, _TRANSIENT = 1000, 1000

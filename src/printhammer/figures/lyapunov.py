@@ -64,6 +64,8 @@ def plot(found: Lyapunov) -> Figure:
     upper.axhline(0.0, color=MUTED, lw=HAIR, zorder=1.0, gid="zero")
     lower.set_xlabel("Number of firings averaged over")
     lower.set_xscale("log")
+    # Also where no estimate is finite.
+    lower.set_xlim(max(0.9 * float(counts[0]), 0.5), 1.1 * float(counts[-1]))
     upper.set_title(_title(found), loc="left", fontsize=SMALL)
     remarks = [] if found.ok else [f"The run ended early: {found.status}."]
     if not found.smooth:
