@@ -8,6 +8,7 @@ from tests.truth.impact_orbits import BouncingBall, LinearImpacts
 
 import printhammer as ph
 from printhammer.chaos.continuation import Branch, continuation
+from printhammer.chaos.stability_chart import stability_chart
 
 SHARP = 1e-8
 MASS, GRAVITY, FREQUENCY = 1e-3, 9.80665, 50.0
@@ -193,3 +194,18 @@ def test_an_oscillation_goes_on_where_it_grazes_a_pack() -> None:
     np.testing.assert_array_equal(branch.pack_contacts, [int(word == "P") for word in branch.contacts])
     # Without contact areas are preserved, and both multipliers stay on the unit circle: no event.
     assert [event.kind for event in branch.events if event.contacts == ("", "")] == []
+
+
+def test_chart_of_the_bouncing_ball() -> None:
+    case = BouncingBall(GRAVITY, 0.8, FREQUENCY)
+    weight = MASS * GRAVITY
+    branch = bounces(case, 0.8, (0.05, 2.0))
+    chart = stability_chart(branch, "backstop.restitution", (0.5, 0.9), grid=(0, 0))
+    assert chart.refused == ()
+    assert sorted(curve.kind for curve in chart.curves) == ["fold", "period doubling"]
+    for curve in chart.curves:
+        assert curve.limits.all()
+        assert (curve.second.min(), curve.second.max()) == (0.5, 0.9)
+        exact = [BouncingBall(GRAVITY, e, FREQUENCY) for e in curve.second]
+        limits = [one.fold if curve.kind == "fold" else one.doubling for one in exact]
+        np.testing.assert_allclose(curve.first / weight, limits, rtol=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -157,13 +158,21 @@ class Work:
         born = Stop(BIRTH, value, state, told)
         return self.described(family, Curve(curve.nodes, (born, curve.stops[1])), steps)
 
+    def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
+        """Return the orbit near a state at one value of the constant; None if there is none."""
+        follower = Follower(self.family(firings), self.scales, PRECISION)
+        row = np.zeros(3)
+        row[-1] = 1.0
+        found = follower.correct(follower.scaled(state, value), row)
+        return None if found is None else np.asarray(found.state)
+
     def told(self, value: float) -> str:
         """Return a value of the constant with name and unit."""
         return f"{self.parameter} = {value:{_DIGITS}} {unit_of(self.regime, self.parameter)}"
 
     def watch(self, firings: int, steps: Steps, progress: Progress | None) -> Any:
         """Return what is asked between any two nodes: whether the branch ends there."""
-        half = None
+        half, whole = None, self.family(firings)
         if firings % 2 == 0:
             half = Follower(self.family(firings // 2), self.scales, steps.precision)
         rigid = rigid_backstop(self.regime)
@@ -177,7 +186,13 @@ class Work:
             if rigid and here.value.label != ahead.value.label:
                 told = "its sequence of contacts changes in a grazing, where the strobe map has no derivative"
                 return Stop("grazing", here.parameter, here.state, told, here)
-            return None if half is None else birth_of(half, here, ahead)
+            born = None if half is None else birth_of(half, here, ahead)
+            if born is None or born.node is None:
+                return born
+            # What the orbit does there is that of its whole period.
+            value = whole(born.node.state, born.node.parameter)
+            last = replace(born.node, value=value) if not value.trouble else here
+            return replace(born, node=last)
 
         return watched
 
