@@ -54,6 +54,8 @@ WAYS: Final = {"from rest": INK, "up": BLUE, "down": ORANGE}
 _POINT: Final = 0.7
 _MOST: Final = 3_000_000
 """Number of points above which they are drawn smaller."""
+_SPARSE: Final = 150
+"""Number of values up to which points are drawn larger."""
 _FEW: Final = 1e-3
 
 
@@ -151,7 +153,7 @@ def _most(states: FloatArray) -> tuple[float, float]:
 def _points(ax: Axes, diagram: Bifurcation, states: FloatArray, across: Scale, up: Scale) -> None:
     values = across.shown(diagram.values)
     apart = hysteresis(diagram)
-    size = _POINT if states.size <= _MOST else 0.5 * _POINT
+    size = _POINT * (2.0 if len(values) <= _SPARSE else 1.0 if states.size <= _MOST else 0.5)
     several = len(diagram.directions) > 1
     for way, name in enumerate(diagram.directions):
         kinds = [(apart, WAYS[name], 3.0 + way)] if several else []
