@@ -118,6 +118,15 @@ def step_range(record: Record, row: int) -> tuple[int, int]:
     return first, last
 
 
+def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]]:
+    """Return surface and time, s, of every touch of a run; contacts open at its start have none."""
+    return [
+        ("pack" if int(row[0]) == PACK_SURFACE else "backstop", float(row[1]))
+        for row in record.contacts
+        if not row[6]
+    ]
+
+
 def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid: bool) -> list[Contact]:
     """Put the recorded contacts together with their peaks and losses.
 

@@ -387,6 +387,11 @@ class Followed:
     found: FloatArray
     columns: FloatArray
 
+    @property
+    def status_name(self) -> str:
+        """Name of the status."""
+        return STATUS_NAMES[self.status]
+
 
 def follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> Followed:
     """Run a problem to the last mark and carry columns along from the first.

@@ -14,7 +14,6 @@ from printhammer.chaos.orbit_newton import CLOSED, Images
 from printhammer.chaos.strobe_map import IN_PACK, WITH_MEMORY, image_of, usable
 from printhammer.ensemble import Ensemble
 from printhammer.errors import InputError
-from printhammer.kernel.modes import OK
 from printhammer.start import initial_state
 from printhammer.threads import in_threads, thread_count
 
@@ -139,7 +138,7 @@ class FastMaps:
         final = np.stack([table.x[:, 0].reshape(shape), table.v[:, 0].reshape(shape)], axis=2)
         kept = np.isin(table.branch[:, 0].reshape(shape), WITH_MEMORY).any(axis=1)
         names = np.array(result.status_names).reshape(shape)
-        stopped = result.status.reshape(shape) != OK
+        stopped = ~result.ok.reshape(shape)
         found.states[rows] = final[:, 0]
         found.jacobians[rows] = np.stack(
             [(final[:, 1 + k] - final[:, 0]) / step[k] for k in range(2)], axis=2

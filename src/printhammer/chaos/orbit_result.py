@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.chaos.strobe_map import margin_of
-from printhammer.kernel.modes import OK, STATUS_NAMES
 from printhammer.motion import Motion
 from printhammer.problem import Problem
 from printhammer.tangent import follow
@@ -40,6 +39,7 @@ CLOSES: Final = 1e-6
 """Largest distance from itself after a whole period, in half-widths of the window and units of the larger
 multiplier if that is more than 1, with which an orbit counts as one."""
 
+_OK: Final = "ok"
 _POINTS: Final = 2001
 
 
@@ -106,7 +106,7 @@ class Orbit:
     @property
     def ok(self) -> bool:
         """Whether there is such an orbit."""
-        return self.status == "ok"
+        return self.status == _OK
 
     @property
     def period(self) -> float:
@@ -242,7 +242,7 @@ def orbit_of(regime: Regime, closing: Closing, phase: float, tolerance: float) -
     first = int(np.lexsort((closing.states[:, 1], closing.states[:, 0]))[0])
     start = closing.states[first]
     run = _Run(regime, start, phase, firings, tolerance)
-    if run.record.status != OK:
+    if run.record.status_name != _OK:
         return no_orbit(regime, firings, phase, tolerance, run.record.status_name)
     returned = run.record.nodes[-1, 1:3]
     residual = float(np.abs((returned - start) / regime.window.half_widths).max())
@@ -271,7 +271,7 @@ def orbit_of(regime: Regime, closing: Closing, phase: float, tolerance: float) -
         energy=run.motion.energy,
         margin=margin_of(run.problem, run.record),
         tolerance=tolerance,
-        status=STATUS_NAMES[OK],
+        status=_OK,
     )
 
 

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.chaos.regime import Regime
+from printhammer.contacts import touches_of
 from printhammer.drive_input import read_count
+from printhammer.ensemble import MODE_NAMES
 from printhammer.errors import InputError
-from printhammer.kernel.modes import HELD_UNLOADING, OK, PACK_SURFACE, RELOADING, STATUS_NAMES, UNLOADING
 from printhammer.problem import Problem, check_tolerance
 from printhammer.start import initial_state
 from printhammer.tangent import follow
@@ -41,7 +42,11 @@ MAP_TOLERANCE: Final = 1e-13
 IN_PACK: Final = "in the pack"
 """Status where the state at a section has a memory of the pack beside displacement and velocity."""
 
-WITH_MEMORY: Final = (UNLOADING, RELOADING, HELD_UNLOADING)
+WITH_MEMORY: Final = tuple(
+    MODE_NAMES.index(name) for name in ("unloading", "reloading", "held on the unloading branch")
+)
+"""Modes whose state has a memory."""
+_OK: Final = "ok"
 _RANGE_LEFT: Final = "range left"
 _TURN_STEPS: Final = 60
 _STILL: Final = 1e-9
@@ -87,7 +92,7 @@ class Image:
     @property
     def ok(self) -> bool:
         """Whether the state came through."""
-        return self.status == STATUS_NAMES[OK]
+        return self.status == _OK
 
 
 def strobe_map(
@@ -265,24 +270,20 @@ def image_of(
         return _no_image(IN_PACK)
     problem = Problem(regime.hammer, train, start, float(moments[0]), tolerance)
     followed = follow(problem, moments[[0, -1]], np.eye(3), renormalise=False)
-    if followed.status != OK:
-        return _no_image(STATUS_NAMES[followed.status])
+    if followed.status_name != _OK:
+        return _no_image(followed.status_name)
     if int(followed.found[-1, 2]) in WITH_MEMORY:
         return _no_image(IN_PACK)
     touched: tuple[tuple[str, float], ...] = ()
     margin = math.nan
     if contacts:
         record = problem.run(float(moments[-1]))
-        touched = tuple(
-            ("pack" if int(row[0]) == PACK_SURFACE else "backstop", float(row[1] - moments[0]))
-            for row in record.contacts
-            if not row[6]
-        )
+        touched = tuple((surface, t - float(moments[0])) for surface, t in touches_of(record))
         margin = margin_of(problem, record)
     return Image(
         state=followed.found[-1, :2].copy(),
         jacobian=followed.columns[:2, :2].copy(),
-        status=STATUS_NAMES[OK],
+        status=_OK,
         smooth=followed.smooth,
         contacts=touched,
         margin=margin,
