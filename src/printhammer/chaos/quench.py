@@ -69,7 +69,8 @@ class QuenchMap:
     struck : bool array
         Whether the second firing made a dot; False for a lost one.
     peak : array
-        Largest local maximum of the displacement after the second firing, m; NaN where there is none.
+        Largest local maximum of the displacement after the second firing, m; NaN where there is none. Of a
+        lost dot it is read from samples, good to 1e-5 of the way to the pack.
     force : array
         Largest pack force of the second dot, N; NaN for a lost one.
     flight_time : array
