@@ -232,7 +232,7 @@ class _Search:
         self.jacobians[rows] = jacobians[chosen]
         self.defects[rows] = defects[chosen]
         self.residual[rows] = residual[chosen]
-        self.smooth[rows] = images.smooth.reshape(shape[:2]).all(axis=1)[chosen]
+        self.smooth[rows] = np.asarray(images.smooth.reshape(shape[:2]).all(axis=1))[chosen]
         bad = np.asarray(reasons[chosen] != CLOSED, np.bool_)
         self.reasons[rows[bad]] = reasons[chosen][bad]
         self._aim(rows[~bad])
