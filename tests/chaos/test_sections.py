@@ -59,8 +59,8 @@ def test_too_few_touches_are_told(hammer: "ph.Hammer") -> None:
     assert found.per_firing == 0.0
 
 
-def test_a_train_that_prints_once_each_firing(hammer: "ph.Hammer") -> None:
-    found = ph.section(hammer, surface="pack", period="1.3 ms", touches=50, transient=300)
+def test_a_slow_train_prints_once_each_firing(hammer: "ph.Hammer") -> None:
+    found = ph.section(hammer, surface="pack", period="6 ms", touches=50, transient=5)
     assert found.per_firing == 1.0
     np.testing.assert_allclose(found.since, found.since[0], rtol=1e-9)
     np.testing.assert_array_equal(np.diff(found.firing), 1)

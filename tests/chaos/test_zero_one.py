@@ -173,10 +173,10 @@ def test_what_is_shown_is_the_angle_in_the_middle() -> None:
 
 
 def test_points_of_a_strobe(hammer: "ph.Hammer") -> None:
-    (points,) = strobes(hammer, ["1.3 ms"], points=FEWEST, transient=300, verdict=False)
+    (points,) = strobes(hammer, ["6 ms"], points=FEWEST, transient=5, verdict=False)
     found = zero_one(points)
     assert found.resolution == pytest.approx(1e-6 * points.window.half_widths[0])
-    # The train has settled to the noise of the arithmetic.
+    # The armature is at rest before each firing, but for the noise of the arithmetic.
     assert found.verdict == "regular"
     known = dataclasses.replace(points, x=logistic(4.0, FEWEST) * 1e-5)
     assert zero_one(known).verdict == "chaotic"

@@ -128,10 +128,11 @@ def test_stable_orbits_have_the_logarithms_of_their_multipliers(hammer: "ph.Hamm
         logs = np.sort(np.log(np.abs(np.linalg.eigvals(once.matrix))))[::-1] / q
         both = math.log(abs(once.determinant)) / q
         assert found.total == pytest.approx(both, rel=1e-6)
-        turning = np.iscomplex(np.linalg.eigvals(once.matrix)).any()
         # The small one of two real multipliers is known from the determinant, not from a difference.
         exact = np.array([logs[0], both - logs[0]])
-        np.testing.assert_allclose(found.exponents, exact, atol=0.05 if turning else 1e-6)
+        # Directions of a complex pair turn for ever, those of multipliers alike settle slowly.
+        apart = exact[0] - exact[1] > 0.5 / q
+        np.testing.assert_allclose(found.exponents, exact, atol=1e-6 if apart else 0.05)
         assert found.dimension == 0.0
 
 

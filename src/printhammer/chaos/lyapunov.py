@@ -249,7 +249,7 @@ def lyapunov(
 def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
     """Return the Kaplan-Yorke dimension of a map of the plane, and its standard error.
 
-    D = 1 + lambda_1/|lambda_2| where lambda_1 > 0 > lambda_1 + lambda_2, 2 where areas do not shrink, 0 where
+    D = 1 - lambda_1/lambda_2 where lambda_1 > 0 > lambda_1 + lambda_2, 2 where areas do not shrink, 0 where
     lambda_1 < 0 (J. L. Kaplan and J. A. Yorke, Lect. Notes Math. 730 (1979) 204). The error is that of the
     mean of (D's slopes) x (growth), which knows how both exponents waver together. The flow in time has one
     dimension more.
