@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from printhammer.chaos.basins import basins
     from printhammer.chaos.bifurcation import bifurcation
+    from printhammer.chaos.continuation import continuation
+    from printhammer.chaos.continuation_regimes import regimes
     from printhammer.chaos.impact_train import impact_train
     from printhammer.chaos.lyapunov import lyapunov
     from printhammer.chaos.orbit_search import orbits
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.recurrence import recurrence
     from printhammer.chaos.sections import section
     from printhammer.chaos.sensitivity import sensitivities
+    from printhammer.chaos.stability_chart import stability_chart
     from printhammer.chaos.strobe import strobe
     from printhammer.chaos.zero_one import zero_one
     from printhammer.drive import Burst, PulseTrain, SineForce
@@ -52,6 +55,7 @@ __all__ = [
     "__version__",
     "basins",
     "bifurcation",
+    "continuation",
     "equilibria",
     "fit",
     "frequency_map",
@@ -63,11 +67,13 @@ __all__ = [
     "orbits",
     "quench_map",
     "recurrence",
+    "regimes",
     "release_current",
     "rest_state",
     "section",
     "sensitivities",
     "simulate",
+    "stability_chart",
     "strobe",
     "sweep",
     "zero_one",
@@ -86,6 +92,7 @@ _HOME = {
     "Waveform": "waveforms",
     "basins": "chaos.basins",
     "bifurcation": "chaos.bifurcation",
+    "continuation": "chaos.continuation",
     "equilibria": "equilibrium",
     "fit": "identify.fitting",
     "frequency_map": "maps",
@@ -97,11 +104,13 @@ _HOME = {
     "orbits": "chaos.orbit_search",
     "recurrence": "chaos.recurrence",
     "quench_map": "chaos.quench",
+    "regimes": "chaos.continuation_regimes",
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
     "sensitivities": "chaos.sensitivity",
     "section": "chaos.sections",
     "simulate": "simulate",
+    "stability_chart": "chaos.stability_chart",
     "strobe": "chaos.strobe",
     "sweep": "sweep",
     "zero_one": "chaos.zero_one",

@@ -84,7 +84,8 @@ class Branches:
         islands = sum(branch.closed for branch in self.found)
         closed = f", {islands} of them closed loops" if islands else ""
         missed = f"; {len(self.refused)} could not be followed" if self.refused else ""
-        return f"{len(self.found)} branches: {kinds}{closed}{missed}"
+        number = len(self.found)
+        return f"{number} branch{'es' if number > 1 else ''}: {kinds}{closed}{missed}"
 
     def to_dataset(self) -> xr.Dataset:
         """Return the branches as a Dataset over `branch` and `orbit`, with units and provenance."""

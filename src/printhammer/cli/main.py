@@ -16,6 +16,7 @@ from printhammer.cli import (
     basins,
     bench,
     bifurcation,
+    continuation,
     figure,
     fit,
     hammer,
@@ -58,6 +59,7 @@ app.command("strobe", epilog=strobe.EXAMPLE)(strobe.strobe)
 app.command("orbits", epilog=orbits.EXAMPLE)(orbits.orbits)
 app.command("bifurcation", epilog=bifurcation.EXAMPLE)(bifurcation.bifurcation)
 app.command("basins", epilog=basins.EXAMPLE)(basins.basins)
+app.command("continue", epilog=continuation.EXAMPLE)(continuation.continue_)
 app.command("lyapunov", epilog=lyapunov.EXAMPLE)(lyapunov.lyapunov)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)
 app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)
