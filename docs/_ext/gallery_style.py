@@ -11,6 +11,7 @@ ORDER = (
     "fast_train",
     "frequency_map",
     "strobe",
+    "exponents",
     "sweep",
     "backstops",
     "energy_ledger",
