@@ -31,7 +31,9 @@ found.plot()
 # What tolerances of the constants do to what is printed follows, as long as they are
 # small:
 
-spread = found.spread({"magnet.Am": "0.5 %", "spring.Bs": "1 %", "pack.thickness": "5 %"})
+spread = found.spread(
+    {"magnet.Am": "0.5 %", "spring.Bs": "1 %", "pack.thickness": "5 %"}
+)
 for name, value, part in zip(
     found.quantities, found.dots[0], spread.deviation[0], strict=True
 ):

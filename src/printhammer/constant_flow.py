@@ -322,23 +322,41 @@ def pack_push_changes(
         Changes of displacement, velocity and latest local maximum.
     """
     moves = as_arrays(wanted)["hammer"]
+    return np.array(
+        [_push_change(problem, moves[k], state, changes[:3, k]) for k in range(len(wanted))], dtype=np.float64
+    )
+
+
+def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
+    """Return the rate [N/s] of the push of the pack at a time of a run, s; NaN but on the loading branch."""
+    row = problem.resample(record, np.array([t]))[0]
+    if int(row[8]) != LOADING:
+        return math.nan
+    drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
+    a = (float(row[3:8].sum()) + drive) / problem.hammer.mass
+    still = np.zeros_like(problem.constants)
+    # In the time of the motion, so that the changes are of the size of the state.
+    time = problem.scales[0] / problem.scales[1]
+    direction = np.array([float(row[1]), a, 0.0]) * time
+    return _push_change(problem, still, np.array([row[0], row[1], row[8], 0.0]), direction) / time
+
+
+def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change: FloatArray) -> float:
+    """Return the change [N] of the push of the pack with constants, displacement, velocity and memory."""
     x, v, mode, peak = (float(number) for number in state)
-    found = np.zeros(len(wanted))
-    for k in range(len(wanted)):
-        dx, dv, dp = (float(number) for number in changes[:3, k])
-        # No point may leave the pack, and no depth may change much.
-        sink = max(abs(dx - moves[k, FRONT]), abs(dp - moves[k, FRONT]))
-        depth = x - problem.constants[FRONT]
-        share = SPACING * min(1.0, depth / sink if sink > 0.0 and depth > 0.0 else 1.0)
-        share *= min(1.0, problem.scales[1] / abs(dv) if dv else 1.0)
+    dx, dv, dp = (float(number) for number in change)
+    # No point may leave the pack, and no depth may change much.
+    sink = max(abs(dx - moves[FRONT]), abs(dp - moves[FRONT]))
+    depth = x - problem.constants[FRONT]
+    share = SPACING * min(1.0, depth / sink if sink > 0.0 and depth > 0.0 else 1.0)
+    share *= min(1.0, problem.scales[1] / abs(dv) if dv else 1.0)
 
-        def moved(e: float, k: int = k, dx: float = dx, dv: float = dv, dp: float = dp) -> float:
-            c = (problem.constants + e * moves[k])[PACK:BACKSTOP_PART]
-            return _push(problem, c, (x + e * dx, v + e * dv, mode, peak + e * dp))
+    def moved(e: float) -> float:
+        c = (problem.constants + e * moves)[PACK:BACKSTOP_PART]
+        return _push(problem, c, (x + e * dx, v + e * dv, mode, peak + e * dp))
 
-        near, far = moved(share) - moved(-share), moved(2.0 * share) - moved(-2.0 * share)
-        found[k] = (8.0 * near - far) / (12.0 * share)
-    return found
+    near, far = moved(share) - moved(-share), moved(2.0 * share) - moved(-2.0 * share)
+    return (8.0 * near - far) / (12.0 * share)
 
 
 def _push(problem: Problem, c: FloatArray, state: tuple[float, float, float, float]) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.constant_flow import Flow, flow, pack_push_changes, surface_moves
+from printhammer.constant_flow import Flow, flow, pack_push_changes, pack_push_rate, surface_moves
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -157,7 +157,22 @@ def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: floa
     )
     t = t_in + float(found.x) * scale
     # Without damping the force is largest where the indentation is, which is known better.
-    return t_peak if abs(t - t_peak) < _NEAR * scale else t
+    return t_peak if abs(t - t_peak) < _NEAR * scale else _settled(problem, record, t, 1e-3 * (high - low))
+
+
+def _settled(problem: Problem, record: Record, t: float, step: float) -> float:
+    """Return the time near `t`, s, at which the force of the pack is stationary, by the secant method.
+
+    A comparison of forces finds it to half of the digits only.
+    """
+    before, rate_before = t - step, pack_push_rate(problem, record, t - step)
+    for _ in range(6):
+        rate = pack_push_rate(problem, record, t)
+        change = -rate * (t - before) / (rate - rate_before) if rate != rate_before else 0.0
+        if not abs(change) < step:
+            break
+        before, rate_before, t = t, rate, t + change
+    return t
 
 
 def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
