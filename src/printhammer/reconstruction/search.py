@@ -14,7 +14,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.reconstruction.evaluation import WEIGHTS, losses_digest, scored
 from printhammer.reconstruction.explorer import Explorer
-from printhammer.reconstruction.search_log import Log
+from printhammer.reconstruction.search_log import Log, read_search
 from printhammer.reconstruction.space import VARIABLES
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def starts_of(path: Path, aim: Aim, count: int = STARTS) -> tuple[tuple[float, .
         The file is not the log of a search, or a search on the stated claims would be led by others through
         its starts.
     """
-    from printhammer.reconstruction.shortlist import read_search, shortlist
+    from printhammer.reconstruction.shortlist import shortlist
 
     heading, rows = read_search(path)
     if aim == "stated" and heading["aim"] != "stated":

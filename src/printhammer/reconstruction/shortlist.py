@@ -9,14 +9,12 @@ import numpy as np
 from printhammer.claims import claims
 from printhammer.reconstruction.judged import FIGURE_11, STATED, row_of
 from printhammer.reconstruction.judged_log import append, joined, key_of, mend, read_judged
-from printhammer.reconstruction.search_log import read_search
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
 
-__all__ = ["judge_candidates", "read_search", "rounded", "shortlist", "standing"]
 
 APART: Final = 0.01
 """Least distance of two candidates of a shortlist in one variable, in shares of its range."""
