@@ -24,7 +24,7 @@ estimates = found.plot()
 # the next, and the dimension of the attractor is hardly more than one.
 #
 # The series of states walks a point about in a plane. If it is chaotic the point
-# walks off like a drunkard, and the square of its distance grows with time.
+# walks off at random, and the square of its distance grows with time.
 
 walk = found.zero_one.plot()
 
