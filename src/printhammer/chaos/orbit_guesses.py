@@ -19,8 +19,11 @@ from printhammer.errors import InputError
 from printhammer.problem import TOLERANCE
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy.typing as npt
 
+    from printhammer.chaos.orbit_newton import Closing
     from printhammer.chaos.regime import Regime
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
@@ -30,6 +33,8 @@ PHASES: Final = (0.0, 0.5)
 
 _ALIKE: Final = 0.02
 """Distance, in half-widths, up to which guesses count as the same."""
+_EARLY_ALIKE: Final = 0.1
+"""The same for those that begin early, so that they lie all over the plane."""
 _LOOKED_AT: Final = 4000
 """Returns that are looked at, closest first, for guesses that are not alike."""
 _EARLY: Final = 2
@@ -209,7 +214,7 @@ def close_returns(records: Records, period: int, most: int, scales: FloatArray) 
     early[:, _EARLY:] = np.inf
     found: list[Guess] = []
     kept = np.empty((most, period, 2))
-    for among, up_to in ((gap, most - most // 2), (early, most)):
+    for among, up_to, apart in ((gap, most - most // 2, _ALIKE), (early, most, _EARLY_ALIKE)):
         flat = among.reshape(-1)
         known = int(np.isfinite(flat).sum())
         for place in np.argsort(flat, kind="stable")[: min(known, _LOOKED_AT)]:
@@ -217,18 +222,55 @@ def close_returns(records: Records, period: int, most: int, scales: FloatArray) 
                 break
             member, first = divmod(int(place), count)
             cycle = scaled[member, first : first + period]
-            if _is_new(cycle, kept[: len(found)]):
+            if _is_new(cycle, kept[: len(found)], apart):
                 kept[len(found)] = cycle
                 found.append(_guess(records, member, first, period))
     return found
 
 
-def _is_new(cycle: FloatArray, kept: FloatArray) -> bool:
+def joined(
+    shorter: Sequence[Closing], phase: float, period: int, most: int, scales: FloatArray
+) -> list[Guess]:
+    """Return guesses made of two shorter orbits, one run through after the other.
+
+    Parameters
+    ----------
+    shorter : sequence of Closing
+        Orbits of fewer firings.
+    phase : float
+        Of the section.
+    period : int
+        Number of firings.
+    most : int
+        Largest number of guesses.
+    scales : array, shape (2,)
+        Half-widths of the window.
+
+    Returns
+    -------
+    list of Guess
+        Those with the smallest jump from one orbit to the other first.
+    """
+    found: list[tuple[float, Guess]] = []
+    for k, one in enumerate(shorter):
+        for other in shorter[:k]:
+            if int(one.firings.sum() + other.firings.sum()) != period:
+                continue
+            gaps = np.abs((one.states[:, np.newaxis] - other.states) / scales).max(axis=2)
+            here, there = (int(place) for place in np.unravel_index(np.argmin(gaps), gaps.shape))
+            states = [np.roll(one.states, -here, axis=0), np.roll(other.states, -there, axis=0)]
+            firings = [np.roll(one.firings, -here), np.roll(other.firings, -there)]
+            guess = Guess(phase, np.concatenate(states), np.concatenate(firings))
+            found.append((float(gaps[here, there]), guess))
+    return [guess for _gap, guess in sorted(found, key=lambda pair: pair[0])[:most]]
+
+
+def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
     """Tell whether a cycle is none of others, whichever of its states comes first."""
     if not len(kept):
         return True
     return all(
-        float(np.abs(kept - np.roll(cycle, shift, axis=0)).max(axis=(1, 2)).min()) > _ALIKE
+        float(np.abs(kept - np.roll(cycle, shift, axis=0)).max(axis=(1, 2)).min()) > apart
         for shift in range(len(cycle))
     )
 

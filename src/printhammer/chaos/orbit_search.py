@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.chaos.orbit_guesses import PHASES, close_returns, first_state, record, spread
+from printhammer.chaos.orbit_guesses import PHASES, close_returns, first_state, joined, record, spread
 from printhammer.chaos.orbit_maps import ExactMaps, FastMaps
 from printhammer.chaos.orbit_newton import Closing, close_orbits
 from printhammer.chaos.orbit_result import KINDS, STABLE, Orbit, no_orbit, orbit_of
@@ -177,7 +177,8 @@ def orbits(
     starts : int, optional
         Number of states from which motions are followed beside that from rest.
     guesses : int, optional
-        Number of guesses for each number of firings.
+        Number of guesses for each number of firings; at most as many again are made of shorter orbits that
+        are known by then.
     waveform : Waveform, optional
         What every firing does; by default the waveform of the hammer.
     drive : Drive, optional
@@ -374,6 +375,7 @@ class _Search:
         different: list[Closing] = []
         for period in range(1, self.longest + 1):
             tried = close_returns(records, period, self.several, self.scales)
+            tried += joined(different, phase, period, self.several, self.scales)
             self.tried[period - 1] += len(tried)
             for closing in _closed(fast, tried, self.scales, _FAST):
                 if closing.closed:
