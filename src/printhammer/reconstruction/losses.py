@@ -58,6 +58,9 @@ _CLEARLY: Final = 0.002
 _LATE: Final = 100e-6
 """How much too late, for the second current, the armature may rise to be of some use to the search, s."""
 
+_SHORTER: Final = 25e-6
+"""How much less than asked the flight of the second dot may be shorter to be of some use to the search, s."""
+
 _TAIL: Final = 1e-3
 """Time after the second of two pulses within which its peak lies, s."""
 
@@ -279,7 +282,7 @@ def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArr
     score.losses["two_pulses_700us"] = (
         0.5 * hinge(max(low - ratio, ratio - high), 0.3)
         + 0.4 * hinge(late, _LATE)
-        + 0.1 * hinge(wanted - gain, 100e-6)
+        + 0.3 * hinge(wanted - gain, _SHORTER)
     )
     # With a reserve, since what is lost between the times looked at counts as well.
     score.losses["second_dot_lost"] = hinge(_CLEAR - float(miss.min()), _CLEAR + 0.5)
