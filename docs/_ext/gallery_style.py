@@ -12,6 +12,7 @@ ORDER = (
     "frequency_map",
     "strobe",
     "exponents",
+    "orbits",
     "sweep",
     "backstops",
     "energy_ledger",
