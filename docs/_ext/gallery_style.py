@@ -16,6 +16,7 @@ ORDER = (
     "sweep",
     "backstops",
     "energy_ledger",
+    "sensitivities",
     "inch_pound_file",
     "measured_magnet",
     "laboratory",
