@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _MOST_CORRECTIONS: Final = 12
 _FEW_CORRECTIONS: Final = 4
 _GROWTH: Final = 1.5
-_LEAST_COSINE: Final = 0.94
+_LEAST_COSINE: Final = 0.97
 """Of the angle between successive tangents, below which a step is taken again with half its length."""
 _FARTHEST: Final = 0.4
 """Distance of a corrected point from its prediction, in steps, beyond which it may lie on another curve."""

@@ -17,6 +17,7 @@ from printhammer.chaos.arclength import Steps
 from printhammer.chaos.continuation_branch import MOST, Branch
 from printhammer.chaos.continuation_work import PRECISION, Work, read_bounds
 from printhammer.chaos.orbit_result import Orbit
+from printhammer.chaos.orbit_search import orbits_of
 from printhammer.chaos.regime import Regime
 from printhammer.chaos.strobe_map import MAP_TOLERANCE, check_phase
 from printhammer.drive_input import read_count
@@ -61,8 +62,8 @@ def continuation(
     Parameters
     ----------
     start : Hammer or Orbit
-        A periodic orbit from `printhammer.orbits`; or a hammer, whose orbit is that to which a train from
-        rest settles, or that near `state`.
+        A periodic orbit from `printhammer.orbits`; or a hammer, whose orbit is that near `state`, or else
+        that to which a train from rest settles, or else the first that a search finds.
     parameter : str
         "period", "rate", or the dotted key of a constant of the hammer, such as "backstop.damping", of the
         waveform or of an endless force, such as "waveform.amplitude" or "drive.amplitude".
@@ -71,8 +72,8 @@ def continuation(
     period, rate, waveform, drive, overlap
         Of a hammer: as for `printhammer.strobe`.
     firings : int, optional
-        Of a hammer: number of firings after which the orbit repeats; by default that of the verdict on the
-        train, 1 where a state is given.
+        Of a hammer: number of firings after which the orbit repeats; by default that to which the train
+        settles, and 1 where it does not or a state is given.
     state : tuple of float, optional
         Of a hammer: displacement, m, and velocity, m/s, at a section, near the orbit.
     phase : float, optional
@@ -99,8 +100,8 @@ def continuation(
     Raises
     ------
     InputError
-        An argument is not what is described above; the start lies out of bounds; the train from rest does not
-        settle to a periodic orbit; there is no orbit near the start.
+        An argument is not what is described above; the start lies out of bounds; there is no orbit to start
+        from.
     """
     check_tolerance(tolerance)
     if isinstance(start, Orbit):
@@ -116,17 +117,22 @@ def continuation(
         regime = Regime.of(start, period=period, rate=rate, waveform=waveform, drive=drive, overlap=overlap)
         part = check_phase(0.0 if phase is None else phase)
         given = None if firings is None else read_count(firings, "firings")
-        point, count = _settled(regime, part, given) if state is None else (np.array(state), given or 1)
+        if state is None:
+            point, count, part = _found(regime, part, given, phase is not None, threads)
+        else:
+            point, count = np.array(state, dtype=np.float64), given or 1
     work = Work(regime, parameter, read_bounds(regime, parameter, bounds), part, tolerance, threads)
     chosen = steps or Steps(most=read_count(most, "most"), precision=PRECISION)
     return work.branch(point, count, chosen, progress)
 
 
-def _settled(regime: Regime, phase: float, firings: int | None) -> tuple[FloatArray, int]:
-    """Return the strobe point to which a train from rest settles, and after how many firings it repeats."""
+def _found(
+    regime: Regime, phase: float, firings: int | None, phase_given: bool, threads: int | None
+) -> tuple[FloatArray, int, float]:
+    """Return a state of the orbit to start from, its number of firings, and the phase of its section."""
     from printhammer.chaos.strobe import strobes
 
-    ((found),) = strobes(
+    (seen,) = strobes(
         regime.hammer,
         None if regime.drive is not None else [regime.period],
         points=1,
@@ -136,16 +142,17 @@ def _settled(regime: Regime, phase: float, firings: int | None) -> tuple[FloatAr
         drives=None if regime.drive is None else [regime.drive],
         overlap=regime.overlap,
         firings=(_SETTLE // 2, _SETTLE),
-        verdict=firings is None,
+        threads=threads,
     )
-    if not found.ok:
-        raise InputError(f"the train from rest ended early: {found.status}; expected a state to start from")
-    if firings is None:
-        judged = found.verdict
-        if judged is None or judged.period is None:
-            raise InputError(
-                f"the train from rest at a period of {regime.period:.9g} s is not periodic,"
-                " expected a state or an orbit to start from"
-            )
-        firings = judged.period
-    return np.array([found.x[0], found.v[0]]), firings
+    judged = None if seen.verdict is None or not seen.ok else seen.verdict.period
+    if judged is not None and firings in (None, judged):
+        return np.array([seen.x[0], seen.v[0]]), judged, phase
+    many = firings or 1
+    search = orbits_of(regime, longest=many, threads=threads)
+    for orbit in search:
+        if orbit.firings == many and (orbit.phase == phase or not phase_given):
+            return np.array(orbit.section), many, orbit.phase
+    raise InputError(
+        f"the train from rest at a period of {regime.period:.9g} s settles to no orbit of {many} firings, and"
+        " a search finds none, expected a state or an orbit to start from"
+    )

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.arclength import Curve, Stop
     from printhammer.chaos.continuation_events import BranchEvent
+    from printhammer.chaos.orbit_result import Orbit
     from printhammer.chaos.regime import Regime
     from printhammer.segments import FloatArray
 
@@ -146,6 +147,20 @@ class Branch:
             "first_end": self.stops[0].sentence,
             "last_end": self.stops[1].sentence,
         }
+
+    def orbit(self, number: int) -> Orbit:
+        """Return all about one of the orbits, closed anew at its value of the constant.
+
+        Parameters
+        ----------
+        number : int
+            Its place along the branch.
+        """
+        from printhammer.chaos.orbit_search import orbit
+
+        regime = self.regime.with_(self.parameter, float(self.values[number]))
+        state = self.curve.nodes[number].state
+        return orbit(regime, state, firings=self.firings, phase=self.phase, tolerance=self.tolerance)
 
     def doubled(
         self, event: BranchEvent, *, most: SupportsIndex = MOST, threads: int | None = None
