@@ -124,8 +124,9 @@ def test_quantities_with_other_parts(case: tuple[str, str, str, str, str], tmp_p
     hammer = hammer_of(magnet, spring, pack, backstop, tmp_path)
     drive = drive_of(magnet, name)
     state = hammers.STOP + 20e-6, 0.3
-    end = before_slow_touches(hammer, drive, 0.9e-3, state)
-    compare_quantities(hammer, drive, end, state)
+    with interpreted():
+        end = before_slow_touches(hammer, drive, 0.9e-3, state)
+        compare_quantities(hammer, drive, end, state)
 
 
 @pytest.mark.slow

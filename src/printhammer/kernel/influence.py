@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled
 from printhammer.kernel.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, PACK, POSITION, SPRING
-from printhammer.kernel.modes import BACKSTOP, BACKSTOP_RELEASED, LOADING, RELOADING, UNLOADING
+from printhammer.kernel.modes import BACKSTOP, LOADING, RELOADING, UNLOADING
 from printhammer.kernel.pulses import LIVE_WIDTH
 from printhammer.kernel.slopes import (
     BACKWARD,
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         MEMORY,
         PACK_PULLS,
         backstop_elastic,
+        backstop_energy,
         backstop_switch,
         backstop_viscous,
         magnet_force,
@@ -221,26 +222,17 @@ def viscous_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[flo
 
 
 @compiled
-def released_loss(
-    x: float, v: float, dx: float, dv: float, k: int, scales: Any, hammer: Hammer, given: Given
+def stored_change(
+    x: float, dx: float, k: int, hammer: Hammer, varied: Any, moves: Any, of_hammer: Any
 ) -> float:
-    """Return the change of the power [W] lost as a backstop that has let go creeps back."""
-    varied, moves, of_hammer, _live_moves, _memories, _spacing = given
+    """Return the change of the energy [J] stored in the backstop at place `x`, which changes by `dx`."""
     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
-    if w == 0.0:
-        return 0.0
-    spacing = ROOT_SPACING * max(w, 1e-2 * math.sqrt(scales[0]))
-    side = CENTRAL if w >= 2.0 * spacing else FORWARD
-    with_w, change = 0.0, 0.0
-    for i in range(POINTS[side]):
-        at = w + OFFSETS[side, i] * spacing
-        with_w += WEIGHTS[side, i] * backstop_elastic(hammer[BACKSTOP_PART:MAGNET], at) / spacing
+    change = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) * (moves[k, POSITION] - dx)
     if of_hammer[k] & BACKSTOP_MOVES:
         for i in range(POINTS[CENTRAL]):
             c = varied[k, MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
-            change += WEIGHTS[CENTRAL, i] * backstop_elastic(c, w) / SPACING
-    change += with_w * (moves[k, POSITION] - dx) / (2.0 * w)
-    return float(change * v + backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) * dv)
+            change += WEIGHTS[CENTRAL, i] * backstop_energy(c, w) / SPACING
+    return float(change)
 
 
 @compiled
@@ -322,8 +314,6 @@ def influence_rates(
                 push_change += pack_change(x, v, mode, k, varied, front, memories)
             change += push_change
             pack_power = -push_change * v - push * dv
-        elif HAS_BACKSTOP and mode == BACKSTOP_RELEASED:
-            backstop_power = released_loss(x, v, dx, dv, k, scales, hammer, given)
         rates[j] = pace * dv
         rates[j + 1] = change * hammer[INVERSE_MASS] + pace * force * moves[k, INVERSE_MASS]
         if FORCE_DRIVE:

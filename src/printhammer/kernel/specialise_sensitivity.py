@@ -15,7 +15,7 @@ from printhammer.kernel.specialise import Kernel, execute, one_at_a_time
 if TYPE_CHECKING:
     from types import ModuleType
 
-TEMPLATES = ("influence", "sensitivity")
+TEMPLATES = ("influence", "influence_switches", "sensitivity")
 
 
 def with_sensitivity(plain: Kernel) -> Kernel:
