@@ -73,7 +73,8 @@ def branches_dataset(branches: Sequence[Branch]) -> xr.Dataset:
 
     most = max((len(branch) for branch in branches), default=0)
     firings = max((branch.firings for branch in branches), default=0)
-    events = max((len(branch.events) for branch in branches), default=0)
+    # At least one column: a dimension of length 0 has another meaning in the classic NetCDF format.
+    events = max(1, *(len(branch.events) for branch in branches)) if branches else 1
     count = len(branches)
     unit = branches[0].unit if branches else "1"
     name = branches[0].parameter if branches else ""
