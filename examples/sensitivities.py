@@ -40,20 +40,22 @@ for name, value, part in zip(
     print(f"{name:14s} {value:.4g} ± {100.0 * part / value:.1f} %")
 
 # %%
-# In a train, what is left of one dot comes back in the next. The derivative with
-# respect to the period tells how near a rate is to its limit.
+# In a train, what is left of one dot comes back in the next. The second flight depends
+# on when, within a rebound on the backstop, its pulse begins; the more so the less
+# time the rebounds had to die out.
 
-rates = np.linspace(300.0, 800.0, 51)
+periods = np.linspace(1.2e-3, 2e-3, 161)
 change = []
-for rate in rates:
-    train = ph.PulseTrain(hammer.waveform, rate=rate, pulses=2)
-    second = ph.sensitivities(hammer, train, constants=["rate"])
-    change.append(second.logarithmic[1, second.quantities.index("flight_time"), 0])
+for period in periods:
+    train = ph.PulseTrain(hammer.waveform, period=period, pulses=2)
+    second = ph.sensitivities(hammer, train, constants=["period"])
+    change.append(second.derivatives[1, second.quantities.index("flight_time"), 0])
 figure, axes = plt.subplots()
-axes.plot(rates, change)
+axes.plot(1e3 * periods, change)
+axes.axhline(0.0, color="0.6", linewidth=0.8)
 axes.set(
-    xlabel="rate (Hz)",
-    ylabel="change in % for 1 % of the rate",
+    xlabel="time between the firings (ms)",
+    ylabel="change in µs for 1 µs more between the firings",
     title="Flight time of the second of two dots",
 )
 
