@@ -148,19 +148,18 @@ def test_nothing_is_written_to_what_is_no_log(
     assert judged == []
 
 
-def test_standing_counts_stated_claims_then_panels_then_others() -> None:
+def test_standing_counts_claims_and_twelfths_for_panels() -> None:
     kinds = {name: claim.kind for name, claim in claims().items()}
 
     def row(panels: int | None = 0, **verdicts: bool) -> dict[str, Any]:
         return {"panels": panels, "verdicts": verdicts}
 
-    assert standing(row(None)) == (0, 0, 0)
-    assert standing(row(12, geometry=True, settle_out=True, print_force=True)) == (1, 12, 1)
-    assert standing(row(3, geometry=False, poincare=True)) == (0, 3, 0)
-    best = row(0, **dict.fromkeys(STATED, True))
-    shapes = dict.fromkeys((name for name, kind in kinds.items() if kind == "shape"), True)
+    assert standing(row(None)) == (0, 0)
+    assert standing(row(6, geometry=True, settle_out=True, print_force=True)) == (2.5, 1)
+    assert standing(row(3, geometry=False, poincare=True)) == (0.25, 0)
+    # All twelve are one claim, and it counts once.
+    assert standing(row(12, poincare=True)) == standing(row(12, poincare=False)) == (1, 0)
+    # Of as many, those with more stated ones.
+    assert standing(row(0, geometry=True)) > standing(row(0, settle_out=True))
     typical = dict.fromkeys((name for name, kind in kinds.items() if kind == "typical"), True)
-    assert standing(best) > standing(row(12, **dict.fromkeys(STATED[1:], True), **shapes))
-    assert standing(row(5, geometry=True)) > standing(row(4, geometry=True, **shapes))
-    # Claims that are "typical" never decide.
     assert standing(row(4, geometry=True, **typical)) == standing(row(4, geometry=True))

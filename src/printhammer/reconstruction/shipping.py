@@ -38,7 +38,7 @@ def gauge() -> str:
 
 
 def best_of(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the candidate that ships: most stated claims, then panels of Fig. 11, then other claims."""
+    """Return the candidate that ships: most claims, a panel of Fig. 11 as a twelfth."""
     return max(rows, key=standing)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.claims import claims
+from printhammer.claims.verdicts import printed_verdicts
 from printhammer.reconstruction.judged import FIGURE_11, STATED, row_of
 from printhammer.reconstruction.judged_log import append, joined, key_of, mend, read_judged
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
-
 
 APART: Final = 0.01
 """Least distance of two candidates of a shortlist in one variable, in shares of its range."""
@@ -108,11 +108,16 @@ def judge_candidates(
     return [known[key_of(constants)] for constants in wanted]
 
 
-def standing(row: dict[str, Any]) -> tuple[int, int, int]:
-    """Return how good a judged candidate is: stated claims, panels of Fig. 11, other claims that hold."""
+def standing(row: dict[str, Any]) -> tuple[float, int]:
+    """Return how good a judged candidate is: claims that hold, and how many of them are stated.
+
+    A panel of Fig. 11 counts as a twelfth of a claim; claims that are "typical" have no say.
+    """
     kinds = {name: claim.kind for name, claim in claims().items()}
-    verdicts = row["verdicts"]
-    stated = sum(bool(verdicts.get(name)) for name in STATED)
-    # Claims that are "typical" have no say.
-    shape = sum(holds for name, holds in verdicts.items() if kinds[name] == "shape")
-    return stated, int(row["panels"] or 0), shape
+    holding = [
+        name
+        for name, holds in row["verdicts"].items()
+        if holds and name != FIGURE_11 and kinds[name] != "typical"
+    ]
+    panels = int(row["panels"] or 0) / len(printed_verdicts())
+    return len(holding) + panels, sum(kinds[name] == "stated" for name in holding)
