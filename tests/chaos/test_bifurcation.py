@@ -159,7 +159,11 @@ def test_exponents_tell_strange_from_undecided(hammer: "ph.Hammer") -> None:
     assert judged.verdicts[0, 1] == "strange"
     assert judged.exponents[0, 1] > 0.0
     assert math.isnan(judged.exponents[0, 2])
-    assert {route.judged for route in judged.routes()} == {"exponent"}
+    # Without the exponents of all trains those on the way are computed.
+    for route in plain.routes():
+        assert route.complete
+    assert plain.routes()[1].first == judged.routes()[1].first == 1.05e-3
+    assert plain.routes()[1].periods == [1]
 
 
 def test_a_run_that_stops_has_a_status_and_the_next_begins_at_rest(hammer: "ph.Hammer") -> None:
@@ -287,12 +291,27 @@ def test_windows_and_the_series_of_doublings() -> None:
     assert "after a series of doublings: period-1, period-2" in rising.sentence
 
 
+def test_trains_that_settle_slowly_do_not_hide_a_series(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("printhammer.chaos.bifurcation_windows._is_strange", lambda *_arguments: False)
+    found = diagram({"from rest": [1, 0, 2, 2, 0, 4, 0, 0, 8, -1]}, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10])
+    rising, falling = found.routes()
+    assert rising.cascade
+    assert rising.periods == [1, 2, 4, 8]
+    assert rising.first == 10.0
+    assert falling.first == 10.0
+    monkeypatch.setattr("printhammer.chaos.bifurcation_windows.MOST_UNDECIDED", 2)
+    rising, _ = found.routes()
+    assert not rising.complete
+    assert rising.first is None
+    assert "not followed further" in rising.sentence
+
+
 def test_without_a_strange_train_the_route_says_so() -> None:
     found = diagram({"from rest": [1, 2, 1]}, [1, 2, 3])
     rising, falling = found.routes()
     assert rising.first is None
     assert falling.periods == [1, 2, 1]
-    assert "no train without a period comes" in rising.sentence
+    assert "no strange train comes" in rising.sentence
     with pytest.raises(ph.InputError, match="direction = 'up'"):
         found.windows("up")
 

@@ -64,7 +64,10 @@ def test_orbits_and_branches_are_drawn_over(both: Bifurcation) -> None:
     assert lines["unstable orbit"].get_xydata().tolist() == [[pytest.approx(0.866), pytest.approx(42.0)]]
     assert lines["unstable orbit"].get_markerfacecolor() == "white"
     assert lines["stable orbit"].get_markerfacecolor() != "white"
-    assert np.isfinite(lines["unstable branch"].get_ydata()).tolist() == [False, True, True]
+    # Half-way between the orbits the multiplier is 1.
+    assert np.isfinite(lines["unstable branch"].get_ydata()).tolist() == [False, True, True, True, False]
+    assert lines["stable branch"].get_xdata()[1] == pytest.approx(0.8625)
+    assert lines["stable branch"].get_ydata()[1] == pytest.approx(42.5)
     branch.parameter = "mass"
     with pytest.raises(ph.InputError, match="orbits"):
         both.plot(orbits=[branch])

@@ -15,6 +15,9 @@ import numpy as np
 
 from printhammer.chaos.bifurcation_carry import SAME
 from printhammer.chaos.bifurcation_columns import orbit_distance
+from printhammer.chaos.bifurcation_work import train_from, window_of_exponent
+from printhammer.chaos.train import exponents_of
+from printhammer.chaos.verdict import SIGNIFICANT
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,6 +30,9 @@ if TYPE_CHECKING:
 
 SERIES: Final = (2, 4, 8)
 """Periods that, one after the other, count as a series of doublings."""
+
+MOST_UNDECIDED: Final = 32
+"""Trains without a period that are not strange, on a route, after which it is not followed further."""
 
 
 @dataclass(frozen=True)
@@ -64,23 +70,23 @@ class Route:
     way : str
         "rising" or "falling" values of the parameter.
     before : tuple of Window
-        The windows before the first strange one, in this order; all of them if there is none.
+        The windows before the first strange train, in this order; all of them if there is none.
     first : float or None
-        Value of the first strange train, SI.
-    judged : str
-        "exponent" where strange trains are known by their exponents; "no period" where these were not
-        computed, and every train without a period is taken for one.
+        Value of the first strange train, SI; None if there is none, or it was not come to.
+    complete : bool
+        False where `MOST_UNDECIDED` trains without a period came first that are not strange, and the way was
+        not followed further.
     """
 
     way: Literal["rising", "falling"]
     before: tuple[Window, ...]
     first: float | None
-    judged: Literal["exponent", "no period"]
+    complete: bool
 
     @property
     def periods(self) -> list[int]:
-        """Periods of the windows before, 0 for one without."""
-        return [window.period for window in self.before]
+        """Periods of the windows before, those without one left out."""
+        return [window.period for window in self.before if window.period]
 
     @property
     def cascade(self) -> bool:
@@ -90,12 +96,18 @@ class Route:
     @property
     def sentence(self) -> str:
         """The finding in a sentence."""
-        kind = "strange train" if self.judged == "exponent" else "train without a period"
-        way = ", ".join(str(window.verdict) for window in self.before) or "nothing"
+        way = ", ".join(window.verdict for window in self.before) or "nothing"
+        if not self.complete:
+            return (
+                f"With {self.way} values {MOST_UNDECIDED} trains come that neither repeat nor are strange,"
+                f" and the way was not followed further: {way}."
+            )
         if self.first is None:
-            return f"With {self.way} values no {kind} comes: {way}."
+            return f"With {self.way} values no strange train comes: {way}."
         told = "a series of doublings" if self.cascade else "no series of doublings"
-        return f"With {self.way} values the first {kind} comes at {self.first:.9g} after {told}: {way}."
+        return (
+            f"With {self.way} values the first strange train comes at {self.first:.9g} after {told}: {way}."
+        )
 
 
 def windows_of(diagram: Bifurcation, direction: str | None = None) -> list[Window]:
@@ -114,11 +126,16 @@ def windows_of(diagram: Bifurcation, direction: str | None = None) -> list[Windo
         The diagram has no such direction.
     """
     row = _row(diagram, direction)
+    return _grouped(diagram, row, range(len(diagram.values)))
+
+
+def _grouped(diagram: Bifurcation, row: int, order: Sequence[int]) -> list[Window]:
+    """Return the windows of neighbouring columns, which may ascend or descend."""
     names, cycles = diagram.verdicts[row].tolist(), diagram.cycles[row].tolist()
     widths = cells(diagram.values)
     found = []
-    for name, group in itertools.groupby(range(len(names)), key=lambda k: names[k]):
-        places = list(group)
+    for name, group in itertools.groupby(order, key=lambda k: names[k]):
+        places = sorted(group)
         first, last = places[0], places[-1]
         found.append(
             Window(
@@ -142,13 +159,20 @@ def cells(values: FloatArray) -> FloatArray:
 
 
 def doublings(windows: Sequence[Window]) -> list[Window]:
-    """Return the first of each three windows in a row whose periods are 2, 4 and 8."""
-    threes = zip(windows, windows[1:], windows[2:], strict=False)
+    """Return the first of each three windows in a row whose periods are 2, 4 and 8.
+
+    Windows that are undecided do not count: where the period doubles, trains take long to settle.
+    """
+    decided = [window for window in windows if window.verdict != "undecided"]
+    threes = zip(decided, decided[1:], decided[2:], strict=False)
     return [three[0] for three in threes if tuple(window.period for window in three) == SERIES]
 
 
 def routes_of(diagram: Bifurcation, direction: str | None = None) -> tuple[Route, Route]:
     """Return the routes to the first strange train of a diagram, with rising and with falling values.
+
+    Of trains without a period whose exponent is not known it is computed here, from one end of the range on
+    up to the first strange one.
 
     Parameters
     ----------
@@ -162,19 +186,46 @@ def routes_of(diagram: Bifurcation, direction: str | None = None) -> tuple[Route
     InputError
         The diagram has no such direction.
     """
-    found = windows_of(diagram, direction)
-    measured = bool(np.isfinite(diagram.exponents).any())
+    row = _row(diagram, direction)
+    names = diagram.verdicts[row].tolist()
+    ends = diagram.values.tolist()
+    known: dict[int, bool] = {}
 
-    def strange(window: Window) -> bool:
-        return window.verdict == "strange" if measured else window.period == 0
+    def strange(column: int) -> bool:
+        if names[column] == "undecided" and column not in known:
+            known[column] = _is_strange(diagram, row, column)
+        return names[column] == "strange" or known.get(column, False)
 
-    def route(way: Literal["rising", "falling"], order: Sequence[Window]) -> Route:
-        before = list(itertools.takewhile(lambda window: not strange(window), order))
-        rest = order[len(before) :]
-        first = None if not rest else rest[0].low if way == "rising" else rest[0].high
-        return Route(way, tuple(before), first, "exponent" if measured else "no period")
+    def route(way: Literal["rising", "falling"], order: Sequence[int]) -> Route:
+        undecided = 0
+        first = None
+        for place, column in enumerate(order):
+            if strange(column):
+                first = place
+                break
+            undecided += names[column] == "undecided"
+            if undecided > MOST_UNDECIDED:
+                return Route(way, tuple(_grouped(diagram, row, order[:place])), None, False)
+        before = tuple(_grouped(diagram, row, order[:first]))
+        return Route(way, before, None if first is None else ends[order[first]], True)
 
-    return route("rising", found), route("falling", found[::-1])
+    columns = range(len(names))
+    return route("rising", columns), route("falling", columns[::-1])
+
+
+def _is_strange(diagram: Bifurcation, row: int, column: int) -> bool:
+    """Tell whether a train without a period is strange, by its exponent from its last point on."""
+    x, v = (float(states[row, column, -1]) for states in (diagram.x, diagram.v))
+    regime = diagram.regime.with_(diagram.parameter, float(diagram.values[column]))
+    front = regime.hammer.front
+    # Inside the pack, and between firings, the state that is kept is not all that a train goes on from.
+    if diagram.status[row, column] != "ok" or diagram.phase or (front is not None and x > front):
+        return False
+    points = diagram.x.shape[2]
+    (found,) = exponents_of(
+        [train_from(regime, (x, v), points)], window_of_exponent(points), diagram.tolerance, threads=1
+    )
+    return bool(found.ok and found.smooth and found.value > SIGNIFICANT * found.standard_error)
 
 
 def hysteresis(diagram: Bifurcation) -> npt.NDArray[np.bool_]:

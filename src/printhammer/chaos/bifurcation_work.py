@@ -37,6 +37,21 @@ _BEFORE: Final = 100
 """Firings before an exponent counts."""
 
 
+def window_of_exponent(points: int) -> tuple[int, int]:
+    """Return the first and last firing over which the exponent of a train with so many points is taken."""
+    return _BEFORE + 1, _BEFORE + points
+
+
+def train_from(regime: Regime, state: tuple[float, float], points: int) -> Train:
+    """Return a train that goes on from a state at a firing, for its exponent."""
+    _first, last = window_of_exponent(points)
+    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
+    drive = regime.drive or PulseTrain(
+        regime.fired, period=regime.period, pulses=last + 2, overlap=regime.overlap
+    )
+    return Train(regime.hammer, drive, regime.period, state)
+
+
 class Work:
     """A diagram under way. Trains are numbered as they come, those of all directions at a value in a row."""
 
@@ -174,22 +189,18 @@ class Work:
     def measure(self) -> None:
         """Compute the exponents of the trains without a period, over as many firings as there are points."""
         columns, table = self.table.columns, self.table
-        window = (_BEFORE + 1, _BEFORE + self.points)
         trains = []
         for row, regime in enumerate(table.regimes):
             x, v, branch, _memory = columns.last[row].tolist()
             # A start inside the pack would need its memory; such a train stays undecided.
             if columns.status[row] != OK or table.cycles[row] or branch >= 0.0 or math.isnan(x):
                 continue
-            drive = regime.drive or PulseTrain(
-                regime.fired, period=regime.period, pulses=window[1] + 2, overlap=regime.overlap
-            )
-            trains.append((row, Train(regime.hammer, drive, regime.period, (x, v))))
+            trains.append((row, train_from(regime, (x, v), self.points)))
         self.known += len(trains)
         begun = self.done
         found = exponents_of(
             [train for _row, train in trains],
-            window,
+            window_of_exponent(self.points),
             self.counts[3],
             threads=self.threads,
             progress=lambda done, _all: self.tell(begun + done),

@@ -195,14 +195,11 @@ def _orbit(ax: Axes, diagram: Bifurcation, found: Any, show: str, across: Scale,
                 f"orbits: a branch in {found.parameter} at phase {found.phase:g}, expected one in"
                 f" {diagram.parameter} at phase {diagram.phase:g}"
             )
-        values = across.shown(found.values)
-        stable = np.abs(found.multipliers[:, 0]) < 1.0
-        for kind, style in ((stable, "-"), (~stable, (0, (1.5, 1.5)))):
-            # A curve goes on to the first orbit of the other kind, so that no gap is left.
-            shown = kind | np.append(False, kind[:-1])
+        values, states, size = _crossed(across.shown(found.values), states, np.abs(found.multipliers[:, 0]))
+        for kind, style in (("stable", "-"), ("unstable", (0, (1.5, 1.5)))):
+            shown = size <= 1.0 if kind == "stable" else size >= 1.0
             line = np.where(shown[:, np.newaxis], states, np.nan)
-            gid = "stable branch" if kind is stable else "unstable branch"
-            ax.plot(values, line, color=GREEN, lw=THIN, ls=style, zorder=5.0, gid=gid)
+            ax.plot(values, line, color=GREEN, lw=THIN, ls=style, zorder=5.0, gid=f"{kind} branch")
         return
     if diagram.phase:
         raise InputError(
@@ -220,6 +217,21 @@ def _orbit(ax: Axes, diagram: Bifurcation, found: Any, show: str, across: Scale,
         mfc=GREEN if stable else "white",
         zorder=6.0,
         gid="stable orbit" if stable else "unstable orbit",
+    )
+
+
+def _crossed(
+    values: FloatArray, states: FloatArray, size: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Put points on a branch where, by a straight line, the absolute value of the multiplier passes 1."""
+    at = np.flatnonzero((size[1:] < 1.0) != (size[:-1] < 1.0))
+    share = (1.0 - size[at]) / (size[at + 1] - size[at])
+    middle = values[at] + share * (values[at + 1] - values[at])
+    between = states[at] + share[:, np.newaxis] * (states[at + 1] - states[at])
+    return (
+        np.insert(values, at + 1, middle),
+        np.insert(states, at + 1, between, axis=0),
+        np.insert(size, at + 1, 1.0),
     )
 
 
