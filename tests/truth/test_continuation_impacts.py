@@ -106,7 +106,8 @@ def test_bouncing_ball_doubled() -> None:
     assert doubled.firings == 2
     assert doubled.stops[0].reason == "period doubling"
     assert doubled.stops[0].parameter == pytest.approx(case.doubling * weight, rel=SHARP)
-    assert doubled.values[0] == pytest.approx(case.doubling * weight, rel=1e-3)
+    assert doubled.values[0] == pytest.approx(case.doubling * weight, rel=SHARP)
+    np.testing.assert_allclose(doubled.multipliers[0].real, [1.0, case.restitution**4], atol=1e-6)
     # Supercritical: the doubled orbit is stable at first.
     assert doubled.stable[0]
     assert doubled.values[-1] == branch.bounds[1]

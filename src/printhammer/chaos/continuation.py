@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.chaos.arclength import Steps
 from printhammer.chaos.continuation_branch import MOST, Branch
-from printhammer.chaos.continuation_work import PRECISION, Work, read_bounds
+from printhammer.chaos.continuation_work import PRECISION, Work, read_bounds, unit_of
 from printhammer.chaos.orbit_result import Orbit
 from printhammer.chaos.orbit_search import orbits_of
 from printhammer.chaos.regime import Regime
@@ -116,6 +116,12 @@ def continuation(
     else:
         regime = Regime.of(start, period=period, rate=rate, waveform=waveform, drive=drive, overlap=overlap)
         part = check_phase(0.0 if phase is None else phase)
+        ends, own = read_bounds(regime, parameter, bounds), regime.value(parameter)
+        if not ends[0] <= own <= ends[1]:
+            raise InputError(
+                f"{parameter} = {own:.9g} {unit_of(regime, parameter)} at the start, expected one within the"
+                f" bounds {ends[0]:.9g} to {ends[1]:.9g}"
+            )
         given = None if firings is None else read_count(firings, "firings")
         if state is None:
             point, count, part = _found(regime, part, given, phase is not None, threads)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
+from printhammer.chaos.branch_points import BIRTH
 from printhammer.drive_input import read_count
 from printhammer.errors import InputError
 
@@ -106,8 +107,15 @@ class Branch:
 
     @property
     def stable(self) -> npt.NDArray[np.bool_]:
-        """Whether all small changes of the state die out, shape (N,)."""
-        return np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)
+        """Whether all small changes of the state die out, shape (N,).
+
+        Where the branch is born in a period doubling, as of the orbit beside it: a multiplier is 1 there.
+        """
+        found = np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)
+        for end, beside, stop in ((0, 1, self.stops[0]), (-1, -2, self.stops[1])):
+            if stop.reason == BIRTH and len(found) > 1:
+                found[end] = found[beside]
+        return found
 
     @property
     def closed(self) -> bool:

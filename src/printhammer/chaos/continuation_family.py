@@ -208,14 +208,15 @@ class RegimeFamily:
 
     def _slope(self, state: FloatArray, parameter: float, image: FloatArray) -> FloatArray | None:
         step = _SPACING * (abs(parameter) or 1.0)
-        beside = [self._end(state, parameter + sign * step) for sign in (-1.0, 1.0)]
+        beside = [self.end_of(state, parameter + sign * step) for sign in (-1.0, 1.0)]
         if beside[0] is not None and beside[1] is not None:
             return np.asarray((beside[1] - beside[0]) / (2.0 * step))
         if beside[1] is not None:
             return np.asarray((beside[1] - image) / step)
         return None if beside[0] is None else np.asarray((image - beside[0]) / step)
 
-    def _end(self, state: FloatArray, parameter: float) -> FloatArray | None:
+    def end_of(self, state: FloatArray, parameter: float) -> FloatArray | None:
+        """Return the state at the end alone; None where the run does not come through."""
         try:
             problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         except InputError:
@@ -224,7 +225,6 @@ class RegimeFamily:
 
     @staticmethod
     def _state_after(problem: Problem, end: float) -> FloatArray | None:
-        """Return the state at the end alone; None where the run does not come through."""
         record = problem.run(end)
         return None if record.status_name != "ok" else np.asarray(record.nodes[-1, 1:3])
 

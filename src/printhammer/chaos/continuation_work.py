@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.arclength import Curve, Follower, Steps, Stop, follow
-from printhammer.chaos.branch_points import BIRTH, birth_of, follow_doubled, points_of
+from printhammer.chaos.arclength import Curve, Follower, Node, Steps, Stop, follow
+from printhammer.chaos.branch_points import BIRTH, birth_of, doubling_near, follow_doubled, points_of
 from printhammer.chaos.continuation_branch import Branch
 from printhammer.chaos.continuation_events import event_of
 from printhammer.chaos.continuation_family import RegimeFamily, rigid_backstop
@@ -19,7 +19,6 @@ from printhammer.errors import InputError
 from printhammer.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
-    from printhammer.chaos.arclength import Node
     from printhammer.chaos.continuation_events import BranchEvent
     from printhammer.chaos.continuation_family import Course, Passage
     from printhammer.chaos.regime import Regime
@@ -34,6 +33,8 @@ _PARTS: Final = 5.0
 _MARGIN_STEP: Final = 1e-6
 _NEAR: Final = 1e-4
 """Change of the margin from which its slope is known; part of the range within which its zero is a stop."""
+_SHORTER: Final = 1e-6
+"""Scaled distance of an orbit from itself after a part of its firings, up to which it repeats then."""
 _DIGITS: Final = ".9g"
 
 
@@ -156,7 +157,13 @@ class Work:
         value, state = event.value, event.point.node.state
         told = f"the orbit is born at {self.told(value)}, where one of half its period doubles"
         born = Stop(BIRTH, value, state, told)
-        return self.described(family, Curve(curve.nodes, (born, curve.stops[1])), steps)
+        nodes = curve.nodes
+        at_birth = family(state, value)
+        if not at_birth.trouble:
+            way = np.append(nodes[0].state - state, nodes[0].parameter - value) / self.scales
+            arc = nodes[0].arc - float(np.linalg.norm(way))
+            nodes = [Node(state, value, nodes[0].tangent, arc, at_birth, 0.0), *nodes]
+        return self.described(family, Curve(nodes, (born, curve.stops[1])), steps)
 
     def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
         """Return the orbit near a state at one value of the constant; None if there is none."""
@@ -176,6 +183,7 @@ class Work:
         if firings % 2 == 0:
             half = Follower(self.family(firings // 2), self.scales, steps.precision)
         rigid = rigid_backstop(self.regime)
+        parts = [self.family(firings // k) for k in range(2, firings + 1) if firings % k == 0]
         taken = 0
 
         def watched(here: Node, ahead: Node) -> Stop | None:
@@ -187,7 +195,10 @@ class Work:
                 told = "its sequence of contacts changes in a grazing, where the strobe map has no derivative"
                 return Stop("grazing", here.parameter, here.state, told, here)
             born = None if half is None else birth_of(half, here, ahead)
-            if born is None or born.node is None:
+            if born is None:
+                shorter = [part for part in parts if self.repeats(part, ahead)]
+                return self.merged(shorter, here, ahead) if shorter else None
+            if born.node is None:
                 return born
             # What the orbit does there is that of its whole period.
             value = whole(born.node.state, born.node.parameter)
@@ -195,6 +206,31 @@ class Work:
             return replace(born, node=last)
 
         return watched
+
+    def repeats(self, part: RegimeFamily, node: Node) -> bool:
+        """Return whether an orbit repeats after the firings of a part of it already."""
+        end = part.end_of(node.state, node.parameter)
+        return end is not None and bool(np.abs((end - node.state) / self.scales[:2]).max() < _SHORTER)
+
+    def merged(self, shorter: list[RegimeFamily], here: Node, ahead: Node) -> Stop:
+        """Return the stop of a branch that has gone over to an orbit of fewer firings.
+
+        Near a period doubling the curves of both orbits lie so close that a step may lead from one to the
+        other.
+        """
+        longest = max(shorter, key=lambda part: part.firings)
+        half = Follower(longest, self.scales, PRECISION)
+        row = np.zeros(3)
+        row[-1] = 1.0
+        single = half.correct(half.scaled(ahead.state, ahead.parameter), row)
+        node = None if single is None else doubling_near(half, single)
+        if node is not None:
+            place, before = half.scaled(node.state, node.parameter), half.scaled(here.state, here.parameter)
+            step = float(np.linalg.norm(half.scaled(ahead.state, ahead.parameter) - before))
+            if float(np.linalg.norm(place - before)) < 3.0 * step:
+                return Stop(BIRTH, node.parameter, node.state, "born", here)
+        told = f"it merges with an orbit of {longest.firings} firings"
+        return Stop("merged", here.parameter, here.state, told, here)
 
     def described(self, family: RegimeFamily, curve: Curve, steps: Steps) -> Branch:
         """Return a branch with all about its orbits."""
@@ -268,6 +304,7 @@ class Work:
             "lost": f"beyond {at} Newton's method does not converge",
             "length": f"the number of steps was used up at {at}",
             "grazing": f"at {at} {why}",
+            "merged": f"close to {at} {why}",
             BIRTH: f"at {at} it is born from an orbit of half its period, which doubles",
             "not asked": f"it was not followed beyond {at}",
         }

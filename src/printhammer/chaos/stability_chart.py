@@ -143,14 +143,17 @@ class StabilityChart:
 
         from printhammer.chaos.orbit_tables import provenance_of
 
-        most = max((len(curve.first) for curve in self.curves), default=0)
-        table = {name: np.full((len(self.curves), most), np.nan) for name in ("first", "second")}
-        limits = np.full((len(self.curves), most), -1, np.int32)
+        # At least one of each: a dimension of length 0 has another meaning in the classic NetCDF format.
+        most, count = max((len(curve.first) for curve in self.curves), default=1), max(len(self.curves), 1)
+        table = {name: np.full((count, most), np.nan) for name in ("first", "second")}
+        limits = np.full((count, most), -1, np.int32)
+        kinds = list(_TESTS)
+        codes = np.full(count, -1, np.int32)
+        codes[: len(self.curves)] = [kinds.index(curve.kind) for curve in self.curves]
         for i, curve in enumerate(self.curves):
             table["first"][i, : len(curve.first)] = curve.first
             table["second"][i, : len(curve.second)] = curve.second
             limits[i, : len(curve.limits)] = curve.limits
-        kinds = list(_TESTS)
         data: dict[str, Any] = {
             "settled": (
                 ("value", "main"),
@@ -159,7 +162,7 @@ class StabilityChart:
             ),
             "kind": (
                 "curve",
-                np.array([kinds.index(curve.kind) for curve in self.curves], dtype=np.int32),
+                codes,
                 {"units": "1", "codes": ", ".join(f"{code} {kind}" for code, kind in enumerate(kinds))},
             ),
             "limits": (("curve", "point"), limits, {"units": "1", "long_name": "whether stability is lost"}),

@@ -1,0 +1,106 @@
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import printhammer as ph
+from printhammer.chaos import Branch, Branches, StabilityChart
+from printhammer.figures.continuation import colour_of
+
+GRAVITY, RESTITUTION, FREQUENCY, GAMMA = 9.80665, 0.5, 50.0, 1.3
+WEIGHT = 1e-3 * GRAVITY
+
+
+@pytest.fixture(scope="module")
+def branch() -> Branch:
+    """The orbit of the bouncing ball with one impact a period: a fold, and a period doubling."""
+    ball = ph.Hammer.build(
+        1e-3,
+        spring={"law": "preload", "preload": -WEIGHT, "stiffness": 0.0},
+        backstop={"law": "rigid", "position": 0.0, "restitution": RESTITUTION},
+    )
+    omega = 2.0 * math.pi * FREQUENCY
+    height = GAMMA * GRAVITY / omega**2
+    angle = math.acos(math.pi * (1.0 - RESTITUTION) / (1.0 + RESTITUTION) / GAMMA)
+    up, dt = 0.5 * GRAVITY / FREQUENCY, 0.5 / FREQUENCY - angle / omega
+    state = (height * math.sin(angle) + up * dt - 0.5 * GRAVITY * dt * dt, up - GRAVITY * dt + height * omega)
+    return ph.continuation(
+        ball,
+        "drive.amplitude",
+        (0.9 * WEIGHT, 1.7 * WEIGHT),
+        drive=ph.SineForce(GAMMA * WEIGHT, FREQUENCY),
+        state=state,
+        phase=0.5,
+    )
+
+
+def lines(figure: Figure, name: str) -> list:
+    return [line for line in figure.axes[0].lines if line.get_gid() == name]
+
+
+def test_stable_parts_are_solid_and_end_at_the_branch_points(branch: Branch) -> None:
+    figure = branch.plot()
+    (stable,) = lines(figure, "stable")
+    assert stable.get_linestyle() == "-"
+    ends = sorted(stable.get_xdata()[[0, -1]])
+    (limits,) = branch.stable_ranges
+    np.testing.assert_allclose(ends, limits, rtol=1e-12)
+    unstable = lines(figure, "unstable")
+    assert {line.get_linestyle() for line in unstable} == {"--"}
+    drawn = sum(len(line.get_xdata()) for line in [stable, *unstable])
+    # Every orbit and branch point once, and those at which the style changes twice.
+    assert drawn == len(branch) + len(branch.events) + 2
+    for event in branch.events:
+        (mark,) = lines(figure, event.kind)
+        assert mark.get_xdata()[0] == event.value
+        np.testing.assert_allclose(mark.get_ydata()[0], event.state[1], rtol=1e-2)
+
+
+def test_the_legend_tells_every_kind(branch: Branch) -> None:
+    told = [text.get_text() for text in branch.plot().axes[0].get_legend().get_texts()]
+    assert told == ["period 1, stable", "unstable", "fold", "period doubling"]
+
+
+def test_other_quantities_and_limits(branch: Branch) -> None:
+    figure = branch.plot(show="x", limits=(0.0, 1e-3))
+    (ax,) = figure.axes
+    assert ax.get_ylim() == (0.0, 1e3)
+    assert "µm" in ax.get_ylabel()
+    for wrong in ("nothing", ""):
+        with pytest.raises(ph.InputError, match="show"):
+            branch.plot(show=wrong)
+
+
+def test_several_branches_have_colours_by_period(branch: Branch) -> None:
+    (event,) = [event for event in branch.events if event.kind == "period doubling"]
+    both = Branches((branch, branch.doubled(event)))
+    figure = both.plot()
+    counts = Counter(line.get_color() for line in lines(figure, "stable"))
+    # The doubled orbit has two states.
+    assert counts[colour_of(1)] == 1
+    assert counts[colour_of(2)] >= 2
+    with pytest.raises(ph.InputError, match="at least one"):
+        Branches(()).plot()
+
+
+def test_ends_before_the_bounds_are_told(branch: Branch) -> None:
+    short = ph.continuation(branch.orbit(len(branch) // 2), branch.parameter, branch.bounds, most=3)
+    assert "number of steps" in short.message
+    figure = short.plot()
+    assert "2 where the number of steps was used up" in figure.get_suptitle()
+    assert branch.plot().get_suptitle() == ""
+
+
+def test_a_chart_is_drawn(branch: Branch) -> None:
+    chart: StabilityChart = ph.stability_chart(branch, "backstop.restitution", (0.48, 0.52), grid=(4, 3))
+    figure = chart.plot()
+    for kind in ("fold", "period doubling"):
+        (curve,) = [curve for curve in chart.curves if curve.kind == kind]
+        (line,) = lines(figure, kind)
+        np.testing.assert_array_equal(line.get_xdata(), curve.first)
+        np.testing.assert_array_equal(line.get_ydata(), np.where(curve.limits, curve.second, np.nan))
+    assert len(figure.axes[0].collections) == 1
+    told = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert {"from rest: period 1", "fold", "period doubling", "the hammer's own"} <= set(told)
