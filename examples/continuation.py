@@ -1,0 +1,116 @@
+"""
+Continuation of periodic orbits
+===============================
+
+Which periodic motions exist at which value of a constant, stable or not? A ball on a
+vibrating table answers in closed form; then the print hammer.
+"""
+
+import math
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import printhammer as ph
+
+gravity, restitution, frequency = 9.80665, 0.8, 50.0
+ball = ph.Hammer.build(
+    "1 g",
+    name="ball on a table",
+    spring={"law": "preload", "preload": "-9.80665 mN", "stiffness": "0 N/m"},
+    backstop={"law": "rigid", "position": "0 m", "restitution": restitution},
+)
+
+# %%
+# In the frame of a table that moves as A sin(w t) the ball feels its weight and the
+# force m A w^2 sin(w t). The ratio of the two, Gamma, tells how hard the table
+# shakes. The orbit with one impact a period appears in a fold, and doubles its
+# period, at
+#
+# .. math::
+#
+#    \Gamma_1 = \pi \frac{1 - e}{1 + e}, \qquad
+#    \Gamma_2^2 = \Gamma_1^2 + \left( 2\, \frac{1 + e^2}{(1 + e)^2} \right)^2 .
+
+weight = 1e-3 * gravity
+fold = math.pi * (1.0 - restitution) / (1.0 + restitution)
+doubling = math.hypot(fold, 2.0 * (1.0 + restitution**2) / (1.0 + restitution) ** 2)
+
+# %%
+# The ball meets the table at the same height each time, so its flight is known, and
+# with it its state half a period after the table is at rest in the middle: a place
+# to start from.
+
+gamma, omega = 0.8, 2.0 * math.pi * frequency
+height, angle = gamma * gravity / omega**2, math.acos(fold / gamma)
+speed, t = 0.5 * gravity / frequency, 0.5 / frequency - angle / omega
+state = (
+    height * math.sin(angle) + speed * t - 0.5 * gravity * t**2,
+    speed - gravity * t + height * omega,
+)
+branch = ph.continuation(
+    ball,
+    "drive.amplitude",
+    (0.2 * weight, 1.2 * weight),
+    drive=ph.SineForce(gamma * weight, frequency),
+    state=state,
+    phase=0.5,
+)
+print(branch.message)
+for event, exact in zip(
+    sorted(branch.events, key=lambda event: event.value), (fold, doubling), strict=True
+):
+    found = event.value / weight
+    print(f"{event.kind:16s} at Gamma = {found:.12f}, exactly {exact:.12f}")
+
+# %%
+# Beyond the doubling the ball needs two periods. That branch is followed as well.
+
+(born,) = [event for event in branch.events if event.kind == "period doubling"]
+twice = branch.doubled(born)
+print(twice.message)
+
+
+def draw(axes, one, x, y, color):
+    """Draw stable parts of a branch solid, unstable ones dashed."""
+    for stable, style in ((True, "-"), (False, "--")):
+        axes.plot(np.where(one.stable == stable, x, np.nan), y, style, color=color)
+
+
+figure, axes = plt.subplots()
+draw(axes, branch, branch.values / weight, 1e3 * branch.x, "C0")
+draw(axes, twice, twice.values / weight, 1e3 * twice.x, "C1")
+for event in branch.events:
+    place = event.value / weight, 1e3 * event.state[0]
+    axes.plot(*place, "o", color="0.2", markersize=4)
+axes.set(
+    xlabel="Gamma",
+    ylabel="height at the section (mm)",
+    title="Solid: stable. Dashed: unstable",
+)
+
+# %%
+# The print hammer, around 1.3 ms between firings: its branch of period 1 turns back at
+# folds, between which several motions exist at once. `period_1.plot()` draws it too.
+
+hammer = ph.load("hendriks-1983")
+period_1 = ph.continuation(hammer, "period", ("1.28 ms", "1.33 ms"), period="1.3 ms")
+print(period_1.message)
+for event in period_1.events:
+    print(f"{1e3 * event.value:.6f} ms  {event.told}")
+
+figure, axes = plt.subplots()
+draw(axes, period_1, 1e3 * period_1.values, period_1.v, "C0")
+for event in period_1.events:
+    axes.plot(1e3 * event.value, event.state[1], "o", color="0.2", markersize=4)
+axes.set(xlabel="period (ms)", ylabel="velocity at the firing (m/s)")
+
+# %%
+# Each orbit of a branch tells what it does, such as when its dots strike: motions that
+# exist at the same rate print at different times.
+
+figure, axes = plt.subplots()
+draw(axes, period_1, 1e3 * period_1.values, 1e6 * period_1.flight_time, "C0")
+axes.set(xlabel="period (ms)", ylabel="flight time (µs)")
+
+plt.show()
