@@ -179,6 +179,14 @@ def test_replace_keeps_options_of_a_part(hammer: ph.Hammer) -> None:
     assert hammer.replace("backstop", soft).backstop == soft
 
 
+def test_a_bare_number_for_a_force_stays_a_force(hammer: ph.Hammer) -> None:
+    pushed = hammer.replace("waveform", HalfSine(amplitude="3 N", width="100 us"))
+    harder = pushed.replace("waveform.amplitude", 4.0)
+    assert harder.waveform == HalfSine(amplitude="4 N", width="100 us")
+    assert harder.constants["waveform.amplitude"].unit == "N"
+    assert harder.replace("waveform.amplitude", "2 A").waveform == HalfSine(amplitude=2.0, width=1e-4)
+
+
 def test_replace_the_waveform_and_take_parts_away(hammer: ph.Hammer) -> None:
     pushed = hammer.replace("waveform", HalfSine(amplitude="3 N", width="100 us"))
     assert pushed.waveform is not None

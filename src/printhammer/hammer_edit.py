@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from printhammer.constants import Constant, quantities, shown
+from printhammer.constants import Constant, Quantity, quantities, shown
 from printhammer.errors import InputError
-from printhammer.hammer_file import SELECTORS, TEXTS, Body, file_options, kinds_of, model_of
+from printhammer.hammer_file import SELECTORS, TEXTS, Body, file_options, kinds_of, model_of, si_unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, MutableMapping
@@ -67,7 +67,14 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
         raise InputError(f"the key {shown(key)} is not known, expected one such as 'pack.stiffness'")
     if note is None or value is None:
         return key, value
-    return key, _constant(key, note.si, value, status, source)
+    return key, _constant(key, _si_unit(note, document, section, name), value, status, source)
+
+
+def _si_unit(note: Quantity, document: Mapping[str, Any], section: str, name: str) -> str:
+    """Return the SI unit of a bare number: that of what it replaces, where the constant may have several."""
+    known = document.get(section, {}).get(name) if note.also else None
+    unit = known.get("unit") if isinstance(known, Mapping) else None
+    return note.si if unit is None else si_unit_of(note, unit)
 
 
 def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> dict[str, Any]:

@@ -265,7 +265,7 @@ def _constant(key: str, given: Any, note: Quantity) -> Constant:
             raise InputError(f"{key}.{name} = {shown(text)}: expected {_WANTED[name]}")
     if texts["status"] not in STATUSES:
         raise InputError(f"{key}.status = {shown(texts['status'])}: expected one of {', '.join(STATUSES)}")
-    si_unit = next((other for other in note.also if _fits(texts["unit"], other)), note.si)
+    si_unit = si_unit_of(note, texts["unit"])
     try:
         si = to_si(value, texts["unit"], si_unit)
     except InputError as error:
@@ -281,6 +281,11 @@ _WANTED: Final = {
     "status": f"a status ({', '.join(STATUSES)})",
     "source": "a source",
 }
+
+
+def si_unit_of(note: Quantity, unit: str) -> str:
+    """Return the SI unit that goes with a unit, of a constant that may have several dimensions."""
+    return next((other for other in note.also if _fits(unit, other)), note.si)
 
 
 def _fits(unit: str, si_unit: str) -> bool:
