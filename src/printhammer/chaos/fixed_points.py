@@ -1,0 +1,221 @@
+"""Fixed points of a map with a parameter, one at a time, by Newton's method.
+
+State u and parameter p together are a point z = (u, p). A point is corrected onto the curve of fixed points
+G(u, p) = u in the plane z . row = constant, in scaled variables: u and p each divided by a scale of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable
+
+    import numpy.typing as npt
+
+    from printhammer.segments import FloatArray
+
+_MOST_CORRECTIONS: Final = 12
+_STAGNANT: Final = 1e3
+"""Corrections that no longer shrink are noise of the map if they are below this many precisions."""
+
+
+@dataclass(frozen=True)
+class MapValue:
+    """A map with a parameter, evaluated at one point.
+
+    Attributes
+    ----------
+    image : array, shape (n,)
+        G(u, p).
+    jacobian : array, shape (n, n)
+        dG/du.
+    slope : array, shape (n,)
+        dG/dp.
+    label : hashable
+        What kind of motion led there, such as its sequence of contacts; where it changes along a curve, that
+        is an event.
+    trouble : str
+        Why the map has no value there; empty where it has one.
+    extra : object
+        Whatever else the map wants to keep of this evaluation.
+    """
+
+    image: FloatArray
+    jacobian: FloatArray
+    slope: FloatArray
+    label: Hashable = ()
+    trouble: str = ""
+    extra: Any = field(default=None, repr=False)
+
+    @classmethod
+    def none(cls, count: int, trouble: str) -> MapValue:
+        """Return what stands for a value that does not exist."""
+        nan = math.nan
+        return cls(np.full(count, nan), np.full((count, count), nan), np.full(count, nan), (), trouble)
+
+
+MapFamily = Callable[["FloatArray", float], MapValue]
+"""A map with a parameter: state, shape (n,), and parameter in, `MapValue` out."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A fixed point on a curve.
+
+    Attributes
+    ----------
+    state : array, shape (n,)
+        u.
+    parameter : float
+        p.
+    tangent : array, shape (n + 1,)
+        Direction of the curve in scaled variables, of length 1.
+    arc : float
+        Length of the curve from its start in scaled variables, negative before it.
+    value : MapValue
+        The map there.
+    residual : float
+        Largest scaled component of G(u, p) - u.
+    """
+
+    state: FloatArray
+    parameter: float
+    tangent: FloatArray
+    arc: float
+    value: MapValue
+    residual: float
+
+    @property
+    def multipliers(self) -> npt.NDArray[np.complex128]:
+        """Eigenvalues of dG/du, largest absolute value first."""
+        found = np.linalg.eigvals(self.value.jacobian).astype(np.complex128)
+        return found[np.argsort(-np.abs(found), kind="stable")]
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool(np.abs(self.multipliers).max() < 1.0)
+
+
+class Follower:
+    """Corrects points onto the curves of one map family.
+
+    Parameters
+    ----------
+    family : callable
+        The map.
+    scales : array, shape (n + 1,)
+        By which the components of the state, and last the parameter, are divided.
+    precision : float
+        Scaled correction below which a point is on a curve.
+    """
+
+    def __init__(self, family: MapFamily, scales: npt.ArrayLike, precision: float) -> None:
+        self.family = family
+        self.scales = np.asarray(scales, dtype=np.float64)
+        self.count = len(self.scales) - 1
+        self.precision = precision
+        self.trouble = ""
+        if not (np.isfinite(self.scales).all() and (self.scales > 0.0).all()):
+            raise InputError(f"scales = {self.scales.tolist()}, expected positive numbers")
+
+    def scaled(self, state: npt.ArrayLike, parameter: float) -> FloatArray:
+        """Return a point in scaled variables."""
+        return np.append(np.asarray(state, dtype=np.float64), parameter) / self.scales
+
+    def derivative(self, value: MapValue) -> FloatArray:
+        """Return the scaled derivative of G(u, p) - u, shape (n, n + 1)."""
+        rows = np.column_stack([value.jacobian - np.eye(self.count), value.slope])
+        return np.asarray(rows * self.scales / self.scales[: self.count, np.newaxis])
+
+    def correct(self, z: FloatArray, row: FloatArray, *, arc: float = 0.0) -> Node | None:
+        """Return the fixed point near z whose scaled product with `row` is that of z; None if not found.
+
+        The tangent of the node points along `row`.
+        """
+        level, z = float(row @ z), z.copy()
+        last = math.inf
+        self.trouble = ""
+        for _ in range(_MOST_CORRECTIONS):
+            state, parameter = z[:-1] * self.scales[:-1], float(z[-1] * self.scales[-1])
+            value = self.family(state, parameter)
+            if value.trouble:
+                self.trouble = value.trouble
+                return None
+            residual = (value.image - state) / self.scales[:-1]
+            matrix = np.vstack([self.derivative(value), row])
+            try:
+                change = -np.linalg.solve(matrix, np.append(residual, row @ z - level))
+            except np.linalg.LinAlgError:
+                return None
+            size = float(np.abs(change).max())
+            settled = size <= self.precision or (size >= 0.5 * last and size <= _STAGNANT * self.precision)
+            if settled:
+                tangent = self._tangent(matrix)
+                if tangent is None:
+                    return None
+                return Node(state, parameter, tangent, arc, value, float(np.abs(residual).max()))
+            if not size < 1e3:
+                return None
+            z, last = z + change, size
+        return None
+
+    def onto(self, z: FloatArray) -> Node | None:
+        """Return the fixed point near z that Newton's method with least corrections finds; None if none."""
+        row = np.zeros(self.count + 1)
+        row[-1] = 1.0
+        found = self.correct(z, row)
+        if found is not None:
+            return found
+        # At a fold the parameter cannot be held; the smallest correction can be taken instead.
+        for _ in range(_MOST_CORRECTIONS):
+            value = self.family(z[:-1] * self.scales[:-1], float(z[-1] * self.scales[-1]))
+            if value.trouble:
+                self.trouble = value.trouble
+                return None
+            matrix = self.derivative(value)
+            _, singular, rows = np.linalg.svd(matrix)
+            if singular[-1] > 0.0:
+                found = self.correct(z, rows[-1])
+                if found is not None:
+                    return found
+            residual = (value.image - z[:-1] * self.scales[:-1]) / self.scales[:-1]
+            z = z - np.linalg.pinv(matrix) @ residual
+        return None
+
+    def _tangent(self, matrix: FloatArray) -> FloatArray | None:
+        unit = np.zeros(self.count + 1)
+        unit[-1] = 1.0
+        try:
+            tangent = np.linalg.solve(matrix, unit)
+        except np.linalg.LinAlgError:
+            return None
+        length = float(np.linalg.norm(tangent))
+        return np.asarray(tangent / length) if math.isfinite(length) and length > 0.0 else None
+
+
+def between(follower: Follower, here: Node, ahead: Node, share: float) -> Node | None:
+    """Return the point of a curve at a share, 0 to 1, of the way between two nodes; None if not found.
+
+    The way is measured along the tangent of the first; the guess is the cubic through both.
+    """
+    one, other = (follower.scaled(node.state, node.parameter) for node in (here, ahead))
+    chord = float(np.linalg.norm(other - one))
+    h = share
+    z = (
+        (1.0 + 2.0 * h) * (1.0 - h) ** 2 * one
+        + h * (1.0 - h) ** 2 * chord * here.tangent
+        + h * h * (3.0 - 2.0 * h) * other
+        - h * h * (1.0 - h) * chord * ahead.tangent
+    )
+    level = float(here.tangent @ one) + share * float(here.tangent @ (other - one))
+    z = z + (level - float(here.tangent @ z)) * here.tangent
+    return follower.correct(z, here.tangent, arc=here.arc + share * (ahead.arc - here.arc))
