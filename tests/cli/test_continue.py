@@ -35,6 +35,7 @@ def test_a_branch(cli: Callable, tmp_path: Path) -> None:
     assert b"<svg" in paths["svg"].read_bytes()
 
 
+@pytest.mark.slow
 def test_a_chart(cli: Callable, tmp_path: Path) -> None:
     own = ph.load("hendriks-1983").constants["backstop.damping"].si
     picture, data = tmp_path / "chart.png", tmp_path / "chart.nc"

@@ -109,7 +109,7 @@ def test_logistic_map_of_period_three_begins_at_a_fold() -> None:
     assert len(found["period doubling"]) == 1
 
 
-@settings(max_examples=15)
+@settings(max_examples=6, deadline=None)
 @given(b=st.floats(min_value=0.05, max_value=0.9))
 def test_henon_map(b: float) -> None:
     family = henon(b)

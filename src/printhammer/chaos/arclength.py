@@ -61,8 +61,8 @@ class Stop:
     Attributes
     ----------
     reason : str
-        "bound", "closed", "grazing", "no value", "lost", "length", "branch point" or what the caller's watch
-        said.
+        "bound"; "closed"; "no value": the map has none beyond; "lost": Newton's method does not converge
+        beyond; "length": the number of steps is used up; "not asked"; or what the caller's watch says.
     parameter : float
         Where.
     state : array

@@ -69,7 +69,10 @@ class Branch:
     events : tuple of BranchEvent
         Folds, period doublings, Neimark-Sacker points, branchings and grazings, in order along the curve.
     stops : tuple of Stop
-        Why and where the branch ends before its first and after its last orbit.
+        Why and where the branch ends before its first and after its last orbit. Reasons: "bound"; "closed";
+        "period doubling": the orbit is born there; "grazing" of a rigid backstop; "merged" with an orbit of
+        fewer firings; "no value": a run does not come through; "lost": Newton's method does not converge;
+        "length": the steps are used up.
     curve : Curve
         The same in the variables of `printhammer.chaos.arclength`.
     """
