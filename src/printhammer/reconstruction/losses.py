@@ -40,7 +40,7 @@ _COARSE: Final = 4e-6
 _RISE: Final = 0.1
 """Rank correlation of restitution with the order of the touches that is aimed at."""
 
-_STABLE: Final = 2.6
+_STABLE: Final = 2.3
 """Longest stable step of Runge-Kutta over the time scale of an oscillation, with some reserve."""
 
 _STEP: Final = 10e-6

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from printhammer.reconstruction.candidates import Candidate
     from printhammer.segments import FloatArray
 
-FIRINGS: Final = 120
+FIRINGS: Final = 360
 """Firings of each panel in the search; the claims themselves are about more."""
 
 _AGREE: Final = 1e-8
