@@ -236,7 +236,7 @@ def test_two_pulses(hammer: "ph.Hammer") -> None:
 
 
 def test_it_rests_after_infinitely_many_bounces_in_a_finite_time(hammer: "ph.Hammer") -> None:
-    # Near the backstop the pull is a = P / m, and bounces end 2 e v / (a (1 - e)) after a touch at speed v, but
+    # Near the backstop the pull is a = P / m; bounces end 2 e v / (a (1 - e)) after a touch at speed v, but
     # for the change of the pull over a bounce, a part K v^2 m / P^2 of it.
     exact = plain(hammer)
     exact.pieces([0.0], 4e-3, slowest=SLOW)
