@@ -24,6 +24,7 @@ ORDER = (
     "single_shot_fit",
     "bouncing_ball",
     "impact_oscillator",
+    "tung_shaw",
     "own_part",
 )
 """The examples in the order in which one would teach them."""
