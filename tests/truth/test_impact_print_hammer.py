@@ -90,13 +90,18 @@ class Hammer:
         """Time after a firing at which the force overcomes the hold."""
         return math.asin(-self.preload / self.amplitude) * self.width / math.pi
 
-    def pieces(self, fired: list[float], end: float, slowest: float) -> list[Piece]:
+    def pieces(
+        self, fired: list[float], end: float, slowest: float, begin: State | None = None
+    ) -> list[Piece]:
         """Motion from rest at the backstop until the end or an impact there slower than `slowest`.
 
-        Pulses do not overlap, and the armature never rests at the backstop between.
+        Or from a state in flight at the first firing. Pulses do not overlap, and the armature never rests at
+        the backstop between.
         """
         found: list[Piece] = []
         time, state, paper, spent = fired[0] + self.take_off(), (0.0, 0.0), False, False
+        if begin is not None:
+            time, state = fired[0], begin
         while time < end:
             pulse = next((t for t in fired if t <= time < t + self.width), None)
             limits = [t for t in (*fired, *(t + self.width for t in fired), end) if t > time]
@@ -233,6 +238,43 @@ def test_two_pulses(hammer: "ph.Hammer") -> None:
     # The second pulse meets the armature between two of its bounces.
     exact = compared(hammer, [0.0, 1.2e-3], 2.4e-3, slowest=SLOW)
     assert [surface for surface, _, _ in exact.touches].count("pack") == 2
+
+
+def closed_orbit(exact: Hammer, period: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """State at the firings of the orbit near a state, and its multipliers, by Newton's method."""
+
+    def image(start: np.ndarray) -> np.ndarray:
+        last = exact.pieces([0.0], period, 0.0, (start[0], start[1]))[-1]
+        assert last.end == period
+        return np.array(last.at(period))
+
+    scale = np.array([exact.front, 1.0])
+    for _ in range(8):
+        columns = [
+            (image(state + step) - image(state - step)) / (2.0 * step.max()) for step in np.diag(1e-6 * scale)
+        ]
+        slope = np.array(columns).T
+        change = np.linalg.solve(slope - np.eye(2), state - image(state))
+        if np.abs(change / scale).max() < 1e-12:
+            break
+        state = state + change
+    return state, np.linalg.eigvals(slope)
+
+
+def test_an_orbit_doubles_its_period_where_the_closed_form_does(hammer: "ph.Hammer") -> None:
+    branch = ph.continuation(hammer, "period", ("1.450 ms", "1.457 ms"), period="1.452 ms")
+    (event,) = branch.events
+    assert event.kind == "period doubling"
+    exact = plain(hammer)
+    scale = np.array([exact.front, 1.0])
+    state, multipliers = closed_orbit(exact, event.value, event.state)
+    np.testing.assert_allclose(event.state / scale, state / scale, atol=SHARP)
+    np.testing.assert_allclose(sorted(event.multipliers.real), sorted(multipliers), atol=1e-6)
+    # The multiplier passes -1 within a part 1e-6 of the period to either side.
+    before, after = (
+        closed_orbit(exact, (1.0 + part) * event.value, event.state)[1].min() for part in (-1e-6, 1e-6)
+    )
+    assert after < -1.0 < before
 
 
 def test_it_rests_after_infinitely_many_bounces_in_a_finite_time(hammer: "ph.Hammer") -> None:
