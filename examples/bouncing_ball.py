@@ -86,4 +86,61 @@ ledger = motion.energy
 print(f"work of the blow    {1e3 * ledger.drive_work:.9f} mJ")
 print(f"loss in the bounces {1e3 * ledger.backstop_loss:.9f} mJ")
 
+# %%
+# On a table that vibrates the ball can bounce for ever. In the frame of the table it
+# feels the force m A w^2 sin(w t) beside its weight. Orbits with one impact a period
+# meet the table each time at the phase p with Gamma cos p = pi (1 - e) / (1 + e), where
+# Gamma = A w^2 / g, so there are two, or none below a fold. One is stable until a
+# multiplier gets to -1, where Gamma sin p = 2 (1 + e^2) / (1 + e)^2.
+
+table = ph.load("bouncing-ball")
+weight, restitution = -table.spring.preload, table.backstop.restitution
+frequency, omega = 50.0, 2.0 * np.pi * 50.0
+fold = np.pi * (1.0 - restitution) / (1.0 + restitution)
+doubling = np.hypot(fold, 2.0 * (1.0 + restitution**2) / (1.0 + restitution) ** 2)
+
+
+def half_way(gamma, sign):
+    """Height and velocity above the table half a period after the phase 0 of it."""
+    p = sign * np.arccos(fold / gamma)
+    height, leaves = gamma * gravity / omega**2, 0.5 * gravity / frequency
+    t = (np.pi - p) / omega
+    x = height * np.sin(p) + leaves * t - 0.5 * gravity * t**2
+    return x, leaves - gravity * t + height * omega
+
+
+branch = ph.continuation(
+    table,
+    "drive.amplitude",
+    (0.3 * weight, 1.3 * weight),
+    drive=ph.SineForce(0.8 * weight, frequency),
+    state=half_way(0.8, 1.0),
+    phase=0.5,
+)
+for event in branch.events:
+    exact = fold if event.kind == "fold" else doubling
+    print(f"{event.kind}: Gamma = {event.value / weight:.12f}, formula {exact:.12f}")
+
+# %%
+# The program follows the branch around the fold and finds both points; the formula is
+# drawn over it.
+
+figure, axes = plt.subplots()
+gamma, height = branch.values / weight, 1e3 * branch.x[:, 0]
+axes.plot(gamma, np.where(branch.stable, height, np.nan), label="stable")
+axes.plot(gamma, np.where(branch.stable, np.nan, height), label="unstable")
+few = np.linspace(fold, gamma.max(), 25)
+for sign in (1.0, -1.0):
+    label = "formula" if sign > 0.0 else None
+    some = [1e3 * half_way(value, sign)[0] for value in few]
+    axes.plot(few, some, "o", color="0.3", markersize=3, label=label)
+for event in branch.events:
+    axes.axvline(event.value / weight, color="0.7", linewidth=0.8, zorder=0)
+axes.set(
+    xlabel="acceleration of the table over that of gravity",
+    ylabel="height at half a period (mm)",
+    title="Bouncing once a period",
+)
+axes.legend()
+
 plt.show()
