@@ -1,9 +1,11 @@
-"""Candidates that tests share: some at random, some about the shipped hammer, which does well."""
+"""Candidates that tests share: some at random, some about a hammer that does well."""
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.reconstruction.candidates import Candidate, candidates
@@ -12,9 +14,9 @@ from printhammer.reconstruction.space import VARIABLES, constants_at, point_of, 
 Points = list[Any]
 
 
-def shipped_values() -> dict[str, float]:
-    """The shipped hammer as values of the variables."""
-    return values_of({key: constant.si for key, constant in ph.load("hendriks-1983").constants.items()})
+def values_in(hammer: str | Path) -> dict[str, float]:
+    """A hammer file as values of the variables."""
+    return values_of({key: constant.si for key, constant in ph.load(hammer).constants.items()})
 
 
 def random_points(count: int, seed: int) -> Points:
@@ -23,9 +25,9 @@ def random_points(count: int, seed: int) -> Points:
 
 
 def near_points(count: int, seed: int, apart: float = 0.05) -> Points:
-    """Points about the shipped hammer, in shares of the ranges."""
+    """Points about the hammer that does well, in shares of the ranges."""
     rng = np.random.default_rng(seed)
-    middle = point_of(shipped_values())
+    middle = point_of(values_in(CRUDE))
     return [np.clip(middle + rng.uniform(-apart, apart, len(middle)), 0.0, 1.0) for _ in range(count)]
 
 
@@ -33,12 +35,12 @@ def near_points(count: int, seed: int, apart: float = 0.05) -> Points:
 def some_candidates(
     count: int = 12, near: int = 6, seed: int = 11, apart: float = 0.05
 ) -> tuple[Candidate, ...]:
-    """Candidates of random points and of points about the shipped hammer."""
+    """Candidates of random points and of points about the hammer that does well."""
     found = candidates(random_points(count, seed) + near_points(near, seed, apart))
     return tuple(candidate for candidate in found if candidate is not None)
 
 
-def shipped_constants() -> dict[str, float]:
-    """The constants of the shipped hammer that the search sets, SI."""
-    known = ph.load("hendriks-1983").constants
-    return {key: known[key].si for key in constants_at(shipped_values(), 1.0, 1.0)}
+def constants_in(hammer: str | Path) -> dict[str, float]:
+    """The constants of a hammer file that the search sets, SI."""
+    known = ph.load(hammer).constants
+    return {key: known[key].si for key in constants_at(values_in(hammer), 1.0, 1.0)}

@@ -4,6 +4,7 @@ import os
 
 import pytest
 from hypothesis import settings
+from tests.hammers import CRUDE
 
 import printhammer as ph
 
@@ -17,5 +18,5 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 @pytest.fixture(scope="session")
 def hammer() -> "ph.Hammer":
-    """The shipped hammer; frozen, so that all tests can share it."""
-    return ph.load("hendriks-1983")
+    """A hammer that stays as it is; frozen, so that all tests can share it."""
+    return ph.load(CRUDE)

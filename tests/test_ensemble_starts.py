@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.hammers import CRUDE
 
 import printhammer as ph
 
@@ -11,7 +12,7 @@ STARTS = np.array([120e-6, 200e-6, 490e-6, 640e-6])
 @pytest.mark.parametrize("engine", ["plain", "lanes"])
 def test_a_run_can_be_taken_up_where_another_one_passed(engine: str) -> None:
     """Also while a pulse is under way, in free flight and at the backstop's edge."""
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load(CRUDE)
     drive = ph.PulseTrain(hammer.waveform)
     whole = ph.simulate(hammer, drive, duration=1.2e-3)
     times = [np.linspace(start, start + 300e-6, 61) for start in STARTS]
@@ -26,7 +27,7 @@ def test_a_run_can_be_taken_up_where_another_one_passed(engine: str) -> None:
 
 def test_starts_are_checked() -> None:
     """One sentence for what cannot be a start."""
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load(CRUDE)
     drive = ph.PulseTrain(hammer.waveform)
     for starts in (-1e-6, 2e-3, np.nan):
         with pytest.raises(ph.InputError, match=r"starts = .*expected a number from 0 to before the end"):

@@ -3,6 +3,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from tests.hammers import CRUDE
 
 import printhammer
 from printhammer.equilibrium import (
@@ -259,7 +260,7 @@ def test_the_picture_holds_it_all() -> None:
 
 
 def test_the_shipped_hammer_is_held_and_released() -> None:
-    hammer = printhammer.load("hendriks-1983")
+    hammer = printhammer.load(CRUDE)
     picture = equilibrium_picture(hammer)
     assert picture.rest == printhammer.rest_state(hammer)
     assert (

@@ -222,7 +222,7 @@ def test_replace_the_waveform_and_take_parts_away(hammer: ph.Hammer) -> None:
 def test_replace_refuses_in_one_sentence(hammer: ph.Hammer, key: str, value: object, sentence: str) -> None:
     with pytest.raises(ph.InputError) as caught:
         hammer.replace(key, value)
-    assert str(caught.value).startswith("hendriks-1983.toml: ")
+    assert "hendriks-1983.toml: " in str(caught.value)
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
 

@@ -81,7 +81,9 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
     from printhammer.units import split
 
     if isinstance(value, Mapping):
-        return {"status": status, "source": source, **value}
+        whole = {"status": status, "source": source, **value}
+        # Value and unit first, as files are written.
+        return dict(sorted(whole.items(), key=lambda item: item[0] in ("status", "source")))
     if isinstance(value, Constant):
         return {"value": value.value, "unit": value.unit, "status": value.status, "source": value.source}
     if isinstance(value, str):

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.chaos import Bifurcation, bifurcation_carry, strobes
@@ -38,7 +39,7 @@ def diagram(
     shape = cycles.shape
     strange = cycles < 0
     points = np.zeros((*shape, 16)) if states is None else states
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load(CRUDE)
     return Bifurcation(
         regime=Regime.of(hammer, period=1e-3),
         parameter="period",

@@ -5,6 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.chaos import Orbits, Regime, orbit
@@ -17,13 +18,13 @@ SMALL = {"longest": 2, "starts": 100, "guesses": 8}
 
 @pytest.fixture(scope="module")
 def found() -> Orbits:
-    return ph.orbits(ph.load("hendriks-1983"), period=PERIOD, **SMALL)
+    return ph.orbits(ph.load(CRUDE), period=PERIOD, **SMALL)
 
 
 @pytest.fixture(scope="module")
 def fast() -> Orbits:
     """A strange train, whose pulses overlap and whose firings fall into the pack."""
-    return ph.orbits(ph.load("hendriks-1983"), period=0.6e-3, **SMALL)
+    return ph.orbits(ph.load(CRUDE), period=0.6e-3, **SMALL)
 
 
 def test_the_train_from_rest_ends_on_a_stable_orbit(found: Orbits, hammer: ph.Hammer) -> None:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.chaos import Regime
@@ -37,7 +38,7 @@ def test_it_is_the_map_of_strobe_points(hammer: ph.Hammer, period: float) -> Non
 )
 @settings(max_examples=15)
 def test_two_firings_are_one_and_another(x: float, v: float, period: float, phase: float) -> None:
-    regime = Regime.of(ph.load("hendriks-1983"), period=period)
+    regime = Regime.of(ph.load(CRUDE), period=period)
     scales = regime.window.half_widths
     once = strobe_map(regime, (x, v), phase=phase)
     twice = strobe_map(regime, (x, v), firings=2, phase=phase)

@@ -3,6 +3,7 @@ from typing import NamedTuple
 
 import pytest
 
+import printhammer as ph
 from printhammer.cli.main import main
 
 
@@ -25,3 +26,9 @@ def cli(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
         return Outcome(int(end.value.code or 0), out, "\n".join(told))
 
     return call
+
+
+@pytest.fixture(scope="session")
+def hammer() -> ph.Hammer:
+    """The shipped hammer, which the tests here call by its name."""
+    return ph.load("hendriks-1983")

@@ -4,12 +4,11 @@ import subprocess
 import sysconfig
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
+from tests.hammers import CRUDE
 
-if TYPE_CHECKING:
-    import printhammer as ph
+import printhammer as ph
 
 SCRIPT = Path(sysconfig.get_path("scripts")) / "printhammer"
 SAMPLED = '[waveform]\nshape = "sampled"\nfile = "pulse.csv"\n'
@@ -71,11 +70,11 @@ BAD_HAMMERS = {
 
 
 @pytest.fixture
-def bad_file(request: pytest.FixtureRequest, hammer: "ph.Hammer", tmp_path: Path) -> Path:
+def bad_file(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     edit, samples, _ = BAD_HAMMERS[request.param]
     (tmp_path / "pulse.csv").write_text(samples, "utf-8")
     path = tmp_path / "bad.toml"
-    path.write_bytes(edit(hammer.to_toml()).encode("utf-8", "surrogateescape"))
+    path.write_bytes(edit(CRUDE.read_text("utf-8")).encode("utf-8", "surrogateescape"))
     return path
 
 
@@ -200,9 +199,9 @@ def test_a_folder_that_cannot_be_written_to(cli, verb: list[str], tmp_path: Path
     assert (tmp_path / "file").read_text() == "kept"
 
 
-def test_force_toward_the_paper_is_a_warning(cli, hammer: "ph.Hammer", tmp_path: Path) -> None:
+def test_force_toward_the_paper_is_a_warning(cli, tmp_path: Path) -> None:
     path = tmp_path / "weak.toml"
-    hammer.replace("magnet.Am", 0.41).save(path)
+    ph.load(CRUDE).replace("magnet.Am", 0.41).save(path)
     for arguments in (["hammer", "check"], ["hammer", "show"], ["run"]):
         outcome = cli(*arguments, path)
         assert outcome.status == 0

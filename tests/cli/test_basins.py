@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.cli.basins import EXAMPLE
@@ -17,12 +18,12 @@ PLANE = ("--x", "30 um, 260 um, 5", "--v", "-1 m/s, 1 m/s, 4")
 def test_attractors_entropy_and_files(cli: Callable, tmp_path: Path) -> None:
     paths = {kind: tmp_path / f"cells.{kind}" for kind in ("csv", "nc", "png", "svg")}
     out = [word for path in paths.values() for word in ("--out", path)]
-    done = cli("basins", "hendriks-1983", "--period", "1.3 ms", *PLANE, "--box", "2", *out)
+    done = cli("basins", CRUDE, "--period", "1.3 ms", *PLANE, "--box", "2", *out)
     assert done.status == 0
     assert "attractor 2" in done.out
     assert "0 of 20 cells" in done.out
     assert "boxes of 2 x 2 cells" in done.out
-    found = ph.basins(ph.load("hendriks-1983"), period=1.3e-3, x=(30e-6, 260e-6, 5), v=(-1.0, 1.0, 4))
+    found = ph.basins(ph.load(CRUDE), period=1.3e-3, x=(30e-6, 260e-6, 5), v=(-1.0, 1.0, 4))
     with xr.open_dataset(paths["nc"], engine="scipy") as chart:
         np.testing.assert_array_equal(chart["label"], found.labels)
     assert len(pd.read_csv(paths["csv"])) == 20

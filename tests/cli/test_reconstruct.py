@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.candidates import shipped_constants
+from tests.candidates import constants_in
+from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.claims import claims, judge_all
@@ -163,7 +164,7 @@ def test_base_rates_are_counted(cli: Callable, here: Path, cheap: None) -> None:
 
 def test_the_best_ships(cli: Callable, here: Path, cheap: None) -> None:
     del cheap
-    best, other = shipped_constants(), shipped_constants()
+    best, other = constants_in(CRUDE), constants_in(CRUDE)
     other["mass"] *= 1.1
     judged_rows(
         here / "judged.jsonl",
@@ -193,7 +194,7 @@ def files(here: Path) -> Path:
     row = {"point": [0.5], "total": 1.0, "constants": None}
     judged_rows(here / "search.jsonl", {**HEADING, "aim": "all"}, row)
     judged_rows(here / "stated.jsonl", HEADING, row)
-    judged_rows(here / "judged.jsonl", held(shipped_constants(), [*STATED]))
+    judged_rows(here / "judged.jsonl", held(constants_in(CRUDE), [*STATED]))
     (here / "notes.txt").write_text("one\ntwo\n")
     return here
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.candidates import shipped_constants
+from tests.candidates import constants_in
+from tests.hammers import CRUDE
 
 from printhammer.chaos import strobe
 from printhammer.claims import Context, claims, judge
@@ -43,7 +44,7 @@ def test_claims_of_the_lists_are_those_of_the_paper() -> None:
 
 
 def test_a_row_has_the_verdicts_and_values_of_the_claims() -> None:
-    constants = shipped_constants()
+    constants = constants_in(CRUDE)
     row = row_of(constants, QUICK, panels=False)
     context = Context(hammer_of(constants))
     for name in QUICK:
@@ -60,7 +61,7 @@ def test_a_row_has_the_verdicts_and_values_of_the_claims() -> None:
 
 def test_a_claim_that_cannot_be_measured_fails_without_values() -> None:
     # So strong a magnet that no current releases the armature.
-    constants = shipped_constants()
+    constants = constants_in(CRUDE)
     constants["magnet.Am"] *= 3.0
     row = row_of(constants, ["settle_out", "print_force"], panels=False)
     assert row["verdicts"] == {"settle_out": False, "print_force": False}
@@ -84,7 +85,7 @@ def test_figure_11_is_judged_with_all_its_changes_only_where_it_may_hold(
 
     monkeypatch.setattr(module, "plain_panels", lambda _hammer: found)
     monkeypatch.setattr(module, "judge", judged)
-    row = row_of(shipped_constants(), [FIGURE_11])
+    row = row_of(constants_in(CRUDE), [FIGURE_11])
     assert row["panels"] == 12 - wrong
     assert row["panel_verdicts"]["1"] == "strange"
     assert row["verdicts"] == {FIGURE_11: robust and not wrong}
@@ -95,7 +96,7 @@ def test_figure_11_is_judged_with_all_its_changes_only_where_it_may_hold(
 def test_panels_are_those_of_the_strobe(monkeypatch: pytest.MonkeyPatch) -> None:
     period = 1.30e-3
     monkeypatch.setattr(module, "printed_verdicts", lambda: {period: "period-1"})
-    hammer = hammer_of(shipped_constants())
+    hammer = hammer_of(constants_in(CRUDE))
     ((name, (found, printed)),) = plain_panels(hammer).items()
     verdict = strobe(hammer, period=period, points=1).verdict
     assert name == "1.30 ms"
@@ -203,7 +204,7 @@ def test_files_that_cannot_be_read_or_written_are_told(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_panels_of_the_shipped_hammer_are_those_of_the_claim() -> None:
-    hammer = hammer_of(shipped_constants())
+    hammer = hammer_of(constants_in(CRUDE))
     found = plain_panels(hammer)
     value = judge(Context(hammer), claims()[FIGURE_11]).value
     assert value is not None

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.candidates import shipped_constants
+from tests.candidates import constants_in
+from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.claims import Result, claims
@@ -48,20 +49,21 @@ def some_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "judge_all", judge_all)
 
 
-def test_stated_claims_come_first_then_panels_then_others() -> None:
-    lost = row(1.0, panels=12, settle_out=True, release_margin=True, **{STATED[1]: False})
+def test_most_claims_ship_and_panels_decide_among_equals() -> None:
+    lost = row(1.0, panels=9, settle_out=True, **{STATED[1]: False})
     few = row(2.0, panels=8, settle_out=True)
-    many = row(3.0, panels=9)
+    many = row(3.0, panels=9, settle_out=False)
     more = row(4.0, panels=9, settle_out=True)
     assert best_of([lost, few, many, more]) is more
-    assert best_of([lost, few, many]) is many
-    assert best_of([lost, few]) is few
+    assert best_of([lost, few, many]) is few
+    # As many claims and panels: one of them is a stated one.
+    assert best_of([lost, many]) is many
     # Equal ones: the first.
     assert best_of([many, dict(many)]) is many
 
 
 def test_the_hammer_file_comes_back_the_same(tmp_path: Path) -> None:
-    constants = rounded(shipped_constants())
+    constants = rounded(constants_in(CRUDE))
     hammer = shipped_hammer(constants, "found")
     hammer.save(tmp_path / "found.toml")
     back = ph.load(tmp_path / "found.toml")
@@ -81,7 +83,7 @@ def test_the_hammer_file_comes_back_the_same(tmp_path: Path) -> None:
 
 def test_what_the_report_tells_can_be_read(some_fail: None, tmp_path: Path) -> None:
     del some_fail
-    hammer = shipped_hammer(shipped_constants(), "found")
+    hammer = shipped_hammer(constants_in(CRUDE), "found")
     best = row(2.0, panels=6, settle_out=True, weak_prints_when_hung_up=False)
     worse = row(3.0, panels=6, settle_out=True, **{STATED[1]: False})
     panels = row(4.0, panels=11, **dict.fromkeys(STATED, False))

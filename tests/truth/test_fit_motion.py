@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy import stats
+from tests.hammers import CRUDE
 from tests.identify import shots
 
 import printhammer as ph
@@ -14,7 +15,7 @@ from printhammer.identify.motion import fit_motion
 from printhammer.identify.residuals import memory_factor, noise_of_record
 from printhammer.segments import evaluate
 
-HAMMER = ph.load("hendriks-1983")
+HAMMER = ph.load(CRUDE)
 STATIC = {
     "magnet.F0": 3e-3,
     "magnet.Am": 1e-3,

@@ -6,6 +6,7 @@ or are cut off by it, have no need of that.
 
 import numpy as np
 import pytest
+from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.chaos import Orbit, Orbits
@@ -15,7 +16,7 @@ TIGHT = 1e-14
 
 
 def found_at(period: float, overlap: str, longest: int, starts: int) -> Orbits:
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load(CRUDE)
     found = ph.orbits(hammer, period=period, overlap=overlap, longest=longest, starts=starts, guesses=12)
     assert found.regime.memory == 1 or period > hammer.waveform.support
     return found

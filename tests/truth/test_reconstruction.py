@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from tests.candidates import shipped_values, some_candidates
+from tests.candidates import some_candidates, values_in
+from tests.hammers import CRUDE
 
 from printhammer.reconstruction import losses
 from printhammer.reconstruction.candidates import Candidate, candidates
@@ -136,7 +137,7 @@ def test_the_panels_do_not_know_the_scale_of_force() -> None:
 
 def test_what_scales_is_taken_out_of_the_space() -> None:
     # The hammer of any scale comes back as the same candidate, at the common scale.
-    (first,) = candidates([point_of(shipped_values())])
+    (first,) = candidates([point_of(values_in(CRUDE))])
     assert first is not None
     assert first.constants["pack.stiffness"] / POUND == pytest.approx(
         5.0 / ((0.5 * (283.2e-6 + 285.8e-6) - XP) / D) ** 2.7, rel=1e-12

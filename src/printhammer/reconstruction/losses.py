@@ -279,10 +279,11 @@ def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArr
     ratio = 0.0 if math.isnan(force) else float(force / score.measured["force"])
     gain = -math.inf if math.isnan(flight[1]) else float(flight[0] - flight[1])
     wanted = band["flight_time_gain_s"]["at_least"]
-    score.losses["two_pulses_700us"] = (
+    score.losses["two_pulses_700us"] = min(
+        1.0,
         0.5 * hinge(max(low - ratio, ratio - high), 0.3)
         + 0.4 * hinge(late, _LATE)
-        + 0.3 * hinge(wanted - gain, _SHORTER)
+        + 0.3 * hinge(wanted - gain, _SHORTER),
     )
     # With a reserve, since what is lost between the times looked at counts as well.
     score.losses["second_dot_lost"] = hinge(_CLEAR - float(miss.min()), _CLEAR + 0.5)
