@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-import printhammer as ph
-
 SPEC = """
 format = 1
 hammer = "hendriks-1983"
@@ -58,9 +56,3 @@ def content(store: Path) -> dict[str, bytes]:
 @pytest.fixture
 def bytes_of() -> Callable[[Path], dict[str, bytes]]:
     return content
-
-
-@pytest.fixture(scope="session")
-def hammer() -> ph.Hammer:
-    """The shipped hammer, which the tests here call by its name."""
-    return ph.load("hendriks-1983")

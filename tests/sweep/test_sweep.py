@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.store import Store, open_store
@@ -34,7 +35,7 @@ ALL = {
 
 
 def run(tmp_path: Path, **spec: Any) -> xr.Dataset:
-    whole = {"format": 1, "hammer": "hendriks-1983", "outputs": ALL, "tolerance": TIGHT, **spec}
+    whole = {"format": 1, "hammer": str(CRUDE), "outputs": ALL, "tolerance": TIGHT, **spec}
     return ph.sweep(whole, tmp_path / "out.zarr")
 
 
