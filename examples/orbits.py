@@ -13,7 +13,7 @@ import numpy as np
 import printhammer as ph
 
 hammer = ph.load("hendriks-1983")
-found = ph.orbits(hammer, period="1.3 ms", longest=2, starts=200)
+found = ph.orbits(hammer, period="1.05 ms", longest=2, starts=200)
 print(found.message)
 for orbit in found:
     print(orbit.name, orbit.multipliers)
@@ -42,7 +42,7 @@ for orbit in found:
 # for a while, leaves it, and comes near another. Their states lie on the attractor
 # or beside it.
 
-strange = ph.orbits(hammer, period="1.05 ms", longest=6, starts=200, guesses=24)
+strange = ph.orbits(hammer, period="1.10 ms", longest=6, starts=200, guesses=24)
 print(strange.message)
 strange.plot(points=2000)
 
@@ -50,7 +50,7 @@ strange.plot(points=2000)
 # How fast the unstable ones lose their neighbours, per firing, beside the largest
 # exponent of the train, which is an average over what it comes near.
 
-exponent = ph.strobe(hammer, period="1.05 ms", points=1).verdict.exponent
+exponent = ph.strobe(hammer, period="1.10 ms", points=1).verdict.exponent
 rates = [np.log(abs(orbit.multipliers[0])) / orbit.firings for orbit in strange]
 figure, panel = plt.subplots()
 panel.plot([orbit.firings for orbit in strange], rates, "o", markerfacecolor="none")

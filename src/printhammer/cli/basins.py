@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.quench import QuenchMap
 
 EXAMPLE: Final = (
-    "Example: printhammer basins hendriks-1983 --period '1.3 ms' --x '30 um, 260 um, 24'"
+    "Example: printhammer basins hendriks-1983 --period '1.05 ms' --x '30 um, 260 um, 24'"
     " --v '-1 m/s, 1 m/s, 20' --out basins.png"
 )
 
@@ -43,7 +43,7 @@ def _quench(flag: str, metavar: str, text: str) -> Any:
 
 def basins(
     hammer: HammerArgument = HAMMER,
-    period: Annotated[str | None, _train("TIME", "Time between firings, such as '1.3 ms'.")] = None,
+    period: Annotated[str | None, _train("TIME", "Time between firings, such as '1.05 ms'.")] = None,
     rate: Annotated[str | None, _train("RATE", "Firings per second, such as '769 Hz'.")] = None,
     x: Annotated[
         str | None, _train("LOW, HIGH, N", "Displacements, such as '30 um, 260 um, 128' (the strobe window).")
@@ -185,7 +185,7 @@ def _one_kind(quench: bool, of_basins: dict[str, Any], of_quench: dict[str, Any]
         expected = "none beside --quench" if quench else "--quench beside it"
         raise InputError(f"--{odd[0]} is given, expected {expected}")
     if not quench and (of_basins["period"] is None) == (of_basins["rate"] is None):
-        raise InputError("--period and --rate: expected one of them, such as --period '1.3 ms', or --quench")
+        raise InputError("--period and --rate: expected one of them, such as --period '1.05 ms', or --quench")
 
 
 def _computed(name: str, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
-EXAMPLE: Final = "Example: printhammer lyapunov hendriks-1983 --period '1.05 ms, 1.30 ms' --firings 300"
+EXAMPLE: Final = "Example: printhammer lyapunov hendriks-1983 --period '1.10 ms, 1.30 ms' --firings 300"
 
 _PICTURES: Final = (".svg", ".png", ".pdf")
 _FIRINGS, _TRANSIENT = 1000, 1000
@@ -34,7 +34,7 @@ def _train(flag: str, metavar: str, text: str) -> Any:
 def lyapunov(
     hammer: HammerArgument = HAMMER,
     period: Annotated[
-        str | None, _train("--period", "TIMES", "Times between firings, such as '1.05 ms, 1.30 ms'.")
+        str | None, _train("--period", "TIMES", "Times between firings, such as '1.10 ms, 1.30 ms'.")
     ] = None,
     rate: Annotated[str | None, _train("--rate", "RATES", "Firings per second, such as '952 Hz'.")] = None,
     lowest: Annotated[

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbit_search import Orbits
     from printhammer.hammer import Hammer
 
-EXAMPLE: Final = "Example: printhammer orbits hendriks-1983 --period '1.3 ms' --longest 4 --out orbits.csv"
+EXAMPLE: Final = "Example: printhammer orbits hendriks-1983 --period '1.05 ms' --longest 4 --out orbits.csv"
 
 _PICTURES: Final = (".svg", ".png", ".pdf")
 _LONGEST: Final = 8

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from printhammer.chaos import Strobe
 
-EXAMPLE: Final = "Example: printhammer strobe hendriks-1983 --period '1.05 ms' --points 200 --out points.csv"
+EXAMPLE: Final = "Example: printhammer strobe hendriks-1983 --period '1.10 ms' --points 200 --out points.csv"
 
 _PICTURES: Final = (".svg", ".png", ".pdf")
 _POINTS: Final = 200
@@ -30,7 +30,7 @@ def _train(metavar: str, text: str) -> Any:
 
 def strobe(
     hammer: HammerArgument = HAMMER,
-    period: Annotated[str | None, _train("TIME", "Time between firings, such as '1.05 ms'.")] = None,
+    period: Annotated[str | None, _train("TIME", "Time between firings, such as '1.10 ms'.")] = None,
     rate: Annotated[str | None, _train("RATE", "Firings per second, such as '952 Hz'.")] = None,
     overlap: Annotated[
         Overlap, _train("add|replace", "Overlapping pulses add up (default), or the latest replaces.")
@@ -75,7 +75,7 @@ def strobe(
             raise InputError(f"--out {path}: expected a name that ends in one of {known}")
     check_outputs(wanted, [Path(hammer)])
     if (period is None) == (rate is None):
-        raise InputError("--period and --rate: expected one of them, such as --period '1.05 ms'")
+        raise InputError("--period and --rate: expected one of them, such as --period '1.10 ms'")
     loaded = load_checked(hammer)
     if loaded.waveform is None:
         raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
