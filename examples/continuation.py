@@ -90,8 +90,9 @@ axes.set(
 )
 
 # %%
-# The print hammer, around 1.3 ms between firings: its branch of period 1 doubles, and turns back at
-# folds, between which several motions exist at once. `period_1.plot()` draws it too.
+# The print hammer, around 1.3 ms between firings: its branch of period 1 doubles, and
+# turns back at folds, between which several motions exist at once. `period_1.plot()`
+# draws it too.
 
 hammer = ph.load("hendriks-1983")
 period_1 = ph.continuation(hammer, "period", ("1.23 ms", "1.36 ms"), period="1.25 ms")

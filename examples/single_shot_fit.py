@@ -26,7 +26,7 @@ record = ph.measure(
 )
 record.write(folder / "shot.csv")
 
-start = hammer.replace({"mass": "0.5 g", "backstop.damping": 3e8})
+start = hammer.replace({"mass": "1.2 g", "backstop.damping": 3e10})
 found = ph.fit("motion", folder / "shot.csv", hammer=start)
 for key, constant in found.constants.items():
     true = hammer.constants[key].si

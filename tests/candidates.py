@@ -24,10 +24,10 @@ def random_points(count: int, seed: int) -> Points:
     return [rng.random(len(VARIABLES)) for _ in range(count)]
 
 
-def near_points(count: int, seed: int, apart: float = 0.05) -> Points:
-    """Points about the hammer that does well, in shares of the ranges."""
+def near_points(count: int, seed: int, apart: float = 0.05, hammer: str | Path = CRUDE) -> Points:
+    """Points about a hammer that does well, in shares of the ranges."""
     rng = np.random.default_rng(seed)
-    middle = point_of(values_in(CRUDE))
+    middle = point_of(values_in(hammer))
     return [np.clip(middle + rng.uniform(-apart, apart, len(middle)), 0.0, 1.0) for _ in range(count)]
 
 

@@ -152,7 +152,8 @@ def test_the_commands_of_the_readme_work_elsewhere(elsewhere: Path, tmp_path: Pa
     (commands,) = (block for block in blocks if "printhammer map" in block)
     output_of("sh", "-ec", f"PATH={shlex.quote(str(elsewhere))}:$PATH\n{commands}", cwd=tmp_path)
     made = {path.name for path in (tmp_path / "build").iterdir()}
-    assert made == {"map.png", "strobe.png", "sweep.toml", "sweep.zarr", "lab", "bench.json"}
+    pictures = {f"{name}.png" for name in ("map", "strobe", "branch", "bifurcation", "quench")}
+    assert made == pictures | {"sweep.toml", "sweep.zarr", "lab", "bench.json"}
 
 
 def test_the_readme_names_files_and_targets_that_exist() -> None:

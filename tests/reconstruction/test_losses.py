@@ -11,7 +11,7 @@ from tests.candidates import near_points, random_points, some_candidates
 
 from printhammer.claims import Context, claims, judge
 from printhammer.reconstruction import losses
-from printhammer.reconstruction.candidates import Candidate
+from printhammer.reconstruction.candidates import Candidate, candidates
 from printhammer.reconstruction.evaluation import WEIGHTS, evaluate, rows
 from printhammer.reconstruction.losses import Score, hinge
 from printhammer.reconstruction.panel_losses import FIRINGS, panels
@@ -44,6 +44,9 @@ def looked_at(chosen: tuple[Candidate, ...]) -> list[Score]:
 
 def close_call(name: str, value: dict[str, float]) -> bool:
     """Whether a measured value is about at the end of its band."""
+    # Whether the armature then comes back to the backstop is left to the claim.
+    if name == "two_pulses_700us" and not value.get("second_excursion_complete"):
+        return True
     key, margin = NEAR.get(name, ("", 0.0))
     band = claims()[name].band.get(key)
     ends = band if isinstance(band, list) else (band or {}).values()
@@ -97,7 +100,8 @@ def test_no_loss_where_the_claim_holds_and_some_where_it_fails() -> None:
 
 @pytest.mark.slow
 def test_losses_and_verdicts_of_many_candidates() -> None:
-    chosen = some_candidates(200, 48, 5)
+    shipped = candidates(near_points(24, 5, 0.002, "hendriks-1983"))
+    chosen = (*some_candidates(200, 48, 5), *(one for one in shipped if one is not None))
     scores = looked_at(chosen)
     assert check(chosen, QUICK, scores) > 0.8 * len(QUICK) * len(chosen)
     for name in QUICK:
