@@ -44,7 +44,9 @@ def test_parts_and_drives(case: tuple[str, str, str, str, str, float, float], tm
     with interpreted():
         assert before_slow_touches(hammer, drive, end, MOVING) == end
         for constant in parameter_names(hammer, drive):
-            if not (name == "sharp" and constant in ("waveform.rise", "waveform.decay")):
+            # An end at a firing: the state there has a kink in the time of that firing.
+            kink = constant in ("period", "rate") and bool(np.isclose(drive.times, end, rtol=1e-9).any())
+            if not kink and not (name == "sharp" and constant in ("waveform.rise", "waveform.decay")):
                 assert close(hammer, drive, constant, end, MOVING), constant
 
 
