@@ -44,9 +44,6 @@ def looked_at(chosen: tuple[Candidate, ...]) -> list[Score]:
 
 def close_call(name: str, value: dict[str, float]) -> bool:
     """Whether a measured value is about at the end of its band."""
-    # Whether the armature then comes back to the backstop is left to the claim.
-    if name == "two_pulses_700us" and not value.get("second_excursion_complete"):
-        return True
     key, margin = NEAR.get(name, ("", 0.0))
     band = claims()[name].band.get(key)
     ends = band if isinstance(band, list) else (band or {}).values()

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.claims.context import TAIL
 from printhammer.claims.definition import claims
 from printhammer.claims.shapes import rank_correlation
 from printhammer.claims.two_pulses import half_rise
@@ -204,7 +205,10 @@ def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
     for start in range(0, len(chosen), CHUNK):
         some, own = chosen[start : start + CHUNK], scores[start : start + CHUNK]
         drives = [PulseTrain(candidate.waveform, at=[0.0, gap]) for candidate in some for gap in gaps]
-        ends = np.tile(gaps + _TAIL, len(some))
+        tails = np.full(len(gaps), _TAIL)
+        # The second excursion of the caught one is to be complete.
+        tails[caught] = TAIL
+        ends = np.tile(gaps + tails, len(some))
         half = half_times(some)
         moments = [np.array([gap + half[k]]) for k in range(len(some)) for gap in gaps]
         times = np.arange(0.0, float(ends.max()), _COARSE)
@@ -222,6 +226,10 @@ def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
             _judge_quench(score, gaps, peaks, quenched)
             late = _late(x[k, caught], times, float(moments[k * len(gaps) + caught][0]))
             score.measured["rise_speed"] = float(speed[k, caught])
+            struck_at = gaps[caught] + flight[k, caught, 1]
+            score.measured["complete"] = bool(
+                (x[k, caught][times > struck_at] <= np.float32(geometry()["b"])).any()
+            )
             _judge_later(
                 score,
                 peaks[caught:],
@@ -283,7 +291,8 @@ def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArr
         1.0,
         0.5 * hinge(max(low - ratio, ratio - high), 0.3)
         + 0.4 * hinge(late, _LATE)
-        + 0.3 * hinge(wanted - gain, _SHORTER),
+        + 0.3 * hinge(wanted - gain, _SHORTER)
+        + (0.0 if score.measured["complete"] else 0.3),
     )
     # With a reserve, since what is lost between the times looked at counts as well.
     score.losses["second_dot_lost"] = hinge(_CLEAR - float(miss.min()), _CLEAR + 0.5)
