@@ -2,13 +2,15 @@
 
 import ast
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
 PARTS = {"cubic_spring"}
 SCRIPTS = sorted(path for path in EXAMPLES.glob("*.py") if path.stem not in PARTS)
 # What a part from outside the package is made of.
@@ -27,6 +29,11 @@ def imported(path: Path) -> set[str]:
 
 def test_there_are_examples() -> None:
     assert len(SCRIPTS) >= 10
+
+
+def test_every_example_has_its_place_in_the_gallery() -> None:
+    order = runpy.run_path(str(ROOT / "docs" / "_ext" / "gallery_style.py"))["ORDER"]
+    assert sorted(order) == sorted(path.stem for path in SCRIPTS)
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)

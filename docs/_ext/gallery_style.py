@@ -13,6 +13,7 @@ ORDER = (
     "strobe",
     "exponents",
     "orbits",
+    "continuation",
     "sweep",
     "backstops",
     "energy_ledger",
