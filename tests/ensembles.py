@@ -27,7 +27,7 @@ class Members:
     def __init__(self, seed: int, size: int = SIZE, *, kinds: int = 6, strange: int = 1) -> None:
         rng = np.random.default_rng([37, seed])
         draw = hammers.Draw(rng)
-        several = [hammers.shipped(), *(draw() for _ in range(kinds - 1))]
+        several = [hammers.crude(), *(draw() for _ in range(kinds - 1))]
         # Not so far above the highest that one pulse brings it to.
         several[-1] = several[0].replace({"magnet.range_max": 300e-6})
         self.hammers = [several[i] for i in rng.integers(kinds, size=size)]

@@ -147,19 +147,19 @@ def drives(quantity: str) -> dict[str, ph.PulseTrain | ph.SineForce]:
     return found
 
 
-def shipped() -> ph.Hammer:
-    """The shipped hammer."""
-    return _shipped()
+def crude() -> ph.Hammer:
+    """The hammer of `CRUDE`."""
+    return _crude()
 
 
 @functools.cache
-def _shipped() -> ph.Hammer:
+def _crude() -> ph.Hammer:
     return ph.load(CRUDE)
 
 
 @dataclasses.dataclass
 class Draw:
-    """Hammers drawn about the shipped one; `redrawn` counts those that were refused or warned about."""
+    """Hammers drawn about the crude one; `redrawn` counts those that were refused or warned about."""
 
     rng: np.random.Generator
     spread: float = 0.2
@@ -168,13 +168,13 @@ class Draw:
 
     def __call__(self) -> ph.Hammer:
         """Draw until a hammer passes its own check without a warning."""
-        constants = shipped().constants
+        constants = crude().constants
         ends = math.log(1.0 - self.spread), math.log(1.0 + self.spread)
         while True:
             factors = np.exp(self.rng.uniform(*ends, len(constants)))
             changes = {key: c.si * f for (key, c), f in zip(constants.items(), factors, strict=True)}
             try:
-                hammer = shipped().replace(changes)
+                hammer = crude().replace(changes)
                 odd = hammer.warnings()
             except ph.InputError:
                 odd = ["refused"]

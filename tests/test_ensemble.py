@@ -117,11 +117,11 @@ def test_further_contacts_after_one_firing(hammer: ph.Hammer) -> None:
 
 def test_different_hammers_and_laws_in_one_ensemble() -> None:
     draw = hammers.Draw(np.random.default_rng(3))
-    shipped = hammers.shipped()
-    every: list[ph.Hammer] = [shipped, draw(), draw(), shipped]
-    every.append(shipped.replace({"pack.reloading": "unloading-curve"}))
+    crude = hammers.crude()
+    every: list[ph.Hammer] = [crude, draw(), draw(), crude]
+    every.append(crude.replace({"pack.reloading": "unloading-curve"}))
     drives: list[Any] = [ph.PulseTrain(h.waveform, period=0.9e-3, pulses=i + 1) for i, h in enumerate(every)]
-    drives[3] = ph.PulseTrain(shipped.waveform, period=0.3e-3, pulses=6, overlap="replace")
+    drives[3] = ph.PulseTrain(crude.waveform, period=0.3e-3, pulses=6, overlap="replace")
     found = Ensemble(every, drives, 3e-3)
     assert len(found.groups) == 3
     check(found)

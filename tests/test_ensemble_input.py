@@ -15,18 +15,18 @@ END = 1e-3
 
 
 def drive() -> ph.PulseTrain:
-    return ph.PulseTrain(hammers.shipped().waveform)
+    return ph.PulseTrain(hammers.crude().waveform)
 
 
 def made(hammer: Any = None, drives: Any = None, ends: Any = END, **options: Any) -> Ensemble:
-    return Ensemble(hammer or hammers.shipped(), drives or drive(), ends, **options)
+    return Ensemble(hammer or hammers.crude(), drives or drive(), ends, **options)
 
 
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
         (lambda: made(drives=[drive()] * 3, ends=[END] * 2), "ends: 2 are given, expected 1 or 3"),
-        (lambda: made([hammers.shipped()] * 2, [drive()] * 3), "hammers: 2 are given, expected 1 or 3"),
+        (lambda: made([hammers.crude()] * 2, [drive()] * 3), "hammers: 2 are given, expected 1 or 3"),
         (lambda: made(drives=[drive()] * 2, ends=[END] * 3), "drives: 2 are given, expected 1 or 3"),
         (lambda: made(ends=[END] * 3, states=[[6e-5, 0.0]] * 2), "states: 2 are given, expected 1 or 3"),
         (lambda: made(ends=0.0), r"ends = 0\.0 s, expected positive"),

@@ -13,7 +13,7 @@ from printhammer.motion import FORCES
 
 @pytest.fixture(scope="module")
 def motion() -> ph.Motion:
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     return ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=301)
 
 

@@ -18,7 +18,7 @@ PULSE = Rectangle(amplitude=14.0, width=3e-4, rise=0.0, decay=0.0, quantity="for
 
 @pytest.fixture(scope="module")
 def motion() -> ph.Motion:
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     drive = ph.PulseTrain(hammers.waveforms(1.2, "current")["rectangle"], period=1.1e-3, pulses=3)
     return ph.simulate(hammer, drive, ledger=True)
 
@@ -59,13 +59,13 @@ SCRIPT = """
 from tests import hammers
 from tests.test_motion import fingerprint
 import printhammer as ph
-hammer = hammers.shipped()
+hammer = hammers.crude()
 print(fingerprint(ph.simulate(hammer, ph.PulseTrain(hammer.waveform, period=1.3e-3, pulses=2), points=500)))
 """
 
 
 def test_same_input_same_bits() -> None:
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     drive = ph.PulseTrain(hammer.waveform, period=1.3e-3, pulses=2)
     here = {fingerprint(ph.simulate(hammer, drive, points=500)) for _ in range(2)}
     there = {

@@ -31,7 +31,7 @@ from printhammer.simulate import CYCLE
     ],
 )
 def test_bad_arguments(options: dict[str, Any], sentence: str) -> None:
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     with pytest.raises(ph.InputError) as error:
         ph.simulate(hammer, ph.PulseTrain(hammer.waveform), **options)
     message = str(error.value)
@@ -58,7 +58,7 @@ def test_no_state_of_rest_to_start_from() -> None:
 
 
 def test_defaults() -> None:
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, at=[0.0, 1e-3]))
     assert motion.end == 1e-3 + CYCLE
     assert motion.x[0] == ph.rest_state(hammer)
@@ -74,7 +74,7 @@ def test_defaults() -> None:
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-8])
 def test_coarse_tolerances_still_meet_the_first_contact(tolerance: float) -> None:
     """The largest tolerance permitted, too: fewer steps, no nonsense."""
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     drive = ph.PulseTrain(hammer.waveform)
     fine = ph.simulate(hammer, drive)
     coarse = ph.simulate(hammer, drive, tolerance=tolerance)
@@ -89,7 +89,7 @@ def test_coarse_tolerances_still_meet_the_first_contact(tolerance: float) -> Non
 
 
 def test_a_tighter_tolerance_is_closer_to_the_truth() -> None:
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     errors = [
         hammers.compare(hammer, ph.PulseTrain(hammer.waveform), 4e-3, whole=True, tolerance=tolerance).error
         for tolerance in (1e-7, 1e-9, 1e-11, 1e-13)
@@ -101,6 +101,6 @@ def test_a_tighter_tolerance_is_closer_to_the_truth() -> None:
 
 
 def test_the_ledger_can_be_asked_for_at_once() -> None:
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     drive = ph.PulseTrain(hammer.waveform)
     assert ph.simulate(hammer, drive, ledger=True).energy == ph.simulate(hammer, drive).energy

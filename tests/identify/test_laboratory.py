@@ -15,7 +15,7 @@ from printhammer.identify.sensor import Amount, Channel, Sensor, wrong_rows
 from printhammer.identify.sensor_settings import by_quantity
 from printhammer.identify.tables import read_table
 
-HAMMER = hammers.shipped()
+HAMMER = hammers.crude()
 MANY = np.linspace(60e-6, 300e-6, 4000)
 RECORD = {"sampling_rate": "200 kHz"}
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 from tests import hammers
-from tests.hammers import made_of, shipped
+from tests.hammers import crude, made_of
 from tests.tangents import scaled
 
 import printhammer as ph
@@ -21,7 +21,7 @@ SCALES = hammers.STROKE, 2.0
 
 
 def train(period: float, pulses: int) -> ph.PulseTrain:
-    return ph.PulseTrain(shipped().waveform, period=period, pulses=pulses)
+    return ph.PulseTrain(crude().waveform, period=period, pulses=pulses)
 
 
 @given(
@@ -33,9 +33,9 @@ def test_maps_compose(times: list[float]) -> None:
     """From a to c is from b to c after a to b, wherever b is."""
     a, b, c = sorted(times)
     drive = train(1.2e-3, 2)
-    whole = tangent_map(shipped(), drive, a, c, tolerance=1e-12)
-    first = tangent_map(shipped(), drive, a, b, tolerance=1e-12)
-    second = tangent_map(shipped(), drive, b, c, tolerance=1e-12)
+    whole = tangent_map(crude(), drive, a, c, tolerance=1e-12)
+    first = tangent_map(crude(), drive, a, b, tolerance=1e-12)
+    second = tangent_map(crude(), drive, b, c, tolerance=1e-12)
     assert first.state_at_end == pytest.approx(second.state_at_start, rel=1e-9, abs=1e-12)
     product = scaled(second.matrix @ first.matrix, SCALES)
     size = np.linalg.norm(scaled(second.matrix, SCALES)) * np.linalg.norm(scaled(first.matrix, SCALES))
@@ -46,29 +46,29 @@ def test_the_state_has_three_components_on_the_unloading_branch_only() -> None:
     drive = train(1.2e-3, 1)
     shapes = {}
     for end in (0.3e-3, 0.4e-3, 0.56e-3):
-        found = tangent_map(shipped(), drive, 0.0, end)
+        found = tangent_map(crude(), drive, 0.0, end)
         shapes[found.branch_at_end] = found.matrix.shape
     assert shapes == {LOADING: (2, 2), UNLOADING: (3, 2), BACKSTOP: (2, 2)}
-    inside = tangent_map(shipped(), drive, 0.38e-3, 0.42e-3)
+    inside = tangent_map(crude(), drive, 0.38e-3, 0.42e-3)
     assert inside.matrix.shape == (3, 3)
     # The latest local maximum stays what it is.
     np.testing.assert_array_equal(inside.matrix[2], [0.0, 0.0, 1.0])
     assert inside.determinant == pytest.approx(1.0, rel=1e-8)
-    out = tangent_map(shipped(), drive, 0.38e-3, 0.5e-3)
+    out = tangent_map(crude(), drive, 0.38e-3, 0.5e-3)
     assert out.determinant == 0.0
     with pytest.raises(ValueError, match="more components"):
-        _ = tangent_map(shipped(), drive, 0.0, 0.4e-3).determinant
+        _ = tangent_map(crude(), drive, 0.0, 0.4e-3).determinant
 
 
 def test_the_result_does_not_depend_on_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
     """To the bit: maps, growth, and a record that is too short for one contact."""
     drive = train(1.05e-3, 12)
-    whole = tangent_map(shipped(), drive, 0.5e-3, 9e-3)
-    growth = strobe_exponent(shipped(), drive, first=2, last=12)
+    whole = tangent_map(crude(), drive, 0.5e-3, 9e-3)
+    growth = strobe_exponent(crude(), drive, first=2, last=12)
     for nodes in (8, 150, 400):
         monkeypatch.setattr(tangent, "_NODES", nodes)
-        np.testing.assert_array_equal(tangent_map(shipped(), drive, 0.5e-3, 9e-3).matrix, whole.matrix)
-        again = strobe_exponent(shipped(), drive, first=2, last=12)
+        np.testing.assert_array_equal(tangent_map(crude(), drive, 0.5e-3, 9e-3).matrix, whole.matrix)
+        again = strobe_exponent(crude(), drive, first=2, last=12)
         np.testing.assert_array_equal(again.factors, growth.factors)
         assert again.value == growth.value
 
@@ -77,11 +77,11 @@ def test_the_result_does_not_depend_on_stretches(monkeypatch: pytest.MonkeyPatch
 def test_on_a_periodic_orbit_the_exponents_are_those_of_its_multipliers(period: float) -> None:
     drive = train(period, 260)
     n = 259
-    orbit = tangent_map(shipped(), drive, drive.times[n - 1], drive.times[n])
+    orbit = tangent_map(crude(), drive, drive.times[n - 1], drive.times[n])
     gap = np.subtract(orbit.state_at_end, orbit.state_at_start) / (SCALES[0], SCALES[1], SCALES[0])
     assert np.abs(gap).max() < 1e-6
     multipliers = np.sort(np.log(np.abs(np.linalg.eigvals(orbit.matrix))))
-    found = strobe_exponent(shipped(), drive, first=200, last=260)
+    found = strobe_exponent(crude(), drive, first=200, last=260)
     assert found.value == pytest.approx(multipliers[1], rel=1e-5, abs=1e-6)
     assert found.second == pytest.approx(multipliers[0], rel=1e-5)
     assert found.standard_error < 1e-5
@@ -91,18 +91,18 @@ def test_on_a_periodic_orbit_the_exponents_are_those_of_its_multipliers(period: 
 def test_a_cycle_of_two_firings() -> None:
     """Its multipliers are those of the map over two firings."""
     drive = train(1.35e-3, 300)
-    orbit = tangent_map(shipped(), drive, drive.times[297], drive.times[299])
+    orbit = tangent_map(crude(), drive, drive.times[297], drive.times[299])
     assert orbit.state_at_start == pytest.approx(orbit.state_at_end, rel=1e-6)
     largest = float(np.log(np.abs(np.linalg.eigvals(orbit.matrix))).max())
-    found = strobe_exponent(shipped(), drive, first=200, last=300)
+    found = strobe_exponent(crude(), drive, first=200, last=300)
     assert found.value == pytest.approx(0.5 * largest, rel=1e-4)
     assert found.standard_error < 1e-4 < abs(found.factors[0] - found.factors[1])
 
 
 def test_exponents_add_up_to_the_mean_growth_of_areas() -> None:
     drive = train(1.05e-3, 40)
-    found = strobe_exponent(shipped(), drive, first=10, last=40)
-    maps = [tangent_map(shipped(), drive, drive.times[i], drive.times[i + 1]) for i in range(9, 39)]
+    found = strobe_exponent(crude(), drive, first=10, last=40)
+    maps = [tangent_map(crude(), drive, drive.times[i], drive.times[i + 1]) for i in range(9, 39)]
     assert {part.matrix.shape for part in maps} == {(2, 2)}
     areas = [math.log(abs(part.determinant)) for part in maps]
     assert found.total == pytest.approx(np.mean(areas), rel=1e-6)
@@ -110,7 +110,7 @@ def test_exponents_add_up_to_the_mean_growth_of_areas() -> None:
 
 def test_at_rest_in_the_backstop_changes_die_out_like_a_damped_oscillator() -> None:
     """For longer than floating-point numbers reach."""
-    hammer = shipped()
+    hammer = crude()
     drive = train(1.0, 2)
     start, end = 0.2, 0.20013
     found = tangent_map(hammer, drive, start, end)
@@ -143,14 +143,14 @@ def _static_force(hammer: ph.Hammer, x: float, v: float) -> float:
 def test_the_number_of_threads_changes_nothing() -> None:
     periods = [0.8e-3, 1.05e-3, 1.3e-3]
     one, two = (
-        strobe_exponents(shipped(), shipped().waveform, periods, first=5, last=30, threads=n) for n in (1, 2)
+        strobe_exponents(crude(), crude().waveform, periods, first=5, last=30, threads=n) for n in (1, 2)
     )
     seen = []
     three = strobe_exponents(
-        [shipped()] * 3, shipped().waveform, periods, first=5, last=30, progress=lambda *p: seen.append(p)
+        [crude()] * 3, crude().waveform, periods, first=5, last=30, progress=lambda *p: seen.append(p)
     )
     for a, b, c, period in zip(one, two, three, periods, strict=True):
-        alone = strobe_exponent(shipped(), shipped().waveform, period, first=5, last=30)
+        alone = strobe_exponent(crude(), crude().waveform, period, first=5, last=30)
         for other in (b, c, alone):
             np.testing.assert_array_equal(a.factors, other.factors)
             assert (a.value, a.standard_error, a.period) == (other.value, other.standard_error, period)
@@ -216,4 +216,4 @@ def test_the_standard_error_of_an_autocorrelated_series() -> None:
 )
 def test_bad_arguments(call: object, told: str) -> None:
     with pytest.raises(ph.InputError, match=told):
-        call(shipped())
+        call(crude())

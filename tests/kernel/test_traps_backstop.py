@@ -166,7 +166,7 @@ def test_very_short_pulses_inside_the_backstop(width: float) -> None:
 
 
 def test_rest_in_the_backstop_for_a_second_takes_few_steps() -> None:
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     motion = ph.simulate(hammer, hammers.idle("current"), duration=1.0)
     assert motion.ok
     assert motion.steps < 10_000
@@ -179,7 +179,7 @@ def test_rest_in_the_backstop_for_a_second_takes_few_steps() -> None:
 
 def test_rest_under_a_current_that_does_not_lift_is_bounded() -> None:
     """A constant current shifts the state of rest; the ringing dies, and no contact ends."""
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     drive = ph.PulseTrain(Trapezoid(amplitude=0.1, rise=1e-3, width=0.1, fall=1e-3))
     motion = ph.simulate(hammer, drive, duration=0.11)
     assert motion.ok
@@ -272,7 +272,7 @@ def test_a_backstop_that_may_not_pull_lets_go_once(gentle: float) -> None:
 def test_the_rest_state_is_at_rest() -> None:
     """`rest_state` and the force sum of the kernel agree: nothing moves from there."""
     for hammer in (
-        hammers.shipped(),
+        hammers.crude(),
         hammers.made_of(
             spring=hammers.SPRINGS["linear"].model_copy(update={"Bs": 1e-3}), backstop=hammers.hertz()
         ),

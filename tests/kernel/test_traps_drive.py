@@ -111,7 +111,7 @@ def test_many_coinciding_edges() -> None:
 
 
 def test_twenty_pulses_at_once() -> None:
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     waveform = hammers.waveforms(0.06, "current")["rectangle"]
     drive = ph.PulseTrain(waveform, period=2e-5, pulses=60)
     assert drive.overlapping >= 20
@@ -151,7 +151,7 @@ def test_no_drive_array_is_too_short() -> None:
 @pytest.mark.parametrize("amplitude", [9.0, -3.0])
 def test_currents_beyond_the_one_that_bucks_all_of_the_pull(shape: str, amplitude: float) -> None:
     """Am - Bm I changes its sign at 4.7 A: the pull grows again beyond."""
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     magnet = hammer.magnet
     assert amplitude < 0.0 or magnet.Am - magnet.Bm * amplitude < 0.0
     waveform = hammers.waveforms(amplitude, "current")[shape]
@@ -193,7 +193,7 @@ def test_a_run_restarted_exactly_on_a_switch_goes_on(hammer: str) -> None:
     """Cut at each switch and at each edge, and started again from the state there, the motion is the same."""
     end = 1.9e-3
     if hammer == "current":
-        subject = hammers.shipped()
+        subject = hammers.crude()
         drive = ph.PulseTrain(hammers.waveforms(1.2, "current")["rectangle"], period=0.7e-3, pulses=2)
     else:
         drive = ph.PulseTrain(BLOCK, period=0.7e-3, pulses=2)

@@ -14,13 +14,13 @@ from printhammer.waveforms import Trapezoid
 
 def test_the_end_of_the_range_of_a_fit_is_met() -> None:
     """A law that holds up to 250 um: the run ends there, inside the pack, and no output lies beyond."""
-    hammer = hammers.shipped().replace({"magnet.range_min": 30e-6, "magnet.range_max": 250e-6})
+    hammer = hammers.crude().replace({"magnet.range_min": 30e-6, "magnet.range_max": 250e-6})
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), times=np.linspace(0.0, 4e-3, 4001))
     assert motion.status == "range left"
     assert not motion.ok
     assert motion.x.max() <= 250e-6
     assert motion.at(motion.end)[0][0] == pytest.approx(250e-6, rel=1e-9)
-    full = ph.simulate(hammers.shipped(), ph.PulseTrain(hammer.waveform), times=motion.t)
+    full = ph.simulate(hammers.crude(), ph.PulseTrain(hammer.waveform), times=motion.t)
     np.testing.assert_allclose(motion.x, full.x, rtol=0.0, atol=1e-9 * STROKE)
     assert full.at(motion.end + 1e-7)[0][0] > 250e-6
 

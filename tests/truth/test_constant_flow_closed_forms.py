@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests import hammers
-from tests.hammers import FRONT, MASS, STOP, THICKNESS, Draw, idle, interpreted, made_of, shipped
+from tests.hammers import FRONT, MASS, STOP, THICKNESS, Draw, crude, idle, interpreted, made_of
 from tests.tangents import SHARP
 from tests.truth import oracles
 
@@ -255,7 +255,7 @@ def check_dimensions(hammer: ph.Hammer, drive: ph.PulseTrain) -> None:
 
 
 def test_dimensions_of_the_shipped_hammer() -> None:
-    hammer = shipped()
+    hammer = crude()
     check_dimensions(hammer, ph.PulseTrain(hammer.waveform))
     check_dimensions(hammer, ph.PulseTrain(hammer.waveform, period=1.4e-3, pulses=3))
 
@@ -269,7 +269,7 @@ def test_dimensions_of_random_hammers(seed: int, period: float) -> None:
 
 def test_maps_compose() -> None:
     """From a to c is from b to c after a to b, the state at b changing with the constants."""
-    hammer = shipped()
+    hammer = crude()
     drive = ph.PulseTrain(hammer.waveform, period=1.2e-3, pulses=3)
     names = ["mass", "pack.front", "backstop.damping", "waveform.width", "period"]
     for a, b, c in ((0.1e-3, 0.38e-3, 0.9e-3), (0.3e-3, 0.75e-3, 1.6e-3), (0.0, 0.5e-3, 2.0e-3)):
@@ -293,7 +293,7 @@ def test_maps_compose() -> None:
 
 def test_the_period_of_a_strobe_map() -> None:
     """Start and end move with the period: as if time had been counted from the first of the two firings."""
-    hammer = shipped()
+    hammer = crude()
     period, n = 1.3e-3, 6
     drive = ph.PulseTrain(hammer.waveform, period=period, pulses=n + 2)
     times = drive.times

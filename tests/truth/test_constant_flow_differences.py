@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests import hammers
-from tests.hammers import Draw, interpreted, shipped
+from tests.hammers import Draw, crude, interpreted
 from tests.moved import flow_deviation, quantities, quantity_differences
 from tests.tangents import before_slow_touches
 from tests.truth.test_tangent_finite_differences import CASES, MOVING, drive_of, hammer_of
@@ -29,7 +29,7 @@ def close(*arguments: object) -> bool:
 @pytest.mark.parametrize("end", [0.3e-3, 0.33e-3, 0.4e-3, 0.5e-3, 0.56e-3, 0.8e-3, 1.5e-3])
 def test_a_single_pulse(end: float) -> None:
     """In flight, in the pack on both branches, in the backstop, between rebounds."""
-    hammer = shipped()
+    hammer = crude()
     drive = ph.PulseTrain(hammer.waveform)
     rest = rest_state(hammer), 0.0
     for name in parameter_names(hammer, drive):
@@ -98,14 +98,14 @@ def compare_quantities(
 
 
 def test_quantities_of_two_dots() -> None:
-    hammer = shipped()
+    hammer = crude()
     drive = ph.PulseTrain(hammer.waveform, period=1.5e-3, pulses=2)
     compare_quantities(hammer, drive, 3e-3)
 
 
 def test_quantities_with_firing_times_of_their_own() -> None:
     """Two pulses, the second quenches: its time is a constant."""
-    hammer = shipped()
+    hammer = crude()
     drive = ph.PulseTrain(hammer.waveform, at=[0.1e-3, 1.2e-3])
     found = ph.sensitivities(hammer, drive, duration=2.5e-3)
     assert found.constants[-1] == "firing.1"

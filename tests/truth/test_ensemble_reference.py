@@ -1,4 +1,4 @@
-"""Ensembles in lanes against the reference, on hammers drawn at random about the shipped one."""
+"""Ensembles in lanes against the reference, on hammers drawn at random about the crude one."""
 
 import dataclasses
 import functools

@@ -85,7 +85,7 @@ def test_the_pairs_meet_every_drive() -> None:
 
 @pytest.mark.parametrize("drive", drives("current"))
 def test_every_current_drives_the_shipped_hammer(drive: str) -> None:
-    check(hammers.shipped(), drives("current")[drive])
+    check(hammers.crude(), drives("current")[drive])
 
 
 @pytest.mark.parametrize("drive", drives("force"))
@@ -132,7 +132,7 @@ def test_every_drive_on_compiled_combinations(
 
 def test_machine_code_and_plain_python_agree() -> None:
     """Contraction of multiply and add is the only freedom of the compiler."""
-    hammer = hammers.shipped()
+    hammer = hammers.crude()
     drive = ph.PulseTrain(hammer.waveform)
     times = np.linspace(0.0, 2e-3, 201)
     compiled = ph.simulate(hammer, drive, times=times)

@@ -1,4 +1,4 @@
-"""The compiled kernel against the reference on hammers drawn at random about the shipped one.
+"""The compiled kernel against the reference on hammers drawn at random about the crude one.
 
 Every constant is log-uniform within 20 %; hammers that `warnings` names or refuses are drawn again and
 counted. Default tolerance throughout.
@@ -85,11 +85,11 @@ def test_two_hundred_trains(seed: int, request: pytest.FixtureRequest) -> None:
 
 
 def test_the_draw_is_what_it_says() -> None:
-    """All constants vary, within 20 % of the shipped ones, and none that is drawn is warned about."""
+    """All constants vary, within 20 % of the crude ones, and none that is drawn is warned about."""
     draw = Draw(np.random.default_rng(7))
     drawn = [draw() for _ in range(20)]
-    shipped = hammers.shipped()
-    for key, constant in shipped.constants.items():
+    crude = hammers.crude()
+    for key, constant in crude.constants.items():
         ratios = [hammer.constants[key].si / constant.si for hammer in drawn]
         assert 0.8 <= min(ratios) < 1.0 < max(ratios) <= 1.2, key
     assert draw.drawn == 20

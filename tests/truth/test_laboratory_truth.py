@@ -8,7 +8,7 @@ from tests import hammers
 import printhammer as ph
 from printhammer.kernel.reference import reference
 
-HAMMER = hammers.shipped()
+HAMMER = hammers.crude()
 C = {key: constant.si for key, constant in HAMMER.constants.items()}
 EXACT = {"exact": True}
 

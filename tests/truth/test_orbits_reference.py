@@ -1,4 +1,4 @@
-"""Periodic orbits of the shipped hammer, stable and unstable, re-integrated with the independent reference.
+"""Periodic orbits of a hammer, stable and unstable, re-integrated with the independent reference.
 
 The reference starts at time 0, with nothing fired before: trains whose pulses end before the next firing,
 or are cut off by it, have no need of that.

@@ -20,7 +20,7 @@ from printhammer.identify.pack import fit_pack
 from printhammer.identify.recovery import Recovery, measured_stiffness, recover, true_value
 from printhammer.identify.result import Fit
 
-HAMMER = hammers.shipped()
+HAMMER = hammers.crude()
 CONSTANTS = {
     "magnet": ("magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs", "spring.As"),
     "pack": ("pack.stiffness",),

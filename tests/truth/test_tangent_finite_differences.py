@@ -16,10 +16,10 @@ from tests.hammers import (
     SPRINGS,
     STOP,
     Draw,
+    crude,
     drives,
     interpreted,
     made_of,
-    shipped,
 )
 from tests.tangents import SHARP, before_slow_touches, deviation, richardson, scaled
 
@@ -45,13 +45,13 @@ MOVING = STOP + 20e-6, -0.4
 @pytest.mark.parametrize("end", [0.15e-3, 0.3e-3, 0.4e-3, 0.45e-3, 0.55e-3, 0.8e-3, 1.0e-3, 1.3e-3])
 def test_a_single_pulse(end: float) -> None:
     """In flight, in the pack on both branches, in the backstop, between rebounds."""
-    hammer = shipped()
+    hammer = crude()
     assert deviation(hammer, ph.PulseTrain(hammer.waveform), 0.0, end) < WANTED
 
 
 @pytest.mark.parametrize("period", [1.35e-3, 1.05e-3, 0.8e-3])
 def test_trains(period: float) -> None:
-    hammer = shipped()
+    hammer = crude()
     drive = ph.PulseTrain(hammer.waveform, period=period, pulses=3)
     end = before_slow_touches(hammer, drive, 2.4e-3)
     assert end > 1.2e-3
@@ -65,7 +65,7 @@ def test_trains(period: float) -> None:
     ("end", "branch_at_end"), [(0.42e-3, UNLOADING), (0.73e-3, BACKSTOP), (0.79e-3, FREE)]
 )
 def test_from_contact_to_contact(start: float, branch: int, end: float, branch_at_end: int) -> None:
-    hammer = shipped()
+    hammer = crude()
     drive = ph.PulseTrain(hammer.waveform)
     if start > end:
         start, branch = 0.2e-3, FREE
@@ -77,7 +77,7 @@ def test_from_contact_to_contact(start: float, branch: int, end: float, branch_a
 
 def test_starts_inside_contacts() -> None:
     """Initial states behind the backstop position and beyond the pack front."""
-    hammer = shipped()
+    hammer = crude()
     drive = ph.PulseTrain(hammer.waveform)
     rest = rest_state(hammer)
     front = hammers.FRONT
@@ -88,7 +88,7 @@ def test_starts_inside_contacts() -> None:
 @pytest.mark.parametrize("end", [0.4e-3, 0.8e-3, 1.9e-3])
 def test_differences_of_the_reference(end: float) -> None:
     """Nothing of the kernel on the other side: two pulses, the second of them into the settling out."""
-    hammer = shipped()
+    hammer = crude()
     drive = ph.PulseTrain(hammer.waveform, at=[0.0, 1.1e-3])
     rest = rest_state(hammer)
     units = np.array([hammers.STROKE, 2.0])
