@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.coil_work import coil_work_of
 from printhammer.contacts import contacts_of, dots_of, loading_works
 from printhammer.errors import InputError
 from printhammer.ledger import increments_of, ledger_of
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from printhammer.coil_work import CoilWork
     from printhammer.contacts import Contact, Dot
     from printhammer.drive import Drive
     from printhammer.hammer import Hammer
@@ -184,6 +186,11 @@ class Motion:
     def energy(self) -> Ledger:
         """The energy ledger of the whole run."""
         return ledger_of(self._problem, self._record, self._increments)
+
+    @cached_property
+    def coil_work(self) -> CoilWork:
+        """The work of the coil over the whole run: net, positive, given back, and its heat."""
+        return coil_work_of(self._problem, self._record)
 
     @cached_property
     def strobe(self) -> tuple[FloatArray, FloatArray, FloatArray]:
