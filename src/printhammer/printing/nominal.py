@@ -1,0 +1,109 @@
+"""The dot of the single pulse, by which all others are judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from printhammer.drive import PulseTrain
+from printhammer.drive_input import read_positive
+from printhammer.errors import InputError
+from printhammer.problem import TOLERANCE
+from printhammer.simulate import simulate
+
+if TYPE_CHECKING:
+    from printhammer.hammer import Hammer
+    from printhammer.waveforms import Waveform
+
+WAIT: Final = 4e-3
+"""Time after the last firing of a run, s, within which its dot and extra contacts are waited for."""
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """What one pulse from rest prints.
+
+    Attributes
+    ----------
+    force : float
+        Largest pack force, N.
+    flight_time : float
+        From firing to touch, s.
+    impact_speed : float
+        At touch, m/s.
+    indentation : float
+        Largest indentation, m.
+    loading_work : float
+        Work done on the pack up to its largest indentation, J.
+    pack_loss : float
+        Energy that the pack keeps, J.
+    """
+
+    force: float
+    flight_time: float
+    impact_speed: float
+    indentation: float
+    loading_work: float
+    pack_loss: float
+
+
+def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Nominal:
+    """Fire a hammer once from rest.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        A hammer with a pack.
+    waveform : Waveform, optional
+        By default that of the hammer.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+
+    Returns
+    -------
+    Nominal
+        What it prints.
+
+    Raises
+    ------
+    InputError
+        The hammer has no pack, no waveform or no rest state, or a single pulse makes no dot.
+    """
+    pulse = pulse_of(hammer, waveform)
+    if hammer.front is None:
+        raise InputError(f"{hammer.path}: the hammer has no pack, expected one that a dot is made on")
+    motion = simulate(hammer, PulseTrain(pulse), duration=WAIT, points=2, tolerance=tolerance)
+    if not motion.ok:
+        raise InputError(f"{hammer.path}: the run of a single pulse ends early: {motion.message}")
+    dot = motion.dots[0]
+    values = (dot.peak_force, dot.flight_time, dot.impact_speed, dot.indentation)
+    energies = (dot.loading_work, dot.net_loss)
+    found = [value for value in (*values, *energies) if value is not None]
+    if len(found) < len(values) + len(energies) or not found[0] > 0.0:
+        raise InputError(f"{hammer.path}: a single pulse makes no dot, expected a hammer that prints")
+    return Nominal(*found)
+
+
+def pulse_of(hammer: Hammer, waveform: Waveform | None = None) -> Waveform:
+    """Return a waveform, by default that of the hammer.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    pulse = hammer.waveform if waveform is None else waveform
+    if pulse is None:
+        raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")
+    return pulse
+
+
+def rate_of(value: float | str, name: str = "rate") -> float:
+    """Read slots per second, Hz, or text with a unit.
+
+    Raises
+    ------
+    InputError
+        Not a positive number or rate.
+    """
+    return read_positive(value, "Hz", name)

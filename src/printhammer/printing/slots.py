@@ -1,0 +1,125 @@
+"""Patterns of slots: times, one period apart, at each of which a dot is wanted or not."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.segments import FloatArray
+
+SLOTS: Final = 8
+"""Number of slots of a pattern from rest, and order of the cycle."""
+
+LEAD_IN: Final = 64
+"""Slots of the cycle that are run before the first one that is judged."""
+
+FIRST_SLOT: Final = 1e-3
+"""Time of slot 0 in a run, s: a drive may fire ahead of a slot, and no drive fires before time 0."""
+
+
+@cache
+def eight_slot_patterns() -> npt.NDArray[np.bool_]:
+    """Return the 255 patterns of eight slots in which at least one dot is wanted.
+
+    Returns
+    -------
+    bool array, shape (255, 8)
+        Row n holds the binary digits of n + 1, the most significant one in slot 0; read-only.
+    """
+    numbers = np.arange(1, 2**SLOTS)
+    rows: npt.NDArray[np.bool_] = (numbers[:, np.newaxis] >> np.arange(SLOTS - 1, -1, -1)) & 1 == 1
+    rows.setflags(write=False)
+    return rows
+
+
+@cache
+def de_bruijn(order: int = SLOTS) -> npt.NDArray[np.bool_]:
+    """Return a binary de Bruijn cycle: read around, it holds every word of `order` slots exactly once.
+
+    It is the least one in the order of a dictionary: the Lyndon words whose length divides the order, one
+    after another (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207).
+
+    Parameters
+    ----------
+    order : int, optional
+        Length of the words, from 1 to 16.
+
+    Returns
+    -------
+    bool array, shape (2**order,)
+        Read-only.
+
+    Raises
+    ------
+    InputError
+        The order is out of bounds.
+    """
+    if not 1 <= order <= 16:
+        raise InputError(f"order = {order!r} of a de Bruijn cycle, expected 1 to 16")
+    cycle: list[int] = []
+    word = [0]
+    # Duval's algorithm: the Lyndon words up to a length, in order.
+    while word:
+        if order % len(word) == 0:
+            cycle += word
+        word = [word[place % len(word)] for place in range(order)]
+        while word and word[-1] == 1:
+            word.pop()
+        if word:
+            word[-1] = 1
+    found = np.array(cycle, dtype=np.bool_)
+    found.setflags(write=False)
+    return found
+
+
+def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> npt.NDArray[np.bool_]:
+    """Return once around the de Bruijn cycle, its own last slots before it.
+
+    The run begins at rest, `lead_in` slots before the cycle does, with what the cycle ends with. So at every
+    slot that is judged the past is that of a cycle without end, for `lead_in` slots at least.
+
+    Parameters
+    ----------
+    order : int, optional
+        As for `de_bruijn`.
+    lead_in : int, optional
+        Number of slots before the cycle.
+
+    Returns
+    -------
+    bool array, shape (lead_in + 2**order,)
+        The slots from number `lead_in` on are to be judged.
+    """
+    cycle = de_bruijn(order)
+    return np.concatenate([np.resize(cycle[::-1], lead_in)[::-1], cycle])
+
+
+def slots_of(pattern: npt.ArrayLike) -> tuple[int, ...]:
+    """Return the numbers of the slots at which a dot is wanted."""
+    return tuple(np.flatnonzero(np.asarray(pattern, dtype=np.bool_)).tolist())
+
+
+def slot_times(
+    slots: Sequence[int] | npt.NDArray[np.int64], rate: float, first: float = FIRST_SLOT
+) -> FloatArray:
+    """Return the times of some slots, s.
+
+    Parameters
+    ----------
+    slots : sequence of int
+        Their numbers; an array of any shape.
+    rate : float
+        Slots per second, Hz.
+    first : float, optional
+        Time of slot 0, s.
+    """
+    return first + np.asarray(slots, dtype=np.float64) / rate
