@@ -18,6 +18,7 @@ from tests.hammers import (
     Draw,
     crude,
     drives,
+    idle,
     interpreted,
     made_of,
 )
@@ -110,6 +111,24 @@ def test_differences_of_the_reference(end: float) -> None:
     truth = scaled(np.array(columns).T, (units[0], units[1]))
     found = scaled(tangent_map(hammer, drive, 0.0, end, tolerance=SHARP).matrix[:2], (units[0], units[1]))
     assert np.linalg.norm(found - truth) < WANTED * np.linalg.norm(truth)
+
+
+@pytest.mark.parametrize("depth", [1e-11, 1e-12, 1e-13, 1e-15])
+@pytest.mark.parametrize("pack", ["power", "curve"])
+def test_a_contact_that_is_hardly_one(pack: str, depth: float) -> None:
+    """A pack that is touched ever so slightly leaves the flow as it is without a pack.
+
+    Thrown back from where a fall from the depth comes by, the armature comes to that depth.
+    """
+    parts = {"magnet": MAGNETS["inverse-root"], "spring": SPRINGS["linear"], "backstop": BACKSTOPS["hertz"]}
+    free, struck = made_of(**parts), made_of(**parts, pack=PACKS[pack])
+    drive = idle("current")
+    fall = ph.simulate(free, drive, duration=0.1e-3, state=(hammers.FRONT + depth, 0.0), tolerance=SHARP)
+    state = float(fall.x[-1]), -float(fall.v[-1])
+    motion = ph.simulate(struck, drive, duration=0.2e-3, state=state, tolerance=SHARP)
+    assert [contact.surface for contact in motion.contacts] == ["pack"]
+    found, wanted = (tangent_map(hammer, drive, 0.0, 0.2e-3, state=state) for hammer in (struck, free))
+    np.testing.assert_allclose(found.matrix, wanted.matrix, rtol=WANTED)
 
 
 CASES = [

@@ -281,9 +281,9 @@ def influence_rates(
         viscous_w, viscous_v = viscous_slopes(w, v, scales, hammer)
     elif indented:
         push = pack_force(x, v, mode, memory, hammer)
-        with_x, with_v = pack_slopes(x, v, mode, memory, scales, hammer)
+        with_x, with_v = pack_slopes(x, v, mode, memory, peak, scales, hammer)
         if MEMORY and mode != LOADING:
-            with_peak = memory_slope(x, v, peak, peaks, scales, hammer)
+            with_peak = memory_slope(x, v, peak, peaks, hammer)
     force += push
     rates[0] = -v if compressed else v
     rates[1] = pace * force * hammer[INVERSE_MASS]

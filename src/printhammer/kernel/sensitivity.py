@@ -114,7 +114,7 @@ def rest_in_pack(
     """Give column `k` the change of a place of rest on the loading branch; the past is forgotten."""
     varied, moves, of_hammer, live_moves, memories, spacing = given
     value = drive_value(t, drive)
-    with_x, _with_v = pack_slopes(x, 0.0, LOADING, 0.0, scales, hammer)
+    with_x, _with_v = pack_slopes(x, 0.0, LOADING, 0.0, x, scales, hammer)
     change = -with_x * moves[k, FRONT]
     if of_hammer[k] & FIELD_MOVES:
         change += field_changes(x, value, k, varied)[0]
@@ -225,7 +225,7 @@ def carry_on(
     else:
         memory = memory_of(mode, kept, hammer)
         if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
-            note_memories(work[MEMORIES], kept, scales, hammer)
+            note_memories(work[MEMORIES], kept, hammer)
             note_changed_memories(memories, kept, varied, moves, of_hammer)
         longest = longest_variation_step(mode, memory, kept, work, scales, bounds, hammer, drive)
         left = t_to - t

@@ -85,13 +85,22 @@ def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer
 
 @compiled
 def pack_slopes(
-    x: float, v: float, mode: int, memory: float, scales: Any, hammer: Hammer
+    x: float, v: float, mode: int, memory: float, peak: float, scales: Any, hammer: Hammer
 ) -> tuple[float, float]:
-    """Return the slopes of the pack force with displacement [N/m] and velocity [N s/m]."""
+    """Return the slopes of the pack force with displacement [N/m] and velocity [N s/m].
+
+    On an unloading branch, with its local maximum `peak`, nothing beyond that is looked at: the branch goes
+    with so high a power of the depth that in a shallow contact it would hide what is within.
+    """
     front = hammer[FRONT]
     x = max(x, front)
-    spacing = max(DEPTH_SPACING * (x - front), LEAST_DEPTH_SPACING * scales[0])
+    least = LEAST_DEPTH_SPACING * scales[0]
+    if MEMORY and mode != LOADING:
+        least = min(least, DEPTH_SPACING * (peak - front))
+    spacing = max(DEPTH_SPACING * (x - front), least)
     spacing = (x + spacing) - x
+    if spacing == 0.0:
+        return 0.0, 0.0
     side = CENTRAL if x - front >= 2.0 * spacing else FORWARD
     if not PACK_PULLS and mode == LOADING and side == CENTRAL:
         c = hammer[PACK:BACKSTOP_PART]
@@ -120,29 +129,28 @@ def pack_slopes(
 
 
 @inlined
-def peak_spacing(peak: float, scales: Any, hammer: Hammer) -> float:
+def peak_spacing(peak: float, hammer: Hammer) -> float:
     """Return by how much a local maximum is moved to see what the unloading branch makes of it [m]."""
-    spacing = max(DEPTH_SPACING * (peak - hammer[FRONT]), 1e-3 * LEAST_DEPTH_SPACING * scales[0])
-    return float((peak + spacing) - peak)
+    return float((peak + DEPTH_SPACING * (peak - hammer[FRONT])) - peak)
 
 
 @compiled
-def note_memories(memories: Any, peak: float, scales: Any, hammer: Hammer) -> None:
+def note_memories(memories: Any, peak: float, hammer: Hammer) -> None:
     """Fill `memories`, five places, with what the unloading branch needs of local maxima about `peak` [m]."""
-    spacing = peak_spacing(peak, scales, hammer)
-    side = CENTRAL if peak - hammer[FRONT] > 2.0 * spacing else FORWARD
+    spacing = peak_spacing(peak, hammer)
     for k in range(5):
-        memories[k] = pack_memory(hammer[PACK:BACKSTOP_PART], peak + OFFSETS[side, k] * spacing)
+        memories[k] = pack_memory(hammer[PACK:BACKSTOP_PART], peak + OFFSETS[CENTRAL, k] * spacing)
 
 
 @compiled
-def memory_slope(x: float, v: float, peak: float, memories: Any, scales: Any, hammer: Hammer) -> float:
+def memory_slope(x: float, v: float, peak: float, memories: Any, hammer: Hammer) -> float:
     """Return the slope [N/m] of the unloading branch at (`x`, `v`) with its local maximum `peak`."""
-    spacing = peak_spacing(peak, scales, hammer)
-    side = CENTRAL if peak - hammer[FRONT] > 2.0 * spacing else FORWARD
+    spacing = peak_spacing(peak, hammer)
+    if spacing == 0.0:
+        return 0.0
     total = 0.0
-    for k in range(POINTS[side]):
-        total += WEIGHTS[side, k] * pack_unloading(hammer[PACK:BACKSTOP_PART], x, v, memories[k])
+    for k in range(POINTS[CENTRAL]):
+        total += WEIGHTS[CENTRAL, k] * pack_unloading(hammer[PACK:BACKSTOP_PART], x, v, memories[k])
     return total / spacing
 
 

@@ -96,10 +96,10 @@ def variation_slopes(
     by_x = field_slope(y[0], value, scales, bounds, hammer)
     by_v, by_peak = 0.0, 0.0
     if HAS_PACK and mode in (LOADING, UNLOADING, RELOADING):
-        pack_x, by_v = pack_slopes(y[0], y[1], mode, memory, scales, hammer)
+        pack_x, by_v = pack_slopes(y[0], y[1], mode, memory, peak, scales, hammer)
         by_x += pack_x
         if MEMORY and mode != LOADING:
-            by_peak = memory_slope(y[0], y[1], peak, memories, scales, hammer)
+            by_peak = memory_slope(y[0], y[1], peak, memories, hammer)
     return by_x * hammer[INVERSE_MASS], by_v * hammer[INVERSE_MASS], by_peak * hammer[INVERSE_MASS]
 
 
@@ -323,7 +323,7 @@ def vary(
     else:
         memory = memory_of(mode, kept, hammer)
         if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
-            note_memories(work[MEMORIES], kept, scales, hammer)
+            note_memories(work[MEMORIES], kept, hammer)
         longest = longest_variation_step(mode, memory, kept, work, scales, bounds, hammer, drive)
         left = t_to - t
         while left > 0.0:
