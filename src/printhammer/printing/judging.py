@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing.nominal import Nominal
+from printhammer.printing.nominal import SinglePulse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -87,7 +87,7 @@ def judge(
     dots: DotTable,
     wanted: BoolArray,
     slot_times: FloatArray,
-    nominal: Nominal | Sequence[Nominal],
+    nominal: SinglePulse | Sequence[SinglePulse],
     limits: Limits,
     ok: BoolArray | None = None,
 ) -> Judgement:
@@ -102,7 +102,7 @@ def judge(
     slot_times : array, shape (members, firings)
         Time of the slot of each firing, s, which need not be that of the firing; of no matter where no dot is
         judged.
-    nominal : Nominal or sequence of Nominal
+    nominal : SinglePulse or sequence of SinglePulse
         The dot of the single pulse: one for all members, or one for each.
     limits : Limits
         How far a dot may be off.
@@ -130,7 +130,7 @@ def judge(
         early = np.flatnonzero(~np.asarray(ok) & (last >= 0))
         run[early, last[early]] = False
     struck = dots.struck & run & asked
-    single = [nominal] if isinstance(nominal, Nominal) else nominal
+    single = [nominal] if isinstance(nominal, SinglePulse) else nominal
     single_force = np.array([one.force for one in single])[:, np.newaxis]
     single_flight = np.array([one.flight_time for one in single])[:, np.newaxis]
     force = np.where(struck, dots.peak_force / single_force - 1.0, np.nan)

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Final
 
 from printhammer.drive import PulseTrain
 from printhammer.drive_input import read_positive
+from printhammer.ensemble import Ensemble
 from printhammer.errors import InputError
 from printhammer.problem import TOLERANCE
 from printhammer.simulate import simulate
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from printhammer.hammer import Hammer
     from printhammer.waveforms import Waveform
 
@@ -20,7 +23,23 @@ WAIT: Final = 4e-3
 
 
 @dataclass(frozen=True)
-class Nominal:
+class SinglePulse:
+    """The dot of one pulse from rest, as far as dots are judged by it.
+
+    Attributes
+    ----------
+    force : float
+        Largest pack force, N.
+    flight_time : float
+        From firing to touch, s.
+    """
+
+    force: float
+    flight_time: float
+
+
+@dataclass(frozen=True)
+class Nominal(SinglePulse):
     """What one pulse from rest prints.
 
     Attributes
@@ -39,8 +58,6 @@ class Nominal:
         Energy that the pack keeps, J.
     """
 
-    force: float
-    flight_time: float
     impact_speed: float
     indentation: float
     loading_work: float
@@ -82,6 +99,51 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     if len(found) < len(values) + len(energies) or not found[0] > 0.0:
         raise InputError(f"{hammer.path}: a single pulse makes no dot, expected a hammer that prints")
     return Nominal(*found)
+
+
+def single_pulses(
+    hammers: Sequence[Hammer],
+    waveforms: Sequence[Waveform] | None = None,
+    *,
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+) -> list[SinglePulse | None]:
+    """Fire many hammers once each, from rest.
+
+    Parameters
+    ----------
+    hammers : sequence of Hammer
+        Hammers that rest, with packs.
+    waveforms : sequence of Waveform, optional
+        What each fires; by default its own waveform.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+    threads : int, optional
+        By default as many as there are cores.
+
+    Returns
+    -------
+    list of SinglePulse or None
+        None where there is no dot, or the run ended early.
+
+    Raises
+    ------
+    InputError
+        A hammer has no waveform or no rest state.
+    """
+    if not hammers:
+        return []
+    pulses = [pulse_of(hammer) for hammer in hammers] if waveforms is None else waveforms
+    drives = [PulseTrain(pulse) for pulse in pulses]
+    result = Ensemble(list(hammers), drives, WAIT, tolerance=tolerance).run(dots=True, threads=threads)
+    dots = result.dots
+    assert dots is not None
+    good = result.ok & dots.struck[:, 0]
+    forces, flights = dots.peak_force[:, 0].tolist(), dots.flight_time[:, 0].tolist()
+    return [
+        SinglePulse(force, flight) if well and force > 0.0 else None
+        for well, force, flight in zip(good.tolist(), forces, flights, strict=True)
+    ]
 
 
 def pulse_of(hammer: Hammer, waveform: Waveform | None = None) -> Waveform:

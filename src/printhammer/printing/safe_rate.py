@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
+    from printhammer.printing.nominal import SinglePulse
     from printhammer.printing.strategy import Strategy
     from printhammer.printing.trial import Trial
     from printhammer.segments import FloatArray
@@ -113,7 +113,7 @@ class SafeRate:
         How, in words.
     limits : Limits
         How far a dot may be off.
-    nominal : Nominal
+    nominal : SinglePulse
         The single-pulse dot by which the others are judged.
     rate : float
         The safe rate, Hz; NaN where not even the first rate passes.
@@ -132,7 +132,7 @@ class SafeRate:
         Number of lost dots and of extra contacts.
     cycle_run : bool array, shape (R,)
         Whether the cycle was run; it is not where a pattern does not pass.
-    peak_current : float
+    peak_drive : float
         Largest absolute value of the drives at the safe rate, A, or N of a force; NaN where there is none.
     step : float
         Of the grid, Hz.
@@ -143,7 +143,7 @@ class SafeRate:
     hammer: Hammer
     strategy: str
     limits: Limits
-    nominal: Nominal
+    nominal: SinglePulse
     rate: float
     failure: Failure | None
     rates: FloatArray = field(repr=False)
@@ -155,7 +155,7 @@ class SafeRate:
     lost: npt.NDArray[np.int64] = field(repr=False)
     extra_contacts: npt.NDArray[np.int64] = field(repr=False)
     cycle_run: npt.NDArray[np.bool_] = field(repr=False)
-    peak_current: float
+    peak_drive: float
     step: float
     tolerance: float
 
@@ -166,7 +166,9 @@ class SafeRate:
 
     def to_dataset(self) -> xr.Dataset:
         """Return the rates as a Dataset over `rate`, with units and provenance in the attributes."""
-        return import_module("printhammer.printing.safe_rate_tables").safe_rate_dataset(self)
+        from printhammer.printing.quality_tables import safe_rate_dataset
+
+        return safe_rate_dataset(self)
 
     def plot(self, **options: Any) -> Any:
         """Draw the deviations against the rate; returns a matplotlib figure."""
@@ -188,7 +190,7 @@ def safe_rate(
     strategy: Strategy = open_loop,
     *,
     limits: Limits | None = None,
-    nominal: Nominal | None = None,
+    nominal: SinglePulse | None = None,
     first: float | str = FIRST,
     last: float | str = LAST,
     step: float | str = STEP,
@@ -207,7 +209,7 @@ def safe_rate(
         How; by default open loop.
     limits : Limits, optional
         How far a dot may be off; by default 10 % of the force, 50 us, no extra contacts.
-    nominal : Nominal, optional
+    nominal : SinglePulse, optional
         The single-pulse dot by which the others are judged; by default that of the hammer. For a hammer that
         differs from the one that a drive was made for, that of the latter.
     first, last, step : float or str, optional
@@ -282,7 +284,7 @@ def safe_rate(
         lost=np.array([row.lost for row in rows]),
         extra_contacts=np.array([row.extra_contacts for row in rows]),
         cycle_run=np.array([row.cycle_run for row in rows]),
-        peak_current=peak,
+        peak_drive=peak,
         step=read_positive(step, "Hz", "step"),
         tolerance=tolerance,
     )

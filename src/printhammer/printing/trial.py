@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
     from printhammer.printing.judging import Judgement
     from printhammer.printing.limits import Limits
-    from printhammer.printing.nominal import Nominal
+    from printhammer.printing.nominal import SinglePulse
     from printhammer.printing.strategy import Strategy
 
 
@@ -31,7 +31,7 @@ class Case(NamedTuple):
     """A hammer at a rate, Hz, and the single-pulse dot by which it is judged."""
 
     hammer: Hammer
-    nominal: Nominal
+    nominal: SinglePulse
     rate: float
 
 
