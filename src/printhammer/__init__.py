@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from printhammer.identify.laboratory import measure
     from printhammer.maps import frequency_map
     from printhammer.motion import Motion
+    from printhammer.printing.page import print_page
+    from printhammer.printing.pattern import Pattern
     from printhammer.simulate import simulate
     from printhammer.sweep import sweep
     from printhammer.waveforms import Waveform
@@ -48,6 +50,7 @@ __all__ = [
     "Hammer",
     "InputError",
     "Motion",
+    "Pattern",
     "PrinthammerError",
     "PulseTrain",
     "SineForce",
@@ -65,6 +68,7 @@ __all__ = [
     "lyapunov",
     "measure",
     "orbits",
+    "print_page",
     "quench_map",
     "recurrence",
     "regimes",
@@ -86,6 +90,7 @@ _HOME = {
     "Hammer": "hammer",
     "InputError": "errors",
     "Motion": "motion",
+    "Pattern": "printing.pattern",
     "PrinthammerError": "errors",
     "PulseTrain": "drive",
     "SineForce": "drive",
@@ -102,6 +107,7 @@ _HOME = {
     "lyapunov": "chaos.lyapunov",
     "measure": "identify.laboratory",
     "orbits": "chaos.orbit_search",
+    "print_page": "printing.page",
     "recurrence": "chaos.recurrence",
     "quench_map": "chaos.quench",
     "regimes": "chaos.continuation_regimes",

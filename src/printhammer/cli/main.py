@@ -24,6 +24,7 @@ from printhammer.cli import (
     measure,
     orbits,
     paper,
+    print_,
     reconstruct,
     run,
     strobe,
@@ -61,6 +62,7 @@ app.command("bifurcation", epilog=bifurcation.EXAMPLE)(bifurcation.bifurcation)
 app.command("basins", epilog=basins.EXAMPLE)(basins.basins)
 app.command("continue", epilog=continuation.EXAMPLE)(continuation.continue_)
 app.command("lyapunov", epilog=lyapunov.EXAMPLE)(lyapunov.lyapunov)
+app.command("print", epilog=print_.EXAMPLE)(print_.print_)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)
 app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)
 app.command("measure", epilog=measure.EXAMPLE)(measure.measure)

@@ -1,0 +1,192 @@
+"""Extra contacts in full: when each of them touches, and how hard.
+
+The table of dots only counts them. An extra contact is the first one of a run that begins where the contact
+before it ends, so it is had by starting there: once for all first extra contacts of a page, once for all
+second ones, and so on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.ensemble import Ensemble
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive import Drive
+    from printhammer.ensemble import DotTable
+    from printhammer.hammer import Hammer
+    from printhammer.segments import FloatArray
+
+    IntArray = npt.NDArray[np.int64]
+
+MOST: Final = 20
+"""Extra contacts of one firing that are looked at; what a hammer that chatters on the pack adds is next to
+nothing."""
+
+_AFTER: Final = 1e-9
+"""Time after the end of a contact, s, at which the next run begins: outside the pack, and before all else."""
+
+
+@dataclass(frozen=True)
+class ExtraDots:
+    """Extra contacts, E of them.
+
+    Attributes
+    ----------
+    member, firing : int array, shape (E,)
+        To which firing of which member they belong.
+    touch : array, shape (E,)
+        Time of touch, s.
+    peak_force : array, shape (E,)
+        Largest pack force, N.
+    """
+
+    member: IntArray = field(repr=False)
+    firing: IntArray = field(repr=False)
+    touch: FloatArray = field(repr=False)
+    peak_force: FloatArray = field(repr=False)
+
+
+def extra_dots(
+    hammer: Hammer,
+    drives: Sequence[Drive],
+    ends: FloatArray,
+    dots: DotTable,
+    *,
+    tolerance: float,
+    threads: int | None = None,
+) -> ExtraDots:
+    """Find the extra contacts of an ensemble that started from rest.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    drives : sequence of Drive
+        Of the members.
+    ends : array
+        Ends of their runs, s.
+    dots : DotTable
+        What the firings did.
+    tolerance, threads
+        As for `Ensemble`.
+
+    Returns
+    -------
+    ExtraDots
+        At most `MOST` of a firing, in the order of members, firings and times.
+    """
+    assert hammer.front is not None
+    member, firing = np.nonzero(dots.extra_contacts > 0)
+    some = _Windows.at(member, firing, _leaving(dots, member, firing))
+    found: list[ExtraDots] = []
+
+    def run(windows: _Windows) -> Ensemble:
+        return Ensemble(
+            hammer,
+            [drives[member] for member in windows.member.tolist()],
+            windows.end,
+            states=windows.state,
+            starts=windows.begin,
+            tolerance=tolerance,
+        )
+
+    if some.member.size:
+        involved, row = np.unique(some.member, return_inverse=True)
+        whole = Ensemble(
+            hammer, [drives[member] for member in involved.tolist()], ends[involved], tolerance=tolerance
+        )
+        state = _states(whole, [some.begin[row == number] for number in range(involved.size)], threads)
+        end = np.array(
+            [
+                _window_end(drives[member], firing, float(ends[member]))
+                for member, firing in zip(some.member.tolist(), some.firing.tolist(), strict=True)
+            ]
+        )
+        some = replace(some, state=state, end=end)
+    for _ in range(MOST):
+        # A pack that does not pull lets go of an armature that is still in it, where no run can begin.
+        some = some.where((some.begin < some.end) & (some.state[:, 0] <= hammer.front))
+        if not some.member.size:
+            break
+        table = run(some).run(dots=True, threads=threads).dots
+        assert table is not None
+        here = np.arange(some.member.size), some.firing
+        struck = table.struck[here]
+        found.append(
+            ExtraDots(
+                some.member[struck],
+                some.firing[struck],
+                (table.fired_at + table.flight_time)[here][struck],
+                table.peak_force[here][struck],
+            )
+        )
+        after = _leaving(table, *here)
+        more = struck & (table.extra_contacts[here] > 0) & np.isfinite(after)
+        some, after = some.where(more), after[more]
+        if some.member.size:
+            state = _states(run(some), [np.array([moment]) for moment in after], threads)
+            some = replace(some, begin=after, state=state)
+    return _joined(found)
+
+
+@dataclass(frozen=True)
+class _Windows:
+    """Runs from the end of a contact to the next firing, each in the member and after the firing given."""
+
+    member: IntArray
+    firing: IntArray
+    begin: FloatArray = field(default_factory=lambda: np.zeros(0))
+    end: FloatArray = field(default_factory=lambda: np.zeros(0))
+    state: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+
+    @classmethod
+    def at(cls, member: IntArray, firing: IntArray, begin: FloatArray) -> _Windows:
+        """Return windows, of those that have a beginning; ends and states are left out."""
+        known = np.isfinite(begin)
+        return cls(member[known], firing[known], begin[known])
+
+    def where(self, kept: npt.NDArray[np.bool_]) -> _Windows:
+        """Return some of the windows."""
+        return _Windows(
+            self.member[kept], self.firing[kept], self.begin[kept], self.end[kept], self.state[kept]
+        )
+
+
+def _joined(found: Sequence[ExtraDots]) -> ExtraDots:
+    """Return contacts found round by round, in the order of members, firings and times."""
+    none = np.zeros(0, np.int64)
+    rounds = [ExtraDots(none, none, np.zeros(0), np.zeros(0)), *found]
+    member = np.concatenate([part.member for part in rounds])
+    firing = np.concatenate([part.firing for part in rounds])
+    touch = np.concatenate([part.touch for part in rounds])
+    force = np.concatenate([part.peak_force for part in rounds])
+    order = np.lexsort((touch, firing, member))
+    return ExtraDots(member[order], firing[order], touch[order], force[order])
+
+
+def _leaving(dots: DotTable, member: IntArray, firing: IntArray) -> FloatArray:
+    """Return when the dots of some firings are over, and a little more."""
+    whole = dots.fired_at + dots.flight_time + dots.contact_time
+    return np.asarray(whole[member, firing] + _AFTER)
+
+
+def _states(ensemble: Ensemble, moments: Sequence[FloatArray], threads: int | None) -> FloatArray:
+    """Return displacement and velocity at some moments of each member, one after the other."""
+    kept = ensemble.run(strobes=moments, threads=threads).strobes
+    assert kept is not None
+    asked = np.isfinite(kept.t)
+    return np.column_stack([kept.x[asked], kept.v[asked]])
+
+
+def _window_end(drive: Drive, firing: int, end: float) -> float:
+    """Return the next firing after one, or the end of the run."""
+    times = drive.times
+    return float(times[firing + 1]) if firing + 1 < times.size else end

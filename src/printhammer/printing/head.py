@@ -1,0 +1,108 @@
+"""Print heads: where the wires are, how thick they are, and how dark a dot of theirs is.
+
+The paper says of the head only that its wires are arranged in columns and that the carriage moves a fraction
+of a metre per second. The numbers here are assumptions in the manner of the heads of the time: nine wires
+1/72 in apart and about as thick as that, columns of dots 1/60 in apart, so that a character of six columns
+takes a tenth of an inch; 18 and 24 wires on the same height, thinner.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Final
+
+from printhammer.errors import InputError
+
+DENSITY: Final = 1.0
+"""Optical density of the dot of a single pulse, an assumption: a tenth of the light comes back."""
+
+_HEIGHT: Final = 9 * 25.4e-3 / 72
+_BETWEEN: Final = 1 / 3
+
+
+@dataclass(frozen=True)
+class Head:
+    """A print head: one column of wires on a carriage.
+
+    Attributes
+    ----------
+    wires : int
+        Number of wires.
+    wire_pitch : float
+        From wire to wire, m.
+    pitch : float
+        From slot to slot, m: from one column of dots to the next. Carriage speed = rate of slots x pitch.
+    wire_diameter : float
+        Also that of a dot, m.
+    density : float
+        Optical density of the dot of a single pulse.
+
+    Raises
+    ------
+    InputError
+        A number is not positive and finite.
+    """
+
+    wires: int
+    wire_pitch: float
+    pitch: float
+    wire_diameter: float
+    density: float = DENSITY
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if isinstance(value, bool) or not (value > 0.0 and math.isfinite(value)):
+                raise InputError(f"head: {one.name} = {value!r}, expected a positive number")
+
+    @property
+    def line_pitch(self) -> float:
+        """From print line to print line, m: the height of the wires and a third more."""
+        return (1.0 + _BETWEEN) * self.wires * self.wire_pitch
+
+
+_STANDARD: Final = {
+    9: Head(9, _HEIGHT / 9, 25.4e-3 / 60, 0.35e-3),
+    18: Head(18, _HEIGHT / 18, _HEIGHT / 18, 0.25e-3),
+    24: Head(24, _HEIGHT / 24, _HEIGHT / 24, 0.2e-3),
+}
+
+
+def head_of(
+    wires: int,
+    *,
+    pitch: float | None = None,
+    wire_diameter: float | None = None,
+    density: float = DENSITY,
+) -> Head:
+    """Return a head of an assumed kind: as high as that of nine wires, whatever their number.
+
+    Parameters
+    ----------
+    wires : int
+        Number of wires.
+    pitch : float, optional
+        From slot to slot, m; by default 1/60 in for 9 wires, else as from wire to wire.
+    wire_diameter : float, optional
+        Thickness of the wires, m; by default 0.35, 0.25 and 0.2 mm for 9, 18 and 24 wires, else a third more
+        than from wire to wire.
+    density : float, optional
+        Optical density of the dot of a single pulse.
+
+    Raises
+    ------
+    InputError
+        A number is not positive and finite.
+    """
+    if wires < 1:
+        raise InputError(f"head: wires = {wires!r}, expected a positive number")
+    apart = _HEIGHT / wires
+    usual = _STANDARD.get(wires, Head(wires, apart, apart, (1.0 + _BETWEEN) * apart))
+    return Head(
+        wires,
+        usual.wire_pitch,
+        usual.pitch if pitch is None else pitch,
+        usual.wire_diameter if wire_diameter is None else wire_diameter,
+        density,
+    )
