@@ -1,0 +1,38 @@
+"""How much one message may ask for, and how large it may be."""
+
+from __future__ import annotations
+
+from typing import Final
+
+LARGEST_MESSAGE: Final = 1_000_000
+"""Bytes of one message to the server."""
+
+LARGEST_FILE: Final = 400_000
+"""Characters of a dropped file."""
+
+MOST_PULSES: Final = 64
+"""Firings of a drive, and slots of a pattern."""
+
+RATES: Final = (10.0, 20e3)
+"""Firing rates, Hz."""
+
+LONGEST_TIME: Final = 20e-3
+"""Longest width, rise, decay or fall of a pulse, s."""
+
+LARGEST_CURRENT: Final = 100.0
+"""Largest amplitude, A or N."""
+
+SPAN: Final = 10.0
+"""Factor by which a constant may differ from the one of the hammer that is loaded."""
+
+MOST_STEPS: Final = 100_000
+"""Steps of a single run above which no map and no strobe is computed."""
+
+MOST_SAMPLES: Final = 2000
+"""Samples of a waveform, and of a measured curve."""
+
+LONGEST_TEXT: Final = 200
+"""Characters of a printed line."""
+
+MOST_TABS: Final = 8
+"""Connections at a time."""

@@ -1,0 +1,256 @@
+"""From a state to frames: what is quick first, previews before detail.
+
+Everything here is a function of the state alone. `newer` is asked now and then whether a newer state has
+come, and what is under way is then given up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.errors import InputError
+from printhammer.maps import TAIL
+from printhammer.simulate import end_of_run, simulate
+from printhammer.studio import bounds
+from printhammer.studio.frames import frame
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.motion import Motion
+    from printhammer.studio.state import State
+
+PREVIEW: Final = (64, 128)
+"""Rates and times of the map that is shown while a slider moves."""
+
+FULL: Final = (512, 512)
+"""Rates and times of the map in full detail."""
+
+POINTS: Final = 1600
+"""Points of a curve, beside the ends of the integrator's steps."""
+
+SECTION: Final = (100, 400)
+"""Strobe points, at first and in the end."""
+
+GAP: Final = 65535
+"""Code of a displacement that is not known, in a map."""
+
+_EXPONENT_STEPS: Final = 40.0
+
+
+class GivenUp(Exception):
+    """A newer state has come."""
+
+
+def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
+    """Return the curves of a single run, and the run.
+
+    Raises
+    ------
+    InputError
+        The state describes no hammer or drive that could be run.
+    """
+    hammer, drive = state.changed, state.drive
+    motion = simulate(hammer, drive, tolerance=DISPLAY_TOLERANCE, points=2)
+    # Every switch of a force is the end of a step.
+    times = np.union1d(np.linspace(motion.start, motion.end, POINTS), motion.step_times)
+    places, speeds = motion.at(times)
+    force = motion.forces_at(times)
+    fired, x, v = motion.strobe
+    arrays: dict[str, Any] = {
+        "t": times,
+        "x": np.float32(places),
+        "v": np.float32(speeds),
+        "drive": np.float32(drive.value(times)),
+        **{f"F {name}": np.float32(values) for name, values in force.items()},
+        "strobe t": fired,
+        "strobe x": np.float32(x),
+        "strobe v": np.float32(v),
+    }
+    told: dict[str, Any] = {
+        "status": motion.status,
+        "message": motion.message,
+        "places": {
+            "backstop": hammer.position,
+            "front": hammer.front,
+            "platen": hammer.platen,
+            "thickness": getattr(hammer.pack, "thickness", None),
+        },
+        "quantity": drive.quantity,
+        "peak": drive.peak,
+        "fired": drive.times.tolist(),
+        "steps": motion.steps,
+        "pulse": pulse_of(state),
+    }
+    return frame("motion", serial, arrays, **told), motion
+
+
+def pulse_of(state: State) -> dict[str, list[float]]:
+    """Return the curve of one pulse for the waveform editor, s and A or N."""
+    waveform = state.fired
+    tau = np.linspace(0.0, min(waveform.support, _shown(state)), 160)
+    return {"t": tau.tolist(), "value": waveform.value(tau).tolist()}
+
+
+def _shown(state: State) -> float:
+    # An exponential decay goes on far beyond what can be seen.
+    waveform = state.fired
+    width, decay = getattr(waveform, "width", None), getattr(waveform, "decay", None)
+    if width is None or decay is None:
+        return waveform.support
+    return float(width + 5.0 * decay)
+
+
+def dots_frame(serial: int, motion: Motion) -> bytes:
+    """Return what the firings did, all contacts, and the energies of the run."""
+    dots = motion.dots
+    struck = [dot for dot in dots if dot.struck]
+    energy = motion.energy
+    told: dict[str, Any] = {
+        "dots": [asdict(dot) for dot in dots],
+        "contacts": [
+            {
+                "surface": contact.surface,
+                "t_in": contact.t_in,
+                "t_out": contact.t_out,
+                "t_peak": contact.t_peak,
+                "peak_force": contact.peak_force,
+                "depth": contact.depth,
+                "v_in": contact.v_in,
+                "loss": contact.loss,
+                "extra": contact.extra,
+            }
+            for contact in motion.contacts[: 4 * bounds.MOST_PULSES]
+        ],
+        "energy": asdict(energy),
+        "quality": {
+            "fired": len(dots),
+            "struck": len(struck),
+            "extra": sum(dot.extra_contacts for dot in dots),
+            "force_low": min((dot.peak_force or 0.0 for dot in struck), default=None),
+            "force_high": max((dot.peak_force or 0.0 for dot in struck), default=None),
+            "flight_low": min((dot.flight_time or 0.0 for dot in struck), default=None),
+            "flight_high": max((dot.flight_time or 0.0 for dot in struck), default=None),
+        },
+    }
+    return frame("dots", serial, **told)
+
+
+def map_key(state: State) -> tuple[Any, ...]:
+    """Return what the map depends on."""
+    return (
+        state.hammer,
+        state.text,
+        state.constants,
+        state.waveform,
+        state.pulses,
+        state.overlap,
+        state.low,
+        state.high,
+    )
+
+
+def map_frame(state: State, serial: int, size: tuple[int, int], newer: Callable[[], bool]) -> bytes:
+    """Return the displacement against time and rate, as 16-bit codes between two displacements.
+
+    Raises
+    ------
+    GivenUp
+        A newer state has come before it was done.
+    InputError
+        The rates are not ascending, or as `motion_frame`.
+    """
+    from printhammer.drive import PulseTrain
+
+    if not state.low < state.high:
+        raise InputError(f"map: rates from {state.low:g} Hz to {state.high:g} Hz, expected ascending ones")
+    hammer, waveform = state.changed, state.fired
+    rates = np.linspace(state.low, state.high, size[0])
+    end = (state.pulses - 1) / state.low + TAIL
+    times = np.linspace(0.0, end, size[1])
+    count, overlap = state.pulses, state.overlap
+    drives = [PulseTrain(waveform, rate=rate, pulses=count, overlap=overlap) for rate in rates.tolist()]
+    runs = Ensemble(hammer, drives, end, tolerance=DISPLAY_TOLERANCE)
+    result = runs.run(times=times, progress=_watch(newer))
+    assert result.x is not None
+    low, high = _limits(hammer.position, hammer.platen, result.x)
+    arrays = {"codes": codes_of(result.x, low, high)}
+    told = {
+        "rates": [state.low, state.high],
+        "end": end,
+        "low": low,
+        "high": high,
+        "front": hammer.front,
+        "failed": int((~result.ok).sum()),
+        "detail": "full" if size == FULL else "preview",
+    }
+    return frame("map", serial, arrays, **told)
+
+
+def _limits(low: float | None, high: float | None, x: Any) -> tuple[float, float]:
+    """Return the displacements between which colours lie: backstop and platen, or what there is."""
+    known = x[np.isfinite(x)]
+    first = float(known.min()) if low is None and known.size else (low or 0.0)
+    last = float(known.max()) if high is None and known.size else (high or 0.0)
+    return first, last if last > first else first + 1e-9
+
+
+def codes_of(x: Any, low: float, high: float) -> Any:
+    """Return displacements as whole numbers from 0 (low) to 65534 (high), 65535 where they are not known."""
+    scaled = (x - np.float32(low)) * np.float32((GAP - 1) / (high - low))
+    np.clip(scaled, 0.0, GAP - 1, out=scaled)
+    unknown = np.isnan(scaled)
+    scaled[unknown] = GAP
+    return scaled.astype(np.uint16)
+
+
+def _watch(newer: Callable[[], bool]) -> Callable[[int, int], None]:
+    def progress(_done: int, _all: int) -> None:
+        if newer():
+            raise GivenUp
+
+    return progress
+
+
+def strobe_key(state: State) -> tuple[Any, ...]:
+    """Return what the strobe section depends on."""
+    return (state.hammer, state.text, state.constants, state.waveform, state.rate, state.overlap)
+
+
+def strobe_frame(state: State, serial: int, points: int, judged: bool) -> bytes:
+    """Return strobe points of an endless train at the rate, and the verdict on it if asked for.
+
+    Raises
+    ------
+    InputError
+        As `motion_frame`.
+    """
+    from printhammer.chaos.strobe import strobe
+
+    found = strobe(
+        state.changed,
+        rate=state.rate,
+        points=points,
+        waveform=state.fired,
+        overlap=state.overlap,
+        verdict=judged,
+    )
+    told: dict[str, Any] = {"status": found.status, "rate": state.rate, "verdict": None}
+    if found.verdict is not None:
+        told["verdict"] = {**found.verdict.as_dict(), "phrases": found.verdict.phrases}
+    arrays = {"x": np.float32(found.x), "v": np.float32(found.v)}
+    return frame("strobe", serial, arrays, **told)
+
+
+def too_long(state: State, motion: Motion) -> str:
+    """Return why a run is too much work to be repeated for a map and a strobe, or nothing."""
+    if motion.steps <= bounds.MOST_STEPS:
+        return ""
+    return (
+        f"the run took {motion.steps} steps, expected at most {bounds.MOST_STEPS} for a map and a strobe;"
+        f" {len(state.drive.times)} firings over {end_of_run(state.drive, None):.3g} s"
+    )

@@ -1,0 +1,83 @@
+"""Frames: what the studio sends, one binary message each.
+
+A frame is the length of its heading (4 bytes, little-endian), the heading (JSON in UTF-8, padded with spaces
+so that what follows begins at a multiple of 8), and arrays one after the other, each padded likewise.
+The heading has ``kind``, ``serial`` (of the state that it answers), whatever else is told, and ``arrays``: a
+list of name, dtype, shape and offset from the end of the heading.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+_ALIGN: Final = 8
+_DTYPES: Final = {"f4": "<f4", "f8": "<f8", "u2": "<u2", "i4": "<i4", "u1": "|u1"}
+
+
+def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **told: Any) -> bytes:
+    """Return one frame.
+
+    Parameters
+    ----------
+    kind : str
+        What it holds, such as "motion".
+    serial : int
+        Number of the state that it answers.
+    arrays : mapping, optional
+        Arrays by name: float32, float64, uint16, int32 or uint8; others are turned into float32.
+    **told
+        The rest of the heading; NaN and infinity become null.
+
+    Returns
+    -------
+    bytes
+        The frame.
+    """
+    parts: list[bytes] = []
+    listed: list[dict[str, Any]] = []
+    offset = 0
+    for name, given in (arrays or {}).items():
+        array = np.asarray(given)
+        code = f"{array.dtype.kind}{array.dtype.itemsize}"
+        if code not in _DTYPES:
+            code = "f4"
+        data = np.ascontiguousarray(array, dtype=_DTYPES[code]).tobytes()
+        listed.append({"name": name, "dtype": code, "shape": list(array.shape), "offset": offset})
+        data += bytes(-len(data) % _ALIGN)
+        parts.append(data)
+        offset += len(data)
+    heading = {"kind": kind, "serial": serial, **told, "arrays": listed}
+    text = json.dumps(plain(heading), allow_nan=False, separators=(",", ":")).encode()
+    text += b" " * (-(4 + len(text)) % _ALIGN)
+    return b"".join((struct.pack("<I", len(text)), text, *parts))
+
+
+def unframe(data: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray[Any, Any]]]:
+    """Return heading and arrays of a frame."""
+    (length,) = struct.unpack_from("<I", data)
+    heading = json.loads(data[4 : 4 + length])
+    arrays = {}
+    for entry in heading["arrays"]:
+        count = math.prod(entry["shape"])
+        found = np.frombuffer(data, _DTYPES[entry["dtype"]], count, 4 + length + entry["offset"])
+        arrays[entry["name"]] = found.reshape(entry["shape"])
+    return heading, arrays
+
+
+def plain(value: Any) -> Any:
+    """Return a value that JSON can hold: NaN and infinity as None, numbers of NumPy as those of Python."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, np.generic | np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,65 @@
+"""Who may speak to the studio: pages of its own, with its token, on this machine."""
+
+from __future__ import annotations
+
+import secrets
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+HOSTS: Final = ("127.0.0.1", "localhost")
+"""Names of this machine in the address of the page."""
+
+HEADERS: Final = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:;"
+        " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+"""Headers of every answer: nothing is fetched from elsewhere, the page stands in no other."""
+
+
+class Guard:
+    """Checks of one server.
+
+    Parameters
+    ----------
+    port : int
+        Port of the server.
+    token : str, optional
+        What the address has to hold; by default a new random one.
+    """
+
+    def __init__(self, port: int, token: str | None = None) -> None:
+        self.port = port
+        self.token = token or secrets.token_urlsafe(24)
+
+    @property
+    def address(self) -> str:
+        """Address of the page."""
+        return f"http://{HOSTS[0]}:{self.port}/?token={self.token}"
+
+    def refuse(self, headers: Mapping[str, str], token: str | None = None, origin: bool = False) -> str:
+        """Return why a request is refused, or nothing.
+
+        Parameters
+        ----------
+        headers : mapping
+            Of the request.
+        token : str, optional
+            From its address; None where none is needed.
+        origin : bool, optional
+            Whether it has to come from a page of this server.
+        """
+        # Another name for 127.0.0.1 would let a foreign page reach the server as its own (DNS rebinding).
+        if headers.get("host", "") not in {f"{name}:{self.port}" for name in HOSTS}:
+            return f"the host is expected to be {HOSTS[0]}:{self.port}"
+        if origin and headers.get("origin", "") not in {f"http://{name}:{self.port}" for name in HOSTS}:
+            return "the request is expected to come from a page of the studio"
+        if token is not None and not secrets.compare_digest(token.encode(), self.token.encode()):
+            return "the address is expected to hold the token that the studio printed"
+        return ""

@@ -1,0 +1,141 @@
+// Axes of a plane: ticks at round numbers, labels, and the way from quantities to pixels.
+import { colours, FONT } from "./theme.js";
+import { digits } from "./units.js";
+
+export const MARGIN = { left: 46, right: 10, top: 8, bottom: 32 };
+
+/** Return round numbers between two ends, about one every `space` pixels. */
+export function ticks(low, high, length, space) {
+  const wish = ((high - low) * space) / Math.max(length, 1);
+  const power = 10 ** Math.floor(Math.log10(wish));
+  const step = [1, 2, 5, 10].find((factor) => factor * power >= wish) * power;
+  const list = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k += 1) list.push(k * step);
+  return Number.isFinite(step) && list.length < 100 ? list : [];
+}
+
+/** Widen a range by a part of itself; make one of a single number. */
+export function widened(low, high, part = 0.04) {
+  if (!(high > low)) return [low - 1, low + 1];
+  const more = part * (high - low);
+  return [low - more, high + more];
+}
+
+/**
+ * Draw axes; x and y are { low, high, label, factor } with the factor from SI to what is written.
+ * Returns the pixel of a quantity, the quantity of a pixel, and the box.
+ */
+export function axes(pen, width, height, x, y, margin = MARGIN) {
+  const c = colours();
+  const box = { x: margin.left, y: margin.top, w: width - margin.left - margin.right, h: height - margin.top - margin.bottom };
+  const X = (value) => box.x + ((value - x.low) / (x.high - x.low)) * box.w;
+  const Y = (value) => box.y + box.h - ((value - y.low) / (y.high - y.low)) * box.h;
+  pen.save();
+  pen.font = FONT;
+  pen.lineWidth = 1;
+  pen.fillStyle = c.muted;
+  pen.strokeStyle = c.faint;
+  pen.textAlign = "center";
+  pen.textBaseline = "top";
+  for (const tick of ticks(x.low * x.factor, x.high * x.factor, box.w, x.space ?? 60)) {
+    const place = X(tick / x.factor);
+    line(pen, place, box.y, place, box.y + box.h);
+    pen.fillText(digits(Number(tick.toPrecision(6))), place, box.y + box.h + 4);
+  }
+  pen.textAlign = "right";
+  pen.textBaseline = "middle";
+  for (const tick of ticks(y.low * y.factor, y.high * y.factor, box.h, 30)) {
+    const place = Y(tick / y.factor);
+    line(pen, box.x, place, box.x + box.w, place);
+    pen.fillText(digits(Number(tick.toPrecision(6))), box.x - 5, place);
+  }
+  pen.textAlign = "center";
+  pen.textBaseline = "top";
+  pen.fillText(x.label, box.x + box.w / 2, box.y + box.h + 17);
+  pen.save();
+  pen.translate(3, box.y + box.h / 2);
+  pen.rotate(-Math.PI / 2);
+  pen.fillText(y.label, 0, 0);
+  pen.restore();
+  pen.restore();
+  return { X, Y, box, x: (place) => x.low + ((place - box.x) / box.w) * (x.high - x.low), y: (place) => y.low + ((box.y + box.h - place) / box.h) * (y.high - y.low) };
+}
+
+export function line(pen, x0, y0, x1, y1) {
+  pen.beginPath();
+  pen.moveTo(x0, y0);
+  pen.lineTo(x1, y1);
+  pen.stroke();
+}
+
+/** Draw a curve through the points that `use` lets pass; a gap where it does not. */
+export function curve(pen, plane, xs, ys, use = null) {
+  pen.beginPath();
+  let on = false;
+  for (let k = 0; k < xs.length; k += 1) {
+    if (use && !use(k)) { on = false; continue; }
+    if (on) pen.lineTo(plane.X(xs[k]), plane.Y(ys[k]));
+    else pen.moveTo(plane.X(xs[k]), plane.Y(ys[k]));
+    on = true;
+  }
+  pen.stroke();
+}
+
+export function dots(pen, plane, xs, ys, radius) {
+  for (let k = 0; k < xs.length; k += 1) {
+    if (!Number.isFinite(xs[k])) continue;
+    pen.beginPath();
+    pen.arc(plane.X(xs[k]), plane.Y(ys[k]), radius, 0, 2 * Math.PI);
+    pen.fill();
+  }
+}
+
+/** Keep what follows inside the box of a plane, until `pen.restore()`. */
+export function inside(pen, plane) {
+  pen.save();
+  pen.beginPath();
+  pen.rect(plane.box.x, plane.box.y, plane.box.w, plane.box.h);
+  pen.clip();
+}
+
+/** Return the smallest and the largest of numbers, at least the two given. */
+export function extent(values, low = Infinity, high = -Infinity) {
+  let [least, most] = [low, high];
+  for (const value of values) {
+    if (value < least) least = value;
+    if (value > most) most = value;
+  }
+  return [least, most];
+}
+
+/** Return the last index at which ascending numbers are not above a value. */
+export function before(values, value) {
+  let [low, high] = [0, values.length - 1];
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (values[middle] <= value) low = middle;
+    else high = middle - 1;
+  }
+  return low;
+}
+
+/** A key: coloured strokes with names, from the right end of a box to the left. */
+export function key(pen, box, entries) {
+  const c = colours();
+  pen.save();
+  pen.font = FONT;
+  pen.textBaseline = "middle";
+  pen.textAlign = "right";
+  let place = box.x + box.w - 4;
+  for (const { name, colour, dash = [] } of [...entries].reverse()) {
+    pen.fillStyle = c.ink;
+    pen.fillText(name, place, box.y + 8);
+    place -= pen.measureText(name).width + 4;
+    pen.strokeStyle = colour;
+    pen.lineWidth = 2;
+    pen.setLineDash(dash);
+    line(pen, place - 14, box.y + 8, place, box.y + 8);
+    place -= 24;
+  }
+  pen.restore();
+}

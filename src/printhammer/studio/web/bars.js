@@ -1,0 +1,122 @@
+// What each firing did: energies of the dots, and the line that they print.
+import { axes, line } from "./axes.js";
+import { surface } from "./pen.js";
+import { colours, FONT } from "./theme.js";
+import { shown, unitOf } from "./units.js";
+
+/** Energy that each dot put into the pack, and what the pack kept. */
+export function energyView(body, studio) {
+  const paint = (pen, width, height) => {
+    const frame = studio.frames.dots;
+    if (!frame) return;
+    const c = colours();
+    const { dots, energy } = frame;
+    const unit = unitOf("J");
+    const most = Math.max(...dots.map((dot) => dot.loading_work ?? 0), 1e-12);
+    const margin = { left: 46, right: 10, top: 38, bottom: 32 };
+    const plane = axes(pen, width, height, { low: 0.5, high: dots.length + 0.5, label: "firing", factor: 1, space: 30 }, { low: 0, high: 1.08 * most, label: `energy, ${unit.name}`, factor: unit.factor }, margin);
+    const wide = Math.min((plane.box.w / dots.length) * 0.36, 16);
+    dots.forEach((dot, k) => {
+      const middle = plane.X(k + 1);
+      if (!dot.struck) {
+        cross(pen, middle, plane.Y(0) - 8, c.lost);
+        return;
+      }
+      bar(pen, plane, middle - wide, wide - 0.5, dot.loading_work, c.x);
+      bar(pen, plane, middle + 0.5, wide - 0.5, dot.net_loss, c.pack);
+    });
+    pen.save();
+    pen.font = FONT;
+    pen.textAlign = "left";
+    pen.textBaseline = "top";
+    pen.fillStyle = c.ink;
+    let place = 6;
+    pen.fillText(`coil ${shown(energy.coil_work, "J", 3)}, pack ${shown(energy.pack_loss, "J", 3)}, backstop ${shown(energy.backstop_loss, "J", 3)}`, 6, 20);
+    for (const [colour, text] of [[c.x, "into the pack"], [c.pack, "kept by it"]]) {
+      pen.fillStyle = colour;
+      pen.fillRect(place, 6, 9, 9);
+      place += 13;
+      pen.fillStyle = c.ink;
+      pen.fillText(text, place, 5);
+      place += pen.measureText(text).width + 12;
+    }
+    pen.restore();
+  };
+  return barsOf(body, studio, "Energy of each dot", paint, ["loading_work", "net_loss"], "J");
+}
+
+/** The dots as they come out on paper that moves past the hammer: place by arrival, size by force. */
+export function lineView(body, studio) {
+  const paint = (pen, width, height) => {
+    const [frame, motion] = [studio.frames.dots, studio.frames.motion];
+    if (!frame || !motion) return;
+    const c = colours();
+    const { dots, quality } = frame;
+    const first = dots.find((dot) => dot.struck);
+    const [force, flight] = [first?.peak_force ?? 1, first?.flight_time ?? 0];
+    const period = 1 / studio.store.state.rate;
+    const slots = Math.max(Math.round(dots.at(-1).fired_at / period) + 1, 1);
+    const pitch = Math.min((width - 30) / slots, 40);
+    const left = (width - pitch * slots) / 2 + pitch / 2;
+    const middle = 0.42 * height;
+    pen.save();
+    pen.font = FONT;
+    pen.strokeStyle = c.faint;
+    pen.lineWidth = 1;
+    for (let slot = 0; slot < slots; slot += 1) line(pen, left + slot * pitch, middle - 20, left + slot * pitch, middle + 20);
+    dots.forEach((dot) => {
+      if (!dot.struck) {
+        cross(pen, left + (dot.fired_at / period) * pitch, middle, c.lost);
+        return;
+      }
+      const place = left + ((dot.fired_at + dot.flight_time - flight) / period) * pitch;
+      const part = Math.min(dot.peak_force / force, 1.6);
+      pen.fillStyle = c.ink;
+      pen.globalAlpha = Math.min(0.25 + 0.75 * part, 1);
+      pen.beginPath();
+      pen.arc(place, middle, Math.max(0.34 * pitch * Math.sqrt(part), 1.5), 0, 2 * Math.PI);
+      pen.fill();
+      pen.globalAlpha = 1;
+      if (dot.extra_contacts) {
+        pen.strokeStyle = c.lost;
+        pen.lineWidth = 1.5;
+        pen.beginPath();
+        pen.arc(place, middle, 0.5 * pitch + 2, 0, 2 * Math.PI);
+        pen.stroke();
+      }
+    });
+    pen.fillStyle = c.ink;
+    pen.textAlign = "center";
+    const told = [
+      `${quality.struck} of ${quality.fired} dots struck, ${quality.extra} extra contacts`,
+      quality.struck ? `force ${shown(quality.force_low, "N", 3)} to ${shown(quality.force_high, "N", 3)}` : "",
+      quality.struck ? `flight time ${shown(quality.flight_low, "s", 4)} to ${shown(quality.flight_high, "s", 4)}` : "",
+    ];
+    told.forEach((text, k) => pen.fillText(text, width / 2, 0.42 * height + 44 + 16 * k));
+    pen.restore();
+  };
+  return barsOf(body, studio, "The line as it is printed", paint, ["flight_time", "peak_force"], "SI");
+}
+
+function barsOf(body, studio, label, paint, columns, unit) {
+  const area = surface(body, paint, label);
+  return {
+    update: (what) => what === "dots" && area.draw(), draw: area.draw, cursor: () => {}, paint,
+    table: () => {
+      const dots = studio.frames.dots?.dots;
+      return dots && { firing: dots.map((dot) => dot.index), "fired_at [s]": dots.map((dot) => dot.fired_at), struck: dots.map((dot) => Number(dot.struck)), ...Object.fromEntries(columns.map((name) => [`${name} [${unit}]`, dots.map((dot) => dot[name] ?? NaN)])), extra_contacts: dots.map((dot) => dot.extra_contacts) };
+    },
+  };
+}
+
+function bar(pen, plane, x, w, value, colour) {
+  pen.fillStyle = colour;
+  pen.fillRect(x, plane.Y(value), w, plane.Y(0) - plane.Y(value));
+}
+
+function cross(pen, x, y, colour) {
+  pen.strokeStyle = colour;
+  pen.lineWidth = 2;
+  line(pen, x - 5, y - 5, x + 5, y + 5);
+  line(pen, x - 5, y + 5, x + 5, y - 5);
+}

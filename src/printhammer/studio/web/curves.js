@@ -1,0 +1,224 @@
+// Displacement and current, and the forces, against time: drawn by uPlot, and by a pen where they are exported.
+import uPlot from "./vendor/uPlot.js";
+import { axes, before, curve, extent, inside, key, line, widened } from "./axes.js";
+import { colours, FONT } from "./theme.js";
+import { timeUnit, unitOf } from "./units.js";
+
+const FORCES = ["magnet", "spring", "pack", "backstop", "damping", "total"];
+const DASHES = { total: [6, 3], damping: [2, 2] };
+
+/** Displacement against time, with backstop, pack and platen, firings, and the drive on the right axis. */
+export function motionView(body, studio) {
+  return curveView(body, studio, {
+    label: "Displacement and drive against time",
+    series: () => [
+      { name: "displacement", si: "m", scale: "x", colour: colours().x, values: (f) => f.data.x },
+      { name: quantity(studio), si: studio.frames.motion?.quantity === "force" ? "N" : "A", scale: "drive", colour: colours().drive, values: (f) => f.data.drive, dash: [5, 3] },
+    ],
+    scales: (frame) => ({ x: placesRange(frame), drive: driveRange(frame) }),
+    under: (pen, plane, box) => places(pen, plane, box, studio.frames.motion),
+    over: (pen, plane) => ghosts(pen, plane, studio),
+  });
+}
+
+/** The forces of the law against time. */
+export function forcesView(body, studio) {
+  return curveView(body, studio, {
+    label: "Forces against time",
+    series: () => FORCES.map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
+    scales: (frame) => ({ x: widened(...FORCES.slice(0, -1).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
+    under: () => {},
+    over: () => {},
+  });
+}
+
+function quantity(studio) { return studio.frames.motion?.quantity === "force" ? "force" : "current"; }
+
+function placesRange(frame) {
+  const { backstop, platen } = frame.places;
+  const ends = extent(frame.data.x, ...[backstop, platen].filter((place) => place !== null).length === 2 ? [backstop, platen] : []);
+  return widened(...ends, 0.06);
+}
+
+function driveRange(frame) {
+  const [low, high] = extent(frame.data.drive, 0, 0);
+  // Below the motion, in the lowest third.
+  const most = Math.max(Math.abs(low), Math.abs(high)) || 1;
+  return [Math.min(low, 0) - 0.05 * most, 3.2 * most];
+}
+
+function places(pen, plane, box, frame) {
+  const c = colours();
+  const { backstop, front, platen } = frame.places;
+  pen.save();
+  pen.font = FONT;
+  pen.globalAlpha = 0.16;
+  pen.fillStyle = c.pack;
+  if (front !== null) pen.fillRect(box.x, plane.Y(platen ?? front), box.w, Math.max(plane.Y(front) - plane.Y(platen ?? front), 1));
+  pen.globalAlpha = 1;
+  for (const [name, place] of [["backstop", backstop], ["pack", front], ["platen", platen]]) {
+    if (place === null) continue;
+    pen.strokeStyle = c.muted;
+    pen.setLineDash([]);
+    pen.lineWidth = 0.8;
+    line(pen, box.x, plane.Y(place), box.x + box.w, plane.Y(place));
+    pen.fillStyle = c.muted;
+    pen.textAlign = "right";
+    const low = plane.Y(place) > box.y + 16;
+    pen.textBaseline = low ? "bottom" : "top";
+    pen.fillText(name, box.x + box.w - 3, plane.Y(place) + (low ? -1 : 2));
+  }
+  pen.strokeStyle = c.drive;
+  pen.lineWidth = 1;
+  for (const fired of frame.fired) line(pen, plane.X(fired), box.y + box.h, plane.X(fired), box.y + box.h - 6);
+  pen.restore();
+}
+
+function ghosts(pen, plane, studio) {
+  const c = colours();
+  pen.setLineDash([]);
+  for (const ghost of studio.ghosts) {
+    pen.strokeStyle = c.ghost;
+    pen.lineWidth = 1.2;
+    curve(pen, plane, ghost.motion.data.t, ghost.motion.data.x);
+  }
+  if (studio.overlay?.what === "displacement") {
+    pen.strokeStyle = c.overlay;
+    pen.lineWidth = 1.5;
+    curve(pen, plane, studio.overlay.data.t, studio.overlay.data.values);
+  }
+}
+
+function curveView(body, studio, kind) {
+  let plot = null;
+  let made = "";
+  let size = [0, 0];
+  const holder = body.appendChild(document.createElement("div"));
+  holder.className = "curves";
+  holder.setAttribute("role", "img");
+  holder.setAttribute("aria-label", kind.label);
+
+  const planeOf = (u) => {
+    const ratio = uPlot.pxRatio;
+    const box = { x: u.bbox.left / ratio, y: u.bbox.top / ratio, w: u.bbox.width / ratio, h: u.bbox.height / ratio };
+    return { box, X: (t) => box.x + u.valToPos(t, "t"), Y: (x) => box.y + u.valToPos(x, "x") };
+  };
+  const scaled = (u, draw) => {
+    const ratio = uPlot.pxRatio;
+    u.ctx.save();
+    u.ctx.scale(ratio, ratio);
+    const plane = planeOf(u);
+    inside(u.ctx, plane);
+    draw(u.ctx, plane, plane.box);
+    u.ctx.restore();
+    u.ctx.restore();
+  };
+
+  function build() {
+    const c = colours();
+    const series = kind.series();
+    const right = series.find((entry) => entry.scale === "drive");
+    const axis = (scale, si, label, side) => ({
+      scale, side, font: FONT, labelFont: FONT, stroke: right && side !== 2 ? (side === 3 ? c.x : c.drive) : c.muted, labelSize: 16, labelGap: 0, gap: 3,
+      size: side === 2 ? 18 : 36, label, space: side === 2 ? 60 : 30,
+      grid: { stroke: c.faint, width: 1, show: side !== 1 }, ticks: { show: false },
+      values: (u, ticks) => ticks.map((tick) => (tick === null ? "" : Number((tick * shownIn(u, si).factor).toPrecision(6)))),
+      splits: (u, _axis, low, high, step) => roundSplits(low, high, step, shownIn(u, si).factor),
+      ...(side === 1 ? { filter: (u, splits) => splits.map((value) => (value <= 1.01 * (studio.frames.motion?.peak ?? 0) ? value : null)) } : {}),
+    });
+    const main = series[0];
+    plot?.destroy();
+    plot = new uPlot({
+      width: size[0], height: size[1], pxAlign: 0, legend: { show: false }, padding: [4, right ? 0 : 8, 0, 0],
+      cursor: { sync: { key: "time", setSeries: false, scales: ["t", null] }, drag: { x: true, y: false, setScale: true }, points: { show: false }, bind: { dblclick: () => () => { studio.zoom(null); return null; } } },
+      scales: { t: { time: false, auto: false }, x: { auto: false }, drive: { auto: false } },
+      axes: [axis("t", "s", (u) => `time, ${shownIn(u, "s").name}`, 2), axis("x", main.si, `${kind.series().length > 2 ? "force" : main.name}, ${unitOf(main.si).name}`, 3), ...(right ? [axis("drive", right.si, `${right.name}, ${unitOf(right.si).name}`, 1)] : [])],
+      series: [{ scale: "t" }, ...series.map((entry) => ({ scale: entry.scale, stroke: entry.colour, width: 1.3, dash: entry.dash, points: { show: false } }))],
+      hooks: {
+        drawAxes: [(u) => { if (studio.frames.motion) scaled(u, kind.under); }],
+        draw: [(u) => { if (studio.frames.motion) scaled(u, (pen, plane, box) => { kind.over(pen, plane, box); if (!right) key(pen, box, series); }); }],
+        setCursor: [(u) => { if (u.cursor.event && u.cursor.left >= 0) studio.setCursor(u.posToVal(u.cursor.left, "t"), holder); }],
+        setSelect: [(u) => { if (u.select.width > 4) studio.zoom([u.posToVal(u.select.left, "t"), u.posToVal(u.select.left + u.select.width, "t")]); }],
+      },
+    }, [[0, 1], ...series.map(() => [0, 0])], holder);
+    made = style();
+  }
+  const style = () => JSON.stringify([unitOf("s"), unitOf("m"), unitOf("N"), quantity(studio), colours()]);
+
+  function draw() {
+    const frame = studio.frames.motion;
+    if (!frame || size[0] < 40 || size[1] < 40) return;
+    if (!plot || made !== style()) build();
+    const { t } = frame.data;
+    const [low, high] = studio.window ?? [t[0], t[t.length - 1]];
+    plot.batch(() => {
+      plot.setData([t, ...kind.series().map((entry) => entry.values(frame))], false);
+      plot.setScale("t", { min: low, max: high });
+      for (const [name, [min, max]] of Object.entries(kind.scales(frame))) plot.setScale(name, { min, max });
+    });
+    cursor();
+  }
+
+  function cursor() {
+    if (!plot || studio.cursorFrom === holder || !studio.frames.motion) return;
+    plot.setCursor({ left: plot.valToPos(studio.cursor, "t"), top: -10 }, false);
+  }
+
+  new ResizeObserver(([entry]) => {
+    size = [Math.floor(entry.contentRect.width), Math.floor(entry.contentRect.height)];
+    if (plot && size[0] > 40 && size[1] > 40) plot.setSize({ width: size[0], height: size[1] });
+    draw();
+  }).observe(body);
+
+  function paint(pen, width, height) {
+    const frame = studio.frames.motion;
+    if (!frame) return;
+    const { t } = frame.data;
+    const [low, high] = studio.window ?? [t[0], t[t.length - 1]];
+    const series = kind.series();
+    const scales = kind.scales(frame);
+    const time = timeUnit(high - low);
+    const main = unitOf(series[0].si);
+    const x = { low, high, label: `time, ${time.name}`, factor: time.factor };
+    const y = { low: scales.x[0], high: scales.x[1], label: `${series.length > 2 ? "force" : series[0].name}, ${main.name}`, factor: main.factor };
+    const plane = axes(pen, width, height, x, y);
+    inside(pen, plane);
+    kind.under(pen, plane, plane.box);
+    for (const entry of series) {
+      const ends = scales[entry.scale];
+      const own = { X: plane.X, Y: (value) => plane.box.y + plane.box.h * (1 - (value - ends[0]) / (ends[1] - ends[0])) };
+      pen.strokeStyle = entry.colour;
+      pen.lineWidth = 1.3;
+      pen.setLineDash(entry.dash ?? []);
+      curve(pen, own, t, entry.values(frame));
+    }
+    kind.over(pen, plane, plane.box);
+    key(pen, plane.box, series);
+    pen.restore();
+    pen.setLineDash([]);
+  }
+
+  const table = () => {
+    const frame = studio.frames.motion;
+    return frame && { "time [s]": frame.data.t, ...Object.fromEntries(kind.series().map((entry) => [`${entry.name} [${entry.si}]`, entry.values(frame)])) };
+  };
+  return { update: (what) => what === "motion" && draw(), draw, cursor, paint, table };
+}
+
+function shownIn(u, si) { return si === "s" ? timeUnit(u.scales.t.max - u.scales.t.min) : unitOf(si); }
+
+function roundSplits(low, high, step, factor) {
+  const power = 10 ** Math.floor(Math.log10(step * factor));
+  const round = [1, 2, 5, 10].find((part) => part * power >= step * factor * 0.999) * power;
+  const list = [];
+  for (let k = Math.ceil((low * factor) / round - 1e-9); k * round <= high * factor * (1 + 1e-9); k += 1) list.push((k * round) / factor);
+  return list;
+}
+
+/** Return the displacement of a motion at a time, between the points next to it. */
+export function displacementAt(frame, time) {
+  const { t, x } = frame.data;
+  const k = Math.min(before(t, time), t.length - 2);
+  const part = t[k + 1] > t[k] ? Math.min(Math.max((time - t[k]) / (t[k + 1] - t[k]), 0), 1) : 0;
+  return x[k] + part * (x[k + 1] - x[k]);
+}

@@ -1,0 +1,48 @@
+// What leaves the studio: files to keep, texts to copy.
+import { SvgPen } from "./pen.js";
+import { colours } from "./theme.js";
+
+export function save(name, content, type) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+/** Copy a text; where the browser does not allow it, show it to be copied. */
+export async function copy(text, studio, what) {
+  try {
+    await navigator.clipboard.writeText(text);
+    studio.say(`${what} copied`);
+  } catch {
+    studio.showText(what, text);
+  }
+}
+
+export function csvOf(table) {
+  const names = Object.keys(table);
+  const rows = [names.join(",")];
+  const count = table[names[0]].length;
+  for (let k = 0; k < count; k += 1) rows.push(names.map((name) => (Number.isFinite(table[name][k]) ? table[name][k] : "")).join(","));
+  return `${rows.join("\n")}\n`;
+}
+
+export function svgOf(view, width, height) {
+  const pen = new SvgPen(width, height);
+  pen.fillStyle = colours().panel;
+  pen.fillRect(0, 0, width, height);
+  view.paint(pen, width, height);
+  return pen.text();
+}
+
+export async function pngOf(view, width, height) {
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [2 * width, 2 * height];
+  const pen = canvas.getContext("2d");
+  pen.scale(2, 2);
+  pen.fillStyle = colours().panel;
+  pen.fillRect(0, 0, width, height);
+  view.paint(pen, width, height);
+  return new Promise((done) => { canvas.toBlob(done, "image/png"); });
+}

@@ -1,0 +1,162 @@
+// The frequency-time map: colours of displacement, and a cursor that sets the rate.
+import { axes, line } from "./axes.js";
+import { surface } from "./pen.js";
+import { colours } from "./theme.js";
+import { shown, timeUnit } from "./units.js";
+
+// Cividis (J. R. Nunez, C. R. Anderton, R. S. Renslow, PLoS ONE 13 (2018) e0199239), every fourth colour.
+const CIVIDIS = "00224e00255400285b002b62002e6a0030700533711235701a386f213b6e273e6e2d416d32436d36466c3b496c3f4c6c434e6c47516c4b546c4f576c535a6d565c6d5a5f6e5e626e61656f656870686a716c6d726f70737273747676767979777d7c78807f788482798885788c8878908b78938e789791779b94769f9775a39a74a79d73aba072afa471b4a76fb8aa6ebcae6cc0b16ac4b468c8b866cdbb63d1bf61d5c25edac65bdec958e2cd54e7d150ebd44bf0d846f5dc41f9e03afee434";
+const CONTACT = [[253, 190, 133], [166, 54, 3]];
+const GAP = 65535;
+const MARGIN = { left: 54, right: 12, top: 8, bottom: 32 };
+
+/** Return 65536 colours: cividis from backstop to pack, orange to brown inside the pack, grey where unknown. */
+function palette(low, high, front, dark) {
+  const table = new Uint32Array(65536);
+  const border = front === null ? GAP : Math.min(Math.max(((front - low) / (high - low)) * (GAP - 1), 1), GAP);
+  const stops = CIVIDIS.length / 6;
+  const little = (r, g, b) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
+  for (let code = 0; code < GAP; code += 1) {
+    if (code < border) {
+      const at = Math.min(Math.floor((code / border) * stops), stops - 1);
+      const colour = parseInt(CIVIDIS.slice(6 * at, 6 * at + 6), 16);
+      table[code] = little(colour >> 16, (colour >> 8) & 255, colour & 255);
+    } else {
+      const part = Math.min((code - border) / Math.max((GAP - border) * 0.6, 1), 1);
+      table[code] = little(...CONTACT[0].map((start, k) => Math.round(start + part * (CONTACT[1][k] - start))));
+    }
+  }
+  table[GAP] = dark ? little(60, 60, 60) : little(230, 230, 230);
+  return table;
+}
+
+export function mapView(body, studio) {
+  const image = document.createElement("canvas");
+  let colourOf = null;
+  let colourKey = "";
+  let plane = null;
+
+  function render(frame) {
+    const [rows, columns] = frame.data.codes.shape;
+    const key = JSON.stringify([frame.low, frame.high, frame.front, colours().dark]);
+    if (key !== colourKey) [colourOf, colourKey] = [palette(frame.low, frame.high, frame.front, colours().dark), key];
+    image.width = columns;
+    image.height = rows;
+    const pixels = new ImageData(columns, rows);
+    const out = new Uint32Array(pixels.data.buffer);
+    const codes = frame.data.codes;
+    for (let row = 0; row < rows; row += 1) {
+      const [from, to] = [row * columns, (rows - 1 - row) * columns];
+      for (let k = 0; k < columns; k += 1) out[to + k] = colourOf[codes[from + k]];
+    }
+    image.getContext("2d").putImageData(pixels, 0, 0);
+  }
+
+  function paint(pen, width, height) {
+    const frame = studio.frames.map;
+    if (!frame) return;
+    const c = colours();
+    const time = timeUnit(frame.end);
+    const x = { low: 0, high: frame.end, label: `time, ${time.name}`, factor: time.factor };
+    const y = { low: frame.rates[0], high: frame.rates[1], label: "firing rate, Hz", factor: 1 };
+    plane = axes(pen, width, height, x, y, MARGIN);
+    const { box } = plane;
+    pen.imageSmoothingEnabled = false;
+    pen.drawImage(image, box.x, box.y, box.w, box.h);
+    pen.save();
+    const rate = studio.store.state.rate;
+    const place = plane.Y(rate);
+    if (place >= box.y - 1 && place <= box.y + box.h + 1) {
+      for (const [colour, thick] of [["#000", 3], ["#fff", 1.2]]) {
+        pen.strokeStyle = colour;
+        pen.lineWidth = thick;
+        line(pen, box.x, place, box.x + box.w, place);
+      }
+    }
+    const now = plane.X(studio.cursor);
+    if (now >= box.x && now <= box.x + box.w) {
+      pen.strokeStyle = "#fff";
+      pen.lineWidth = 1;
+      pen.setLineDash([2, 3]);
+      line(pen, now, box.y, now, box.y + box.h);
+    }
+    pen.setLineDash([]);
+    pen.strokeStyle = c.muted;
+    pen.strokeRect(box.x, box.y, box.w, box.h);
+    pen.restore();
+  }
+
+  const area = surface(body, paint, "Frequency-time map");
+  const { canvas } = area;
+  canvas.tabIndex = 0;
+  canvas.setAttribute("role", "slider");
+  canvas.setAttribute("aria-label", "Frequency-time map: firing rate");
+  canvas.setAttribute("aria-orientation", "vertical");
+  const tip = body.appendChild(document.createElement("div"));
+  tip.className = "tip";
+
+  const choose = (event) => {
+    if (!plane) return;
+    const bounds = canvas.getBoundingClientRect();
+    const rate = plane.y(Math.min(Math.max(event.clientY - bounds.top, plane.box.y), plane.box.y + plane.box.h));
+    studio.store.set({ rate: Number(rate.toPrecision(5)) }, "rate");
+  };
+  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); choose(event); });
+  canvas.addEventListener("pointermove", (event) => {
+    if (event.buttons & 1) choose(event);
+    read(event);
+  });
+  canvas.addEventListener("pointerleave", () => { tip.textContent = ""; });
+  canvas.addEventListener("keydown", (event) => {
+    const step = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
+    if (!step || !studio.frames.map) return;
+    event.preventDefault();
+    const [low, high] = studio.frames.map.rates;
+    const rate = studio.store.state.rate + (step * (high - low)) / 200;
+    studio.store.set({ rate: Number(Math.min(Math.max(rate, low), high).toPrecision(5)) }, "rate");
+  });
+
+  /** Tell time, rate and displacement below the pointer. */
+  function read(event) {
+    const frame = studio.frames.map;
+    const bounds = canvas.getBoundingClientRect();
+    if (!frame || !plane) return;
+    const [time, rate] = [plane.x(event.clientX - bounds.left), plane.y(event.clientY - bounds.top)];
+    const [rows, columns] = frame.data.codes.shape;
+    const row = Math.round(((rate - frame.rates[0]) / (frame.rates[1] - frame.rates[0])) * (rows - 1));
+    const column = Math.round((time / frame.end) * (columns - 1));
+    const code = row >= 0 && row < rows && column >= 0 && column < columns ? frame.data.codes[row * columns + column] : GAP;
+    const x = frame.low + (code / (GAP - 1)) * (frame.high - frame.low);
+    tip.textContent = code === GAP ? "" : `${shown(rate, "Hz")}, ${shown(time, "s")}: ${shown(x, "m")}`;
+  }
+
+  function refresh() {
+    const { rate } = studio.store.state;
+    const [low, high] = studio.frames.map?.rates ?? [rate, rate];
+    canvas.setAttribute("aria-valuemin", low);
+    canvas.setAttribute("aria-valuemax", high);
+    canvas.setAttribute("aria-valuenow", rate);
+    area.draw();
+  }
+  return {
+    update: (what) => {
+      if (what === "map") render(studio.frames.map);
+      if (what === "map" || what === "state") refresh();
+    },
+    draw: () => { if (studio.frames.map) render(studio.frames.map); refresh(); },
+    cursor: area.draw,
+    paint,
+    table: () => {
+      const frame = studio.frames.map;
+      if (!frame) return null;
+      const [rows, columns] = frame.data.codes.shape;
+      const at = (k, count, low, high) => low + (k / (count - 1)) * (high - low);
+      const all = [...frame.data.codes.keys()];
+      return {
+        "rate [Hz]": all.map((k) => at(Math.floor(k / columns), rows, ...frame.rates)),
+        "time [s]": all.map((k) => at(k % columns, columns, 0, frame.end)),
+        "displacement [m]": all.map((k) => (frame.data.codes[k] === GAP ? NaN : at(frame.data.codes[k], GAP, frame.low, frame.high))),
+      };
+    },
+  };
+}

@@ -1,0 +1,224 @@
+// The studio in an element: `mount(element, send)` returns what takes the server's frames.
+import { energyView, lineView } from "./bars.js";
+import { buildControls } from "./controls.js";
+import { forcesView, motionView } from "./curves.js";
+import { element as make } from "./dom.js";
+import { decode } from "./frames.js";
+import { bindKeys } from "./keys.js";
+import { mapView } from "./map.js";
+import { layout } from "./panels.js";
+import { loopsView, phaseView, strobeView } from "./planes.js";
+import { sketchView } from "./sketch.js";
+import { fromText, START, Store, toText } from "./state.js";
+import { readColours } from "./theme.js";
+import { setSystem, setUnits } from "./units.js";
+
+const MAKERS = { motion: motionView, sketch: sketchView, map: mapView, forces: forcesView, phase: phaseView, strobe: strobeView, loops: loopsView, energy: energyView, line: lineView };
+const MOST_GHOSTS = 4;
+
+/**
+ * Build the studio.
+ * element: where; send: takes the text of a message; address: { read, write, address } of the state, if there is one.
+ */
+export function mount(element, send, address = { read: () => "", write: () => {}, address: () => "" }) {
+  const studio = {
+    element, store: new Store({ ...START }), frames: {}, ghosts: [], overlay: null, cursor: 0, cursorFrom: null, window: null,
+    described: null, offered: [], limits: {}, shapes: {}, views: {}, serial: Math.floor(Math.random() * 2 ** 40), sentAt: new Map(), busy: false, stale: false,
+  };
+  let follow = () => {};
+  let queue = [];
+  let writing = 0;
+  let begun = false;
+  const asked = new Map();
+
+  const message = (kind, content) => {
+    studio.serial += 1;
+    send(JSON.stringify({ kind, serial: studio.serial, ...content }));
+    return studio.serial;
+  };
+  /** Ask the server a question; the answer is a frame. */
+  studio.ask = (kind, content) => new Promise((done) => { asked.set(message(kind, content), done); });
+
+  /** Send the state; one is under way at a time, and the latest follows it. */
+  studio.sendState = () => {
+    if (!studio.described) return;
+    if (studio.busy) { studio.stale = true; return; }
+    studio.busy = true;
+    studio.stale = false;
+    const now = studio.changedAt ?? performance.now();
+    studio.sentAt.set(message("state", { state: studio.store.state }), now);
+    studio.changedAt = null;
+    for (const serial of studio.sentAt.keys()) if (serial < studio.serial - 64) studio.sentAt.delete(serial);
+  };
+
+  studio.quantity = () => (studio.described.constants.some((constant) => constant.section === "magnet") ? "current" : "force");
+  studio.setCursor = (time, from = null) => {
+    const t = studio.frames.motion?.data.t;
+    if (!t) return;
+    studio.cursor = Math.min(Math.max(time, t[0]), t[t.length - 1]);
+    studio.cursorFrom = from;
+    redraw("cursor");
+  };
+  studio.zoom = (range) => {
+    studio.window = range;
+    for (const name of ["motion", "forces"]) studio.views[name]?.draw();
+  };
+  studio.hint = (text) => { studio.parts.hint.textContent = text; };
+  studio.say = (text, bad = false) => {
+    studio.parts.status.textContent = text;
+    studio.parts.status.classList.toggle("bad", bad);
+  };
+  studio.showText = (title, text) => {
+    const box = make("textarea", { readonly: true, rows: 14, "aria-label": title });
+    box.value = text;
+    studio.parts.dialog.replaceChildren(make("h2", {}, title), box, make("form", { method: "dialog" }, make("button", {}, "Close")));
+    studio.parts.dialog.showModal();
+    box.select();
+  };
+
+  const dirty = new Set();
+  let pending = 0;
+  function redraw(what) {
+    dirty.add(what);
+    pending ||= requestAnimationFrame(() => {
+      pending = 0;
+      const list = [...dirty];
+      dirty.clear();
+      for (const name of studio.store.state.views) {
+        const view = studio.views[name];
+        if (!view) continue;
+        for (const kind of list) {
+          if (kind === "cursor") { if (!list.includes("motion")) view.cursor(); } else view.update(kind);
+        }
+      }
+      if (list.includes("motion")) follow();
+      report(queue.splice(0));
+    });
+  }
+
+  /** Tell, after the next paint, how long a state took to be seen. */
+  function report(seen) {
+    if (!seen.length) return;
+    const channel = new MessageChannel();
+    channel.port1.onmessage = () => {
+      for (const { kind, detail, serial } of seen) {
+        const took = studio.sentAt.has(serial) ? performance.now() - studio.sentAt.get(serial) : null;
+        element.dispatchEvent(new CustomEvent("painted", { detail: { kind, detail, serial, took } }));
+      }
+    };
+    channel.port2.postMessage(0);
+  }
+
+  studio.pin = () => {
+    if (!studio.frames.motion) return;
+    studio.ghosts = [...studio.ghosts, { motion: studio.frames.motion, state: studio.store.state }].slice(-MOST_GHOSTS);
+    studio.say(`pinned, ${studio.ghosts.length} of ${MOST_GHOSTS}`);
+    redrawAll();
+  };
+  studio.unpin = () => { studio.ghosts = []; studio.overlay = null; redrawAll(); studio.say("pins taken away"); };
+  const redrawAll = () => { for (const name of studio.store.state.views) studio.views[name]?.draw(); };
+  studio.units = (system) => { setSystem(system); follow(); redrawAll(); };
+  studio.theme = () => { readColours(element.querySelector(".studio")); redrawAll(); follow(); };
+
+  /** Describe the hammer of a state anew, then take the state: as a step of the history, or as it is there already. */
+  async function load(state, step = true) {
+    const frame = await studio.ask("hammer", { name: state.text ? "" : state.hammer, text: state.text });
+    if (frame.kind === "refusal") {
+      studio.say(frame.reason, true);
+      if (!studio.described && (state.text || state.hammer)) await load({ ...START });
+      return;
+    }
+    Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes });
+    setUnits(frame.units);
+    const waveform = state.waveform ?? (frame.hammer.waveform ? null : { shape: "half-sine", amplitude: 1, width: 3e-4, quantity: studio.quantity() });
+    studio.parts.hammers.replaceChildren(...[...frame.offered, ...(state.text ? ["dropped"] : [])].map((name) => make("option", { value: name }, name)));
+    studio.parts.hammers.value = state.text ? "dropped" : frame.asked;
+    studio.parts.honesty.textContent = honesty(frame.hammer);
+    studio.parts.honesty.title = frame.hammer.note;
+    follow = buildControls(studio.parts.controls, studio);
+    studio.loaded = state.text || frame.asked;
+    const whole = { ...state, hammer: state.text ? "" : frame.asked, waveform };
+    if (!begun) studio.store.begin(whole);
+    else if (step) studio.store.set(whole);
+    else studio.store.tell();
+    begun = true;
+  }
+  studio.choose = (name) => load({ ...studio.store.state, hammer: name, text: "", constants: {}, waveform: null });
+  studio.open = (text) => { if (text !== toText(studio.store.state)) load(fromText(text)); };
+  studio.preset = (patch) => studio.store.set(patch);
+
+  studio.drop = async (file) => {
+    if (file.size > studio.limits.file) {
+      studio.say(`${file.name} has ${file.size} bytes, expected at most ${studio.limits.file}`, true);
+      return;
+    }
+    const frame = await studio.ask("drop", { name: file.name, text: await file.text() });
+    if (frame.kind === "refusal") studio.say(frame.reason, true);
+    else if (frame.what === "hammer") load({ ...studio.store.state, hammer: "", text: frame.text, constants: {}, waveform: null });
+    else if (frame.what === "displacement") {
+      studio.overlay = frame;
+      studio.say(`${frame.name} laid over the motion`);
+      redrawAll();
+    } else studio.store.set({ waveform: { shape: "sampled", times: [...frame.data.t], values: [...frame.data.values], quantity: frame.what } });
+  };
+
+  studio.store.listeners.add((state) => {
+    const wanted = state.text || state.hammer;
+    if (wanted !== studio.loaded) { load(state, false); return; }
+    studio.changedAt ??= performance.now();
+    studio.sendState();
+    follow();
+    redraw("state");
+    studio.layout.show(state.views);
+    clearTimeout(writing);
+    writing = setTimeout(() => address.write(toText(studio.store.state)), 150);
+  });
+
+  studio.parts = layout(studio, MAKERS);
+  studio.layout = studio.parts.layout;
+  studio.address = address.address;
+  bindKeys(studio);
+  readColours(element.querySelector(".studio"));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", studio.theme);
+  load(fromText(address.read()));
+
+  return {
+    studio,
+    open: studio.open,
+    connected: () => { if (studio.described) { studio.busy = false; studio.sendState(); } studio.say("ready"); },
+    lost: (reason, again) => {
+      studio.busy = false;
+      studio.say(`the connection ended${reason ? `: ${reason}` : ""}; press Enter here to connect again`, true);
+      studio.parts.status.tabIndex = 0;
+      studio.parts.status.onclick = again;
+      studio.parts.status.onkeydown = (event) => { if (event.key === "Enter") again(); };
+    },
+    receive: (buffer) => {
+      const frame = decode(buffer);
+      if (asked.has(frame.serial)) {
+        asked.get(frame.serial)(frame);
+        asked.delete(frame.serial);
+        return;
+      }
+      if (frame.kind === "motion" || frame.kind === "refusal") {
+        studio.busy = false;
+        if (studio.stale) studio.sendState();
+      }
+      if (frame.kind === "refusal") { studio.say(frame.reason, true); return; }
+      studio.frames[frame.kind] = frame;
+      if (frame.kind === "motion") {
+        studio.say(frame.message || `${frame.steps} steps, ${frame.status}`, frame.status !== "ok");
+        const t = frame.data.t;
+        studio.cursor = Math.min(studio.cursor, t[t.length - 1]);
+      }
+      queue.push({ kind: frame.kind, detail: frame.detail, serial: frame.serial });
+      redraw(frame.kind);
+    },
+  };
+}
+
+function honesty(hammer) {
+  const counts = {};
+  for (const { status } of hammer.constants) counts[status] = (counts[status] ?? 0) + 1;
+  return Object.entries(counts).map(([status, count]) => `${count} ${status}`).join(", ");
+}

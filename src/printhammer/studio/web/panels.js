@@ -1,0 +1,109 @@
+// The page: a bar, the controls, the views in a grid, and a line for hints.
+import { element as make } from "./dom.js";
+import { copy, csvOf, pngOf, save, svgOf } from "./exports.js";
+import { HELP } from "./keys.js";
+import { VIEWS } from "./state.js";
+
+const TITLES = { motion: "Motion", sketch: "Actuator", map: "Frequency-time map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Force-displacement loops", energy: "Energy per dot", line: "Printed line" };
+const PRESETS = {
+  "single pulse": { pulses: 1, pattern: "" }, "two pulses": { pulses: 2, pattern: "", rate: 1000 }, "burst of nine": { pulses: 9, pattern: "", rate: 1200 },
+  "fast burst": { pulses: 9, pattern: "", rate: 1800 }, "letters": { pattern: "1101011100101", rate: 1200 }, "long train": { pulses: 40, pattern: "", rate: 1000 },
+};
+
+export function layout(studio, makers) {
+  const button = (text, label, action, extra = {}) => make("button", { type: "button", title: label, "aria-label": label, onclick: action, ...extra }, text);
+  const hammers = make("select", { "aria-label": "hammer", onchange: () => { if (hammers.value !== "dropped") studio.choose(hammers.value); } });
+  const honesty = make("span", { class: "honesty" });
+  const presets = make("select", { "aria-label": "preset", onchange: () => { if (PRESETS[presets.value]) studio.preset(PRESETS[presets.value]); presets.value = ""; } },
+    make("option", { value: "" }, "preset …"), ...Object.keys(PRESETS).map((name) => make("option", { value: name }, name)));
+  const units = make("select", { "aria-label": "units", onchange: () => studio.units(Number(units.value)) }, make("option", { value: 0 }, "SI"), make("option", { value: 1 }, "inch-pound"));
+  const dialog = make("dialog", { "aria-label": "text" });
+  const file = make("input", { type: "file", hidden: true, accept: ".toml,.csv", onchange: () => { for (const each of file.files) studio.drop(each); file.value = ""; } });
+  const text = async (kind, action) => {
+    const frame = await studio.ask("texts", { state: studio.store.state });
+    if (frame.kind === "refusal") studio.say(frame.reason, true);
+    else action(frame.texts[kind]);
+  };
+  const out = make("select", { "aria-label": "export", class: "out" }, make("option", { value: "" }, "export …"));
+  const leaving = {
+    "hammer, TOML": () => text("hammer", (content) => save("studio-hammer.toml", content, "text/plain")),
+    "drive, TOML": () => text("drive", (content) => save("studio-drive.toml", content, "text/plain")),
+    "copy as Python": () => text("python", (content) => copy(content, studio, "Python")),
+    "copy as command": () => text("command", (content) => copy(content, studio, "command")),
+    "copy address": () => copy(studio.address(), studio, "address"),
+  };
+  out.append(...Object.keys(leaving).map((name) => make("option", { value: name }, name)));
+  out.addEventListener("change", () => { leaving[out.value]?.(); out.value = ""; });
+
+  const controls = make("div", { class: "controls" });
+  const hint = make("div", { class: "hint", "aria-live": "polite" });
+  const status = make("div", { class: "status", role: "status" });
+  const grid = make("main", { class: "grid" });
+  const chooser = make("div", { class: "chooser", role: "group", "aria-label": "views" });
+  const bar = make("header", { class: "bar" },
+    make("h1", {}, "printhammer studio"), hammers, honesty, presets, button("undo", "Undo (Ctrl+Z)", () => studio.store.undo(), { class: "undo" }), button("redo", "Redo (Ctrl+Shift+Z)", () => studio.store.redo(), { class: "redo" }),
+    button("pin", "Pin this run as a ghost (P)", studio.pin, { class: "pin" }), button("unpin", "Take all pins away (U)", studio.unpin),
+    out, button("open", "Open a hammer file or a measured CSV", () => file.click()), make("span", { class: "space" }), chooser, units,
+    button("◐", "Light or dark (T)", () => studio.toggleTheme(), { class: "theme" }), button("?", "Keys (?)", () => studio.help(), { class: "help" }), file);
+  const page = make("div", { class: "studio" }, bar, make("aside", { class: "side", "aria-label": "controls" }, controls, hint), grid, status, dialog);
+  studio.element.replaceChildren(page);
+
+  studio.toggleTheme = () => {
+    const dark = getComputedStyle(page).getPropertyValue("--dark").trim() === "1";
+    page.dataset.theme = dark ? "light" : "dark";
+    studio.theme();
+  };
+  studio.help = () => {
+    dialog.replaceChildren(make("h2", {}, "Keys"), make("dl", {}, ...HELP.flatMap(([keys, what]) => [make("dt", {}, keys), make("dd", {}, what)])), make("form", { method: "dialog" }, make("button", {}, "Close")));
+    dialog.showModal();
+  };
+
+  const panels = {};
+  for (const name of VIEWS) {
+    const body = make("div", { class: "body" });
+    const leave = make("select", { class: "leave", "aria-label": `save ${TITLES[name]}` }, ...["save …", "PNG", "SVG", "CSV"].map((kind, k) => make("option", { value: k ? kind : "" }, kind)));
+    const panel = make("section", { class: `panel view-${name}`, "aria-label": TITLES[name], hidden: true },
+      make("h2", {}, make("span", {}, TITLES[name]), leave, button("⤢", `Enlarge ${TITLES[name]}`, () => enlarge(name), { class: "enlarge" })), body);
+    grid.append(panel);
+    panels[name] = panel;
+    studio.views[name] = makers[name](body, studio);
+    leave.addEventListener("change", () => { leaveView(name, leave.value, body); leave.value = ""; });
+    chooser.append(make("button", { type: "button", "aria-pressed": "false", title: TITLES[name], "aria-label": TITLES[name], "data-view": name, onclick: () => toggle(name) }, String(VIEWS.indexOf(name) + 1)));
+  }
+
+  async function leaveView(name, kind, body) {
+    const view = studio.views[name];
+    const [width, height] = [Math.max(body.clientWidth, 480), Math.max(body.clientHeight, 320)];
+    const table = view.table();
+    if (!table) return;
+    if (kind === "CSV") save(`${name}.csv`, csvOf(table), "text/csv");
+    if (kind === "SVG") save(`${name}.svg`, svgOf(view, width, height), "image/svg+xml");
+    if (kind === "PNG") save(`${name}.png`, await pngOf(view, width, height), "image/png");
+  }
+  function toggle(name) {
+    const { views } = studio.store.state;
+    const next = views.includes(name) ? views.filter((view) => view !== name) : VIEWS.filter((view) => view === name || views.includes(view));
+    if (next.length) studio.store.set({ views: next });
+  }
+  function enlarge(name) {
+    grid.classList.toggle("one", !panels[name].classList.contains("large"));
+    for (const [other, panel] of Object.entries(panels)) panel.classList.toggle("large", other === name && grid.classList.contains("one"));
+  }
+  studio.enlarge = enlarge;
+
+  for (const kind of ["dragover", "drop"]) {
+    page.addEventListener(kind, (event) => {
+      event.preventDefault();
+      if (kind === "drop") for (const each of event.dataTransfer.files) studio.drop(each);
+    });
+  }
+  let shown = "";
+  const show = (views) => {
+    if (views.join() === shown) return;
+    shown = views.join();
+    for (const [name, panel] of Object.entries(panels)) panel.hidden = !views.includes(name);
+    for (const each of chooser.children) each.setAttribute("aria-pressed", String(views.includes(each.dataset.view)));
+    grid.dataset.count = String(views.length);
+  };
+  return { page, bar, controls, hint, status, grid, dialog, hammers, honesty, layout: { show, enlarge } };
+}

@@ -1,0 +1,137 @@
+// Phase plane, force-displacement loops and strobe section.
+import { axes, before, curve, dots, extent, inside, key, widened } from "./axes.js";
+import { surface } from "./pen.js";
+import { colours, FONT } from "./theme.js";
+import { digits, unitOf } from "./units.js";
+
+function planeView(body, studio, label, kinds, paint, table) {
+  const area = surface(body, paint, label);
+  return {
+    update: (what) => kinds.includes(what) && area.draw(),
+    draw: area.draw,
+    cursor: kinds.includes("motion") ? area.draw : () => {},
+    paint,
+    table,
+  };
+}
+
+function displacementAxis(low, high) {
+  const unit = unitOf("m");
+  return { low, high, label: `displacement, ${unit.name}`, factor: unit.factor };
+}
+
+function velocityAxis(low, high) {
+  const unit = unitOf("m/s");
+  return { low, high, label: `velocity, ${unit.name}`, factor: unit.factor };
+}
+
+/** Velocity against displacement, with the states at the firings. */
+export function phaseView(body, studio) {
+  return planeView(body, studio, "Phase plane with the states at the firings", ["motion"], (pen, width, height) => {
+    const frame = studio.frames.motion;
+    if (!frame) return;
+    const c = colours();
+    const { x, v, t } = frame.data;
+    const plane = axes(pen, width, height, displacementAxis(...widened(...extent(x))), velocityAxis(...widened(...extent(v))));
+    inside(pen, plane);
+    pen.lineWidth = 1.1;
+    for (const ghost of studio.ghosts) {
+      pen.strokeStyle = c.ghost;
+      curve(pen, plane, ghost.motion.data.x, ghost.motion.data.v);
+    }
+    pen.strokeStyle = c.x;
+    curve(pen, plane, x, v);
+    pen.fillStyle = c.drive;
+    dots(pen, plane, frame.data["strobe x"], frame.data["strobe v"], 3);
+    const now = before(t, studio.cursor);
+    pen.strokeStyle = c.ink;
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    pen.arc(plane.X(x[now]), plane.Y(v[now]), 5, 0, 2 * Math.PI);
+    pen.stroke();
+    pen.restore();
+  }, () => {
+    const frame = studio.frames.motion;
+    return frame && { "time [s]": frame.data.t, "displacement [m]": frame.data.x, "velocity [m/s]": frame.data.v };
+  });
+}
+
+/** Force of pack and backstop against displacement, while they are touched. */
+export function loopsView(body, studio) {
+  const stop = (frame) => frame.data["F backstop"].map((force, k) => force + frame.data["F damping"][k]);
+  return planeView(body, studio, "Force-displacement loops of pack and backstop", ["motion"], (pen, width, height) => {
+    const frame = studio.frames.motion;
+    if (!frame) return;
+    const c = colours();
+    const unit = unitOf("N");
+    const { x, t } = frame.data;
+    const pack = frame.data["F pack"].map((force) => -force);
+    const backstop = stop(frame);
+    const [low, high] = widened(...extent(backstop, ...extent(pack, 0, 1e-9)));
+    const { front, backstop: place } = frame.places;
+    const plane = axes(pen, width, height, displacementAxis(...widened(...extent(x))), { low, high, label: `force, ${unit.name}`, factor: unit.factor });
+    inside(pen, plane);
+    pen.lineWidth = 1.2;
+    for (const ghost of studio.ghosts) {
+      const old = ghost.motion;
+      pen.strokeStyle = c.ghost;
+      curve(pen, plane, old.data.x, old.data["F pack"].map((force) => -force), (k) => old.data.x[k] >= old.places.front);
+      curve(pen, plane, old.data.x, stop(old), (k) => old.data.x[k] <= old.places.backstop);
+    }
+    pen.strokeStyle = c.pack;
+    if (front !== null) curve(pen, plane, x, pack, (k) => x[k] >= front);
+    pen.strokeStyle = c.backstop;
+    if (place !== null) curve(pen, plane, x, backstop, (k) => x[k] <= place);
+    const now = before(t, studio.cursor);
+    pen.strokeStyle = c.ink;
+    pen.beginPath();
+    pen.arc(plane.X(x[now]), plane.Y(Math.max(pack[now], backstop[now])), 4, 0, 2 * Math.PI);
+    pen.stroke();
+    key(pen, plane.box, [{ name: "backstop", colour: c.backstop }, { name: "pack", colour: c.pack }]);
+    pen.restore();
+  }, () => {
+    const frame = studio.frames.motion;
+    return frame && { "displacement [m]": frame.data.x, "pack force [N]": frame.data["F pack"], "backstop force [N]": stop(frame) };
+  });
+}
+
+/** The states at the firings of an endless train, with the verdict. */
+export function strobeView(body, studio) {
+  return planeView(body, studio, "Strobe section of an endless train at this rate", ["strobe"], (pen, width, height) => {
+    const frame = studio.frames.strobe;
+    if (!frame) return;
+    const c = colours();
+    const { x, v } = frame.data;
+    const known = [...x.keys()].filter((k) => Number.isFinite(x[k]));
+    const [xs, vs] = [known.map((k) => x[k]), known.map((k) => v[k])];
+    // A periodic train has a few points only, whose differences would fill the whole plane.
+    const around = ([low, high], least) => (high - low < least ? [0.5 * (low + high - least), 0.5 * (low + high + least)] : [low, high]);
+    const spread = studio.frames.motion ? [extent(studio.frames.motion.data.x), extent(studio.frames.motion.data.v)] : [[0, 1e-4], [0, 1]];
+    const [xe, ve] = [around(extent(xs), 0.3 * (spread[0][1] - spread[0][0])), around(extent(vs), 0.3 * (spread[1][1] - spread[1][0]))];
+    const margin = { left: 46, right: 10, top: 22, bottom: 32 };
+    const plane = axes(pen, width, height, displacementAxis(...widened(...xe)), velocityAxis(...widened(...ve)), margin);
+    inside(pen, plane);
+    pen.fillStyle = c.x;
+    dots(pen, plane, xs, vs, 2);
+    pen.restore();
+    pen.save();
+    pen.font = FONT;
+    pen.fillStyle = c.ink;
+    pen.textAlign = "left";
+    pen.textBaseline = "top";
+    pen.fillText(strobeText(frame), 6, 5);
+    pen.restore();
+  }, () => {
+    const frame = studio.frames.strobe;
+    return frame && { "displacement [m]": frame.data.x, "velocity [m/s]": frame.data.v };
+  });
+}
+
+export function strobeText(frame) {
+  const told = `${frame.data.x.length} points at ${digits(frame.rate, 5)} Hz`;
+  if (frame.status !== "ok") return `${told}: ${frame.status}`;
+  const judged = frame.verdict;
+  if (!judged) return `${told}, verdict follows`;
+  const exponent = judged.exponent_per_firing;
+  return `${judged.verdict.replace("-", " ")}${exponent === null ? "" : `, exponent ${exponent > 0 ? "+" : ""}${digits(exponent, 3)} per firing`}`;
+}

@@ -1,0 +1,139 @@
+// The actuator to scale along its stroke, with the armature moving: play, slow motion, scrub.
+import { line } from "./axes.js";
+import { displacementAt } from "./curves.js";
+import { surface } from "./pen.js";
+import { colours, FONT } from "./theme.js";
+import { shown, unitOf } from "./units.js";
+
+const SPEEDS = [["1/100", 0.01], ["1/300", 1 / 300], ["1/1000", 1e-3], ["1/3000", 1 / 3000]];
+
+export function sketchView(body, studio) {
+  const area = surface(body.appendChild(Object.assign(document.createElement("div"), { className: "drawing" })), paint, "The actuator, to scale along its stroke");
+  const bar = body.appendChild(Object.assign(document.createElement("div"), { className: "transport" }));
+  bar.innerHTML = `<button type="button" class="play" aria-label="Play">▶</button>
+    <input type="range" class="scrub" min="0" max="1000" value="0" step="1" aria-label="Time">
+    <select class="speed" aria-label="Slow motion">${SPEEDS.map(([name, factor]) => `<option value="${factor}">${name}</option>`).join("")}</select>`;
+  const [play, scrub, speed] = bar.children;
+  speed.value = String(SPEEDS[1][1]);
+  let timer = 0;
+  let last = 0;
+
+  const span = () => {
+    const t = studio.frames.motion?.data.t;
+    return t ? studio.window ?? [t[0], t[t.length - 1]] : [0, 1];
+  };
+  function step(now) {
+    const [low, high] = span();
+    const next = studio.cursor + ((now - last) / 1000) * Number(speed.value);
+    last = now;
+    studio.setCursor(next > high || next < low ? low : next);
+    timer = requestAnimationFrame(step);
+  }
+  function toggle() {
+    if (timer) {
+      cancelAnimationFrame(timer);
+      timer = 0;
+    } else {
+      last = performance.now();
+      timer = requestAnimationFrame(step);
+    }
+    play.textContent = timer ? "❚❚" : "▶";
+    play.setAttribute("aria-label", timer ? "Pause" : "Play");
+  }
+  play.addEventListener("click", toggle);
+  scrub.addEventListener("input", () => {
+    const [low, high] = span();
+    studio.setCursor(low + (scrub.value / 1000) * (high - low));
+  });
+
+  function paint(pen, width, height) {
+    const frame = studio.frames.motion;
+    if (!frame) return;
+    const c = colours();
+    const { backstop, front, platen } = frame.places;
+    const known = [backstop, front, platen, ...frame.data.x.subarray(0, 1)].filter((place) => place !== null);
+    const [low, high] = [Math.min(...known), Math.max(...known)];
+    const way = high - low || 1e-4;
+    const [left, right] = [0.34 * width, 0.9 * width];
+    const X = (x) => left + ((x - low) / way) * (right - left);
+    const [middle, tall] = [0.46 * height, Math.min(0.28 * height, 70)];
+    const x = displacementAt(frame, studio.cursor);
+    const current = frame.data.drive[Math.min(Math.round((studio.cursor / (frame.data.t.at(-1) || 1)) * frame.data.t.length), frame.data.t.length - 1)];
+    pen.save();
+    pen.font = FONT;
+    pen.textAlign = "center";
+    if (platen !== null) block(pen, X(platen), middle - 1.3 * tall, 0.06 * width, 2.6 * tall, c.backstop, "platen", c);
+    if (front !== null) {
+      const touch = Math.max(x, front);
+      const thick = Math.max(X(platen ?? front + 0.2 * way) - X(front), 3);
+      pen.fillStyle = c.pack;
+      pen.globalAlpha = 0.35;
+      pen.fillRect(X(front), middle - 1.2 * tall, thick, 2.4 * tall);
+      pen.globalAlpha = 0.9;
+      pen.fillRect(X(touch), middle - 0.2 * tall, Math.max(thick - (X(touch) - X(front)), 1), 0.4 * tall);
+      pen.globalAlpha = 1;
+      pen.fillStyle = c.muted;
+      pen.fillText("pack", X(front) + thick / 2, middle + 1.2 * tall + 13);
+    }
+    const tip = X(x);
+    // Shank and head of the armature, the face at the displacement.
+    pen.fillStyle = c.x;
+    pen.fillRect(tip - 0.1 * width, middle - 0.16 * tall, 0.1 * width, 0.32 * tall);
+    pen.fillRect(tip - 0.19 * width, middle - 0.6 * tall, 0.09 * width, 1.2 * tall);
+    if (backstop !== null) block(pen, X(backstop) - 0.26 * width, middle - 0.75 * tall, 0.07 * width, 1.5 * tall, c.backstop, "backstop", c);
+    if (studio.described?.constants.some((constant) => constant.section === "magnet")) coil(pen, X(low) - 0.15 * width, middle - 1.1 * tall, 0.1 * width, current, frame, c);
+    ruler(pen, X, low, high, height, c);
+    pen.fillStyle = c.ink;
+    pen.textAlign = "left";
+    pen.fillText(`${shown(studio.cursor, "s")}   ${shown(x, "m")}   ${shown(current, frame.quantity === "force" ? "N" : "A", 3)}`, 8, 14);
+    pen.restore();
+  }
+
+  function cursor() {
+    const [low, high] = span();
+    scrub.value = String(Math.round((1000 * (studio.cursor - low)) / (high - low || 1)));
+    scrub.setAttribute("aria-valuetext", shown(studio.cursor, "s"));
+    area.draw();
+  }
+  return {
+    update: (what) => what === "motion" && cursor(), draw: area.draw, cursor, paint, toggle,
+    table: () => studio.frames.motion && { "time [s]": studio.frames.motion.data.t, "displacement [m]": studio.frames.motion.data.x },
+  };
+}
+
+function block(pen, x, y, w, h, colour, name, c) {
+  pen.fillStyle = colour;
+  pen.fillRect(x, y, w, h);
+  pen.fillStyle = c.muted;
+  pen.fillText(name, x + w / 2, y + h + 13);
+}
+
+function coil(pen, x, y, w, current, frame, c) {
+  pen.fillStyle = c.magnet;
+  pen.globalAlpha = 0.25 + 0.75 * Math.min(Math.abs(current) / (frame.peak || 1), 1);
+  pen.fillRect(x, y, w, 8);
+  pen.globalAlpha = 1;
+  pen.strokeStyle = c.magnet;
+  pen.lineWidth = 1;
+  pen.strokeRect(x, y, w, 8);
+  pen.fillStyle = c.muted;
+  pen.fillText("coil", x + w / 2, y - 4);
+}
+
+function ruler(pen, X, low, high, height, c) {
+  const unit = unitOf("m");
+  const power = 10 ** Math.floor(Math.log10((high - low) * unit.factor));
+  const step = ((high - low) * unit.factor) / power < 3 ? power / 2 : power;
+  pen.strokeStyle = c.muted;
+  pen.fillStyle = c.muted;
+  pen.lineWidth = 1;
+  line(pen, X(low), height - 18, X(high), height - 18);
+  for (let k = Math.ceil((low * unit.factor) / step); k * step <= high * unit.factor * 1.0001; k += 1) {
+    const place = X((k * step) / unit.factor);
+    line(pen, place, height - 18, place, height - 14);
+    pen.fillText(String(Number((k * step).toPrecision(4))), place, height - 3);
+  }
+  pen.textAlign = "right";
+  pen.fillText(unit.name, X(low) - 12, height - 14);
+  pen.textAlign = "center";
+}

@@ -1,0 +1,80 @@
+// The state that the user has set, its history, and its text in the address.
+export const VIEWS = ["motion", "sketch", "map", "forces", "phase", "strobe", "loops", "energy", "line"];
+
+const NUMBERS = ["rate", "pulses", "low", "high"];
+const TEXTS = ["hammer", "text", "pattern", "overlap", "line"];
+const JOINED = 700; // ms within which changes of one control are one step of the history
+const DEEPEST = 200;
+
+export const START = Object.freeze({
+  hammer: "", text: "", constants: {}, waveform: null, rate: 1200, pulses: 9, pattern: "", overlap: "add",
+  low: 500, high: 2000, line: "HAMMER", views: VIEWS,
+});
+
+export class Store {
+  constructor(state) {
+    this.state = state;
+    this.past = [];
+    this.future = [];
+    this.listeners = new Set();
+    this.last = { control: null, at: 0 };
+  }
+
+  /** Change the state; changes of one control shortly after each other are undone together. */
+  set(patch, control = null) {
+    const now = performance.now();
+    const same = control !== null && control === this.last.control && now - this.last.at < JOINED;
+    if (!same) {
+      this.past.push(this.state);
+      if (this.past.length > DEEPEST) this.past.shift();
+    }
+    this.last = { control, at: now };
+    this.future = [];
+    this.state = Object.freeze({ ...this.state, ...patch });
+    this.tell();
+  }
+
+  /** Begin with a state, without a past. */
+  begin(state) {
+    this.past = [];
+    this.future = [];
+    this.state = Object.freeze({ ...state });
+    this.tell();
+  }
+
+  undo() { this.step(this.past, this.future); }
+  redo() { this.step(this.future, this.past); }
+
+  step(from, to) {
+    if (!from.length) return;
+    to.push(this.state);
+    this.state = from.pop();
+    this.last = { control: null, at: 0 };
+    this.tell();
+  }
+
+  tell() { for (const listener of this.listeners) listener(this.state); }
+}
+
+/** Return a state as text for an address: what differs from the start. */
+export function toText(state) {
+  const found = new URLSearchParams();
+  for (const name of [...TEXTS, ...NUMBERS]) if (state[name] !== START[name]) found.set(name, state[name]);
+  for (const [key, value] of Object.entries(state.constants)) found.set(key, value);
+  if (state.waveform) found.set("waveform", JSON.stringify(state.waveform));
+  if (state.views.join() !== VIEWS.join()) found.set("views", state.views.join("-"));
+  return found.toString();
+}
+
+/** Return the state that a text tells; what cannot be read stays as at the start. */
+export function fromText(text) {
+  const state = { ...START, constants: {} };
+  for (const [key, value] of new URLSearchParams(text)) {
+    if (NUMBERS.includes(key)) { if (Number.isFinite(Number(value))) state[key] = Number(value); }
+    else if (TEXTS.includes(key)) state[key] = value;
+    else if (key === "waveform") { try { state.waveform = JSON.parse(value); } catch { /* as the hammer's */ } }
+    else if (key === "views") state.views = value.split("-").filter((view) => VIEWS.includes(view));
+    else if (Number.isFinite(Number(value))) state.constants[key] = Number(value);
+  }
+  return state;
+}

@@ -1,0 +1,28 @@
+// Quantities as people write them: a number of few digits and its unit, metric or inch-pound.
+let known = {};
+let system = 0;
+
+/** Take the units that the server told, by SI unit: [metric, inch-pound], each a name and a factor. */
+export function setUnits(units) { known = units; }
+export function setSystem(number) { system = number; }
+export const getSystem = () => system;
+
+export function unitOf(si) { return known[si]?.[system] ?? { name: si === "1" ? "" : si, factor: 1 }; }
+
+/** Return the unit of a time axis: long ones are told in ms. */
+export function timeUnit(span) { return span > 3e-3 ? { name: "ms", factor: 1e3 } : unitOf("s"); }
+
+/** Return a number with some significant digits. */
+export function digits(value, count = 4) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e5 || size < 1e-3) return value.toExponential(count - 1).replace("e+", "e");
+  return String(Number(value.toPrecision(count)));
+}
+
+export function shown(value, si, count = 4) {
+  const unit = unitOf(si);
+  const number = value === null || value === undefined ? "–" : digits(value * unit.factor, count);
+  return unit.name ? `${number} ${unit.name}` : number;
+}

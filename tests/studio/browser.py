@@ -1,0 +1,191 @@
+"""A headless Chromium, driven over its own protocol; helpers only."""
+
+import base64
+import itertools
+import json
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--hide-scrollbars",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-extensions",
+    "--disable-sync",
+    "--mute-audio",
+    "--remote-debugging-port=0",
+)
+START = 60.0
+WAIT = 60.0
+
+
+def chromium() -> str | None:
+    """Return the program of a Chromium, or nothing."""
+    return next(filter(None, map(shutil.which, NAMES)), None)
+
+
+class Page:
+    """One tab: what it runs, what it says on its console, what it asks the network for."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.numbers = itertools.count(1)
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            self.call(f"{domain}.enable")
+
+    def call(self, method: str, **arguments: Any) -> dict[str, Any]:
+        """Send a command and return its answer."""
+        number = next(self.numbers)
+        self.socket.send(json.dumps({"id": number, "method": method, "params": arguments}))
+        while True:
+            message = json.loads(self.socket.recv(timeout=WAIT))
+            if message.get("id") == number:
+                assert "error" not in message, message["error"]
+                return message["result"]
+            self._note(message)
+
+    def _note(self, message: dict[str, Any]) -> None:
+        told = message.get("params", {})
+        match message.get("method"):
+            case "Runtime.exceptionThrown":
+                self.complaints.append(json.dumps(told["exceptionDetails"])[:2000])
+            case "Runtime.consoleAPICalled" if told["type"] in ("error", "warning", "assert"):
+                self.complaints.append(json.dumps(told["args"])[:2000])
+            case "Log.entryAdded" if told["entry"]["level"] in ("error", "warning"):
+                self.complaints.append(f"{told['entry']['text']} {told['entry'].get('url', '')}")
+            case "Network.requestWillBeSent":
+                self.requests.append(told["request"]["url"])
+            case "Network.webSocketCreated":
+                self.requests.append(told["url"])
+
+    def run(self, script: str) -> Any:
+        """Run a script in the page, which may be a promise, and return its value."""
+        found = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in found, found["exceptionDetails"]
+        return found["result"].get("value")
+
+    def wait(self, condition: str, seconds: float = WAIT) -> Any:
+        """Wait until a script gives something true, and return that."""
+        end = time.monotonic() + seconds
+        while not (found := self.run(condition)):
+            assert time.monotonic() < end, f"waited for {condition}; {self.complaints}"
+            time.sleep(0.05)
+        return found
+
+    def open(self, address: str) -> None:
+        """Go to an address."""
+        self.call("Page.navigate", url=address)
+        self.wait("document.readyState === 'complete'")
+
+    def size(self, width: int, height: int, dark: bool = False) -> None:
+        """Set the size of the window and the colours that its user prefers."""
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.call("Emulation.setEmulatedMedia", features=[scheme])
+
+    def picture(self, path: Path, selector: str | None = None) -> None:
+        """Write what is seen, all of it or one element, as PNG."""
+        clip: dict[str, Any] = {}
+        if selector is not None:
+            box = self.box(selector)
+            clip = {"clip": {**box, "scale": 1}}
+        path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png", **clip)["data"]))
+
+    def box(self, selector: str) -> dict[str, float]:
+        """Return place and size of an element."""
+        return self.run(
+            f"(() => {{ const b = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
+            " return {x: b.x, y: b.y, width: b.width, height: b.height}; })()"
+        )
+
+    def mouse(self, kind: str, x: float, y: float, held: bool = True) -> None:
+        """Move, press ("mousePressed") or release ("mouseReleased") the left button."""
+        button = "left" if held else "none"
+        self.call(
+            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(held), clickCount=1
+        )
+
+    def drag(self, *places: tuple[float, float]) -> None:
+        """Press at the first place, move through the others, release at the last."""
+        self.mouse("mousePressed", *places[0])
+        for place in places:
+            self.mouse("mouseMoved", *place)
+        self.mouse("mouseReleased", *places[-1])
+
+    def press(self, name: str, code: str = "", modifiers: int = 0) -> None:
+        """Press and release a key."""
+        text = {"text": name} if len(name) == 1 and not modifiers else {}
+        codes = {"ArrowRight": 39, "ArrowLeft": 37, "ArrowUp": 38, "ArrowDown": 40}
+        more = {"windowsVirtualKeyCode": codes[name]} if name in codes else {}
+        for kind in ("keyDown", "keyUp"):
+            self.call(
+                "Input.dispatchKeyEvent",
+                type=kind,
+                key=name,
+                code=code or name,
+                modifiers=modifiers,
+                **text,
+                **more,
+            )
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Start a Chromium and give a function that opens a new tab."""
+    program = chromium()
+    assert program is not None
+    with tempfile.TemporaryDirectory() as folder:
+        command = (program, *FLAGS, f"--user-data-dir={folder}", "about:blank")
+        process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        sockets: list[Any] = []
+        try:
+            address = _address(process)
+            host = address.split("/")[2]
+
+            def tab() -> Page:
+                from urllib.request import Request, urlopen
+
+                with urlopen(Request(f"http://{host}/json/new?about:blank", method="PUT")) as answer:
+                    found = json.load(answer)
+                opened = connect(found["webSocketDebuggerUrl"], max_size=None)
+                sockets.append(opened)
+                return Page(opened.__enter__())
+
+            yield tab
+        finally:
+            for socket in sockets:
+                socket.__exit__(None, None, None)
+            process.terminate()
+            process.wait(20)
+            assert process.stderr is not None
+            process.stderr.close()
+
+
+def _address(process: "subprocess.Popen[str]") -> str:
+    assert process.stderr is not None
+    for line in process.stderr:
+        if found := re.search(r"DevTools listening on (ws://\S+)", line):
+            return found[1]
+    raise AssertionError("Chromium did not start")
