@@ -28,6 +28,7 @@ from printhammer.cli import (
     reconstruct,
     run,
     strobe,
+    studio,
     sweep,
 )
 from printhammer.cli import map as frequency_map
@@ -64,6 +65,7 @@ app.command("continue", epilog=continuation.EXAMPLE)(continuation.continue_)
 app.command("lyapunov", epilog=lyapunov.EXAMPLE)(lyapunov.lyapunov)
 app.command("print", epilog=print_.EXAMPLE)(print_.print_)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)
+app.command("studio", epilog=studio.EXAMPLE)(studio.studio)
 app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)
 app.command("measure", epilog=measure.EXAMPLE)(measure.measure)
 app.add_typer(hammer.app, name="hammer")
