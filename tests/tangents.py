@@ -30,6 +30,7 @@ def arrive(problem: Problem, state: Any, branch: int, start: float, end: float) 
     nodes = np.empty((20_000, 5))
     status, used, _touched, _steps = problem.kernel.run(
         problem.firings,
+        problem.begins,
         problem.pieces,
         problem.replace,
         problem.constants,

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from printhammer.drive import Burst, Drive, Overlap, PulseTrain, SineForce
 from printhammer.drive_input import even_times
 from printhammer.errors import InputError
+from printhammer.kernel.layout import END
 from printhammer.waveforms import HalfSine, Rectangle, Sampled, Sine, Trapezoid, Waveform
 
 PULSE = Rectangle(amplitude=0.9, width=350e-6, rise=1e-5, decay=2.4e-5)
@@ -133,13 +134,15 @@ def test_a_sinusoidal_force_has_one_endless_segment() -> None:
 
 def test_pulses_of_force_are_a_force_drive() -> None:
     pulse = HalfSine(amplitude="3 lbf", width="1 ms")
-    times, segments, replace, force = PulseTrain(
+    times, begins, pieces, replace, force = PulseTrain(
         pulse, rate=100.0, pulses=3, overlap="replace"
     ).kernel_arrays()
     assert times.tolist() == [0.0, 0.01, 0.02]
-    np.testing.assert_array_equal(segments, pulse.segments())
+    assert begins.tolist() == [0, 0, 0]
+    np.testing.assert_array_equal(pieces[:-1], pulse.segments()[:-1])
+    assert pieces[-1].tolist() == [pulse.support, END, 0.0, 0.0, 0.0, 0.0]
     assert (replace, force) == (True, True)
-    assert PulseTrain(PULSE).kernel_arrays()[2:] == (False, False)
+    assert PulseTrain(PULSE).kernel_arrays()[3:] == (False, False)
 
 
 def test_changed_copies_leave_the_drive_alone() -> None:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.strobe import strobe
     from printhammer.chaos.zero_one import zero_one
     from printhammer.drive import Burst, PulseTrain, SineForce
+    from printhammer.drive_sequence import PulseSequence
     from printhammer.ensemble import Ensemble, EnsembleResult
     from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
     from printhammer.errors import InputError, PrinthammerError
@@ -52,6 +53,7 @@ __all__ = [
     "Motion",
     "Pattern",
     "PrinthammerError",
+    "PulseSequence",
     "PulseTrain",
     "SineForce",
     "Waveform",
@@ -92,6 +94,7 @@ _HOME = {
     "Motion": "motion",
     "Pattern": "printing.pattern",
     "PrinthammerError": "errors",
+    "PulseSequence": "drive_sequence",
     "PulseTrain": "drive",
     "SineForce": "drive",
     "Waveform": "waveforms",

@@ -256,7 +256,7 @@ def flow(
         arrays["pieces"],
         np.zeros((count, 5 * problem.firings.size)),
         np.zeros((count, VARIED)),
-        _VALUE_SPACING * (problem.drive.waveform.peak or 1.0),
+        _VALUE_SPACING * (problem.drive.largest_pulse or 1.0),
         np.ascontiguousarray(marks, np.float64),
         np.asarray(nodes, dtype=np.int64),
         np.ascontiguousarray(initial, np.float64),

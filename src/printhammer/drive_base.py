@@ -11,7 +11,7 @@ import numpy as np
 from printhammer.drive_input import checked_times, read_number
 from printhammer.drive_text import FORMAT, column_text, document, waveform_text
 from printhammer.errors import InputError
-from printhammer.segments import evaluate, largest, largest_sum
+from printhammer.segments import evaluate, largest, largest_sum, stacked
 from printhammer.waveforms import Waveform
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from printhammer.segments import FloatArray
     from printhammer.waveform_base import QuantityName
+
+    IntArray = npt.NDArray[np.int64]
 
 Overlap = Literal["add", "replace"]
 OVERLAPS: Final = get_args(Overlap)
@@ -42,6 +44,7 @@ class Drive:
         self._period = period
         self._times = checked_times(times)
         self._segments = waveform.segments()
+        self._pieces = stacked([self._segments])[1]
 
     @property
     def waveform(self) -> Waveform:
@@ -52,6 +55,11 @@ class Drive:
     def times(self) -> FloatArray:
         """Firing times, s, ascending, read-only."""
         return self._times
+
+    @property
+    def uniform(self) -> bool:
+        """Whether every firing does the same."""
+        return True
 
     @property
     def overlap(self) -> Overlap:
@@ -71,7 +79,7 @@ class Drive:
     @property
     def end(self) -> float:
         """Time from which on the drive is zero, s; possibly infinite."""
-        return float(self._times[-1] + self._segments[-1, 0])
+        return float(self._ends().max())
 
     @property
     def fingerprint(self) -> str:
@@ -86,39 +94,47 @@ class Drive:
         """Return the segment table of the waveform (see `printhammer.segments`), SI, read-only."""
         return self._segments
 
-    def kernel_arrays(self) -> tuple[FloatArray, FloatArray, bool, bool]:
-        """Return firing times, segment table, whether pulses replace, and whether the drive is a force."""
-        return self._times, self._segments, self._overlap == "replace", self.quantity == "force"
+    def kernel_arrays(self) -> tuple[FloatArray, IntArray, FloatArray, bool, bool]:
+        """Return the drive as the kernel wants it.
+
+        Firing times, s; the row at which the segment table of each firing begins; the tables one after the
+        other (see `printhammer.segments.stacked`); whether pulses replace; whether the drive is a force.
+        """
+        return self._times, self._begins(), self._pieces, self._overlap == "replace", self.quantity == "force"
 
     @property
     def overlapping(self) -> int:
         """Largest number of pulses that are under way at once; 1 where the latest replaces the others."""
         if self._overlap == "replace":
             return 1
-        first = np.searchsorted(self._times + self._segments[-1, 0], self._times, side="right")
-        return int((np.arange(len(self._times)) - first).max()) + 1
+        ended = np.searchsorted(np.sort(self._ends()), self._times, side="right")
+        return int((np.arange(len(self._times)) - ended).max()) + 1
 
     def value(self, t: npt.ArrayLike) -> FloatArray:
         """Total current, A, or force, N, at times t, s; right-continuous, zero before the first firing."""
         time = np.asarray(t, dtype=np.float64)
         latest = np.searchsorted(self._times, time, side="right") - 1
         total = np.where(np.isnan(time), np.nan, 0.0)
-        for lag in range(self.overlapping):
+        for lag in range(self._reach()):
             pulse = latest - lag
-            part = evaluate(self._segments, time, self._times[np.maximum(pulse, 0)])
-            total = np.where(pulse >= 0, total + part, total)
+            total = np.where(pulse >= 0, total + self._values(time, np.maximum(pulse, 0)), total)
         return total
+
+    @property
+    def largest_pulse(self) -> float:
+        """Largest absolute value of any one pulse, A or N."""
+        return largest(self._segments)
 
     @property
     def peak(self) -> float:
         """Largest absolute value of the total current, A, or force, N; exact where pulses do not overlap."""
         several = self.overlapping
         if several == 1:
-            return largest(self._segments)
+            return self.largest_pulse
         # From the time when `several` pulses are under way, an even train repeats itself until it ends.
         count = several + 1 if self._period is not None else len(self._times)
         shortest = Drive(self._waveform, self._times[:count], self._overlap)
-        return largest_sum(self._segments, shortest.times, shortest.value)
+        return largest_sum(np.unique(np.add.outer(shortest.times, self._segments[:, 0])), shortest.value)
 
     def scaled(self, factor: float) -> Self:
         """Return the same drive with every value multiplied by a factor.
@@ -145,7 +161,24 @@ class Drive:
         result = copy(self)
         result._waveform = waveform
         result._segments = waveform.segments()
+        result._pieces = stacked([result._segments])[1]
         return result
+
+    def _begins(self) -> IntArray:
+        """Return the row of the kernel's tables at which that of each firing begins."""
+        return np.broadcast_to(np.int64(0), self._times.shape)
+
+    def _ends(self) -> FloatArray:
+        """Return the times at which the pulses end, s."""
+        return self._times + self._segments[-1, 0]
+
+    def _reach(self) -> int:
+        """Return how many of the latest firings may be under way, with all between them."""
+        return self.overlapping
+
+    def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:
+        """Return the values at given times, s, of the pulses with given numbers."""
+        return evaluate(self._segments, time, self._times[pulse])
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Drive):
@@ -153,7 +186,8 @@ class Drive:
         return (
             (self.quantity, self.overlap) == (other.quantity, other.overlap)
             and np.array_equal(self._times, other._times)
-            and np.array_equal(self._segments, other._segments)
+            and np.array_equal(self._begins(), other._begins())
+            and np.array_equal(self._pieces, other._pieces)
         )
 
     def __hash__(self) -> int:

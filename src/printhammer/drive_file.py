@@ -1,6 +1,6 @@
 """Drive files: a drive as TOML, read and written back.
 
-A file has ``format = 1``, optionally ``overlap = "add"`` or ``"replace"``, and exactly one of four tables::
+A file has ``format = 1``, optionally ``overlap = "add"`` or ``"replace"``, and exactly one of five tables::
 
     [train]                       # rate or period, with pulses; start
     rate = "1.2 kHz"
@@ -15,14 +15,21 @@ A file has ``format = 1``, optionally ``overlap = "add"`` or ``"replace"``, and 
     bursts = 4
     gap = "3 ms"
 
+    [sequence]                    # a waveform for each firing, by its name
+    at = ["0 us", "700 us", "1.4 ms"]
+    waveforms = ["print", "soft", "print"]
+
     [sine]                        # a sinusoidal force; phase is optional
     amplitude = "0.5 N"
     frequency = "300 Hz"
     phase = "90 deg"
 
-All but the sine fire a waveform: the table ``[waveform]`` of the file, or else the hammer's. Its keys are
-``shape`` and the constants of the shape; a sampled one names a CSV file (``file``, relative to the drive
-file) or holds the samples as ``time`` and ``current`` or ``force``, each ``{ values = [...], unit = "us" }``.
+Train, times and burst fire a waveform: the table ``[waveform]`` of the file, or else the hammer's. The
+waveforms of a sequence are the tables ``[waveforms.print]``, ``[waveforms.soft]`` and so on. The keys of a
+waveform are ``shape`` and the constants of the shape; a sampled one names a CSV file (``file``, relative to
+the drive file) or holds the samples as ``time`` and ``current`` or ``force``, each ``{ values = [...], unit =
+"us" }``; one of the shape "chain" has ``parts``, a list of waveforms, each with its offset ``at`` from the
+firing.
 Every quantity is written with its unit, as a string or as ``{ value = 1.2, unit = "kHz" }``.
 """
 
@@ -36,19 +43,21 @@ from pydantic import ValidationError
 
 from printhammer.constants import quantities, sentence, shown
 from printhammer.drive import Burst, Drive, PulseTrain, SineForce
+from printhammer.drive_sequence import PulseSequence
 from printhammer.drive_text import FORMAT
 from printhammer.errors import InputError
 from printhammer.waveform_base import QUANTITY_UNITS, Waveform
-from printhammer.waveforms import SHAPES, Sampled
+from printhammer.waveforms import SHAPES, Chain, Sampled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-_PLAIN: Final = {"pulses", "bursts"}
+_PLAIN: Final = {"pulses", "bursts", "waveforms"}
 _KEYS: Final[dict[str, dict[str, str]]] = {
     "train": {"rate": "Hz", "period": "s", "pulses": "", "start": "s"},
     "times": {"at": "s", "start": "s"},
     "burst": {"rate": "Hz", "period": "s", "pulses": "", "bursts": "", "gap": "s", "start": "s"},
+    "sequence": {"at": "s", "waveforms": "", "start": "s"},
     "sine": {"amplitude": "N", "frequency": "Hz", "phase": "rad"},
 }
 _MAKERS: Final[dict[str, Callable[..., Drive]]] = {"train": PulseTrain, "times": PulseTrain, "burst": Burst}
@@ -115,24 +124,32 @@ def save_drive(drive: Drive, path: str | Path) -> None:
 
 
 def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Drive:
-    _known(data, {"format", "overlap", "waveform", *_KEYS}, "")
+    _known(data, {"format", "overlap", "waveform", "waveforms", *_KEYS}, "")
     if data.get("format") != FORMAT or isinstance(data["format"], (bool, float)):
         raise InputError(f"format = {shown(data.get('format'))} is expected to be {FORMAT}")
     kinds = [kind for kind in _KEYS if kind in data]
     if len(kinds) != 1:
         given = " and ".join(f"[{kind}]" for kind in kinds) or "none"
-        raise InputError(f"{given} given, expected one of the tables [train], [times], [burst] and [sine]")
+        raise InputError(
+            f"{given} given, expected one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}"
+        )
     kind = kinds[0]
     arguments = _arguments(_table(data[kind], kind), kind)
+    for key, others in (("waveform", ("sine", "sequence")), ("waveforms", set(_KEYS) - {"sequence"})):
+        if key in data and kind in others:
+            raise InputError(f"{key} is expected to be left out beside [{kind}]")
     if kind == "sine":
-        for key in ("waveform", "overlap"):
-            if key in data and not (key == "overlap" and data[key] == "add"):
-                raise InputError(f"{key} is expected to be left out beside [sine]")
+        if data.get("overlap", "add") != "add":
+            raise InputError("overlap is expected to be left out beside [sine]")
         _required(arguments, ("amplitude", "frequency"), kind)
         return _named(kind, SineForce, arguments)
     overlap = data.get("overlap", "add")
     if overlap not in ("add", "replace"):
         raise InputError(f"overlap = {shown(overlap)} is expected to be 'add' or 'replace'")
+    if kind == "sequence":
+        _required(arguments, ("at", "waveforms"), kind)
+        waveforms = _waveforms(arguments.pop("waveforms"), data, folder)
+        return _named(kind, PulseSequence, {"waveforms": waveforms, "overlap": overlap, **arguments})
     if kind == "times":
         _required(arguments, ("at",), kind)
     elif "rate" not in arguments and "period" not in arguments:
@@ -140,7 +157,7 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
     else:
         _required(arguments, ("pulses",), kind)
     if "waveform" in data:
-        waveform: Waveform | None = _waveform(_table(data["waveform"], "waveform"), folder)
+        waveform: Waveform | None = _waveform(_table(data["waveform"], "waveform"), folder, "waveform")
     else:
         waveform = standard
     if waveform is None:
@@ -233,43 +250,85 @@ def _column(value: Any, si: str, where: str) -> list[float]:
     return [_quantity({"value": entry, "unit": unit}, (si,), where)[0] for entry in values]
 
 
-def _waveform(table: dict[str, Any], folder: Path) -> Waveform:
+def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]:
+    """Return the waveforms of a sequence, which name the tables of a file."""
+    tables = _table(data.get("waveforms", {}), "waveforms")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"sequence.waveforms = {shown(names)} is expected to be a list of names")
+    made = {
+        name: _waveform(_table(table, f"waveforms.{name}"), folder, f"waveforms.{name}")
+        for name, table in tables.items()
+    }
+    for name in names:
+        if name not in made:
+            known = (
+                ", ".join(f"[waveforms.{known}]" for known in made)
+                or "a table [waveforms.NAME] for each name"
+            )
+            raise InputError(
+                f"sequence.waveforms: {shown(name)} is no waveform of the file, expected {known}"
+            )
+    return [made[name] for name in names]
+
+
+def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
     shape = table.get("shape")
-    if not isinstance(shape, str) or shape not in SHAPES:
-        raise InputError(f"waveform.shape = {shown(shape)} is expected to be one of {', '.join(SHAPES)}")
-    model = SHAPES[shape]
+    known = {**SHAPES, Chain.shape: Chain}
+    if not isinstance(shape, str) or shape not in known:
+        raise InputError(f"{where}.shape = {shown(shape)} is expected to be one of {', '.join(known)}")
+    model = known[shape]
     data = {key: value for key, value in table.items() if key != "shape"}
+    if model is Chain:
+        return _chain(data, folder, where)
     if model is Sampled and "file" not in data:
-        return _samples(data)
+        return _samples(data, where)
     notes = quantities(model)
-    _known(data, {*notes, *({"file", "interpolation"} if model is Sampled else ())}, "waveform")
+    _known(data, {*notes, *({"file", "interpolation"} if model is Sampled else ())}, where)
     fields: dict[str, Any] = {}
     for key, value in data.items():
         if key not in notes:
             fields[key] = value
             continue
-        fields[key], si = _quantity(value, (notes[key].si, *notes[key].also), f"waveform.{key}")
+        fields[key], si = _quantity(value, (notes[key].si, *notes[key].also), f"{where}.{key}")
         if notes[key].also:
             fields["quantity"] = QUANTITY_UNITS[si]
     try:
         return model.model_validate(fields, context={"folder": folder})
     except ValidationError as error:
-        raise InputError(sentence(error, model, "waveform.")) from None
+        raise InputError(sentence(error, model, f"{where}.")) from None
 
 
-def _samples(data: dict[str, Any]) -> Waveform:
+def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
+    """Read a chain: a list of waveforms, each with its offset."""
+    _known(data, {"parts"}, where)
+    _required(data, ("parts",), where)
+    if not isinstance(data["parts"], list) or not data["parts"]:
+        raise InputError(f"{where}.parts = {shown(data['parts'])} is expected to be a list of waveforms")
+    parts = []
+    for number, entry in enumerate(data["parts"]):
+        own = f"{where}.parts[{number}]"
+        table = dict(_table(entry, own))
+        _required(table, ("at",), own)
+        parts.append((_quantity(table.pop("at"), ("s",), f"{own}.at")[0], _waveform(table, folder, own)))
+    try:
+        return Chain(parts=parts)
+    except InputError as error:
+        raise InputError(f"{where}.{error}") from None
+
+
+def _samples(data: dict[str, Any], where: str) -> Waveform:
     """Read a sampled waveform whose samples the file holds."""
     si = {name: unit for unit, name in QUANTITY_UNITS.items()}
-    _known(data, {"interpolation", "time", *si}, "waveform")
+    _known(data, {"interpolation", "time", *si}, where)
     driven = [name for name in si if name in data]
     if "time" not in data or len(driven) != 1:
-        raise InputError("waveform is expected to have a file, or time and either current or force")
+        raise InputError(f"{where} is expected to have a file, or time and either current or force")
     interpolation = data.get("interpolation", "pchip")
     if interpolation not in ("pchip", "linear"):
         raise InputError(
-            f"waveform.interpolation = {shown(interpolation)} is expected to be 'pchip' or 'linear'"
+            f"{where}.interpolation = {shown(interpolation)} is expected to be 'pchip' or 'linear'"
         )
     name = driven[0]
-    times = _column(data["time"], "s", "waveform.time")
-    values = _column(data[name], si[name], f"waveform.{name}")
+    times = _column(data["time"], "s", f"{where}.time")
+    values = _column(data[name], si[name], f"{where}.{name}")
     return Sampled.from_samples(times, values, quantity=QUANTITY_UNITS[si[name]], interpolation=interpolation)

@@ -9,7 +9,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from printhammer.constants import quantities
-from printhammer.waveforms import Sampled
+from printhammer.waveforms import Chain, Sampled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -33,6 +33,11 @@ def column_text(values: Iterable[float], unit: str) -> dict[str, Any]:
 def waveform_text(waveform: Waveform) -> dict[str, Any]:
     """Return the ``[waveform]`` table of a drive file; the samples of a record are part of it."""
     result: dict[str, Any] = {"shape": waveform.shape}
+    if isinstance(waveform, Chain):
+        result["parts"] = [
+            {"at": quantity_text(offset, "s"), **waveform_text(part)} for offset, part in waveform.parts
+        ]
+        return result
     if isinstance(waveform, Sampled):
         result["interpolation"] = waveform.interpolation
         result["time"] = column_text(waveform.times, "s")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.kernel import carry, lane_layout
-from printhammer.kernel.layout import MAGNET, PLACES
+from printhammer.kernel.layout import END, MAGNET, PLACES
 from printhammer.problem import MAX_STEPS, Problem, scales_of
 
 if TYPE_CHECKING:
@@ -37,12 +37,12 @@ def starts_of(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.int64]:
 
 
 LaneKinds = tuple[int, bool, bool]
-"""Number of exponentials in a waveform, whether it has a cubic piece, whether a sine."""
+"""Number of rates of exponentials in the waveforms of a drive, whether there is a cubic piece, a sine."""
 
 
 def kernel_of(drive: Drive, known: dict[int, LaneKinds | None]) -> Hashable:
     """Return what of a drive decides on the kernel: the overlap rule, and the kinds of its pieces."""
-    _times, pieces, replace, _force = drive.kernel_arrays()
+    _times, _begins, pieces, replace, _force = drive.kernel_arrays()
     if id(pieces) not in known:
         known[id(pieces)] = closed_form(pieces)[1]
     return bool(replace), known[id(pieces)]
@@ -89,12 +89,12 @@ class Group:
         typical: dict[tuple[Any, ...], float] = {}
         for i, (hammer, drive) in enumerate(zip(hammers, drives, strict=True)):
             if id(drive) not in forms_of:
-                pieces = np.asarray(drive.kernel_arrays()[1], dtype=np.float64)
+                pieces = np.asarray(drive.kernel_arrays()[2], dtype=np.float64)
                 form = pieces.tobytes()
                 if form not in waves:
                     waves[form] = len(tables)
                     tables.append(pieces)
-                forms_of[id(drive)] = waves[form], drive.waveform.peak
+                forms_of[id(drive)] = waves[form], drive.largest_pulse
             self.waveform_of[i], peak = forms_of[id(drive)]
             x, v = float(states[i, 1]), float(states[i, 2])
             key: tuple[Any, ...] = (id(hammer), peak, drive.quantity)
@@ -110,7 +110,8 @@ class Group:
                 problems.append(Problem(hammer, drive, (x, v), 0.0, tolerance))
             self.hammer_of[i] = rows[key]
         firings = [np.asarray(drive.times, dtype=np.float64) for drive in drives]
-        self.replace = bool(drives[0].kernel_arrays()[2])
+        begins = [np.asarray(drive.kernel_arrays()[1], dtype=np.int64) for drive in drives]
+        self.replace = bool(drives[0].kernel_arrays()[3])
         self.kernel: Kernel = problems[0].kernel
         self.laws = problems[0].laws
         width = max(problem.constants.size for problem in problems)
@@ -123,6 +124,7 @@ class Group:
         self.pieces = np.concatenate(tables)
         self.firing_starts = starts_of(firings)
         self.firings = np.concatenate(firings)
+        self.begins = np.concatenate(begins)
         self.most_firings = max(len(times) for times in firings)
         self.uniform = len(problems) == 1 and len(tables) == 1
         forms = [closed_form(table) for table in tables]
@@ -152,11 +154,11 @@ class Group:
 
 
 def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
-    """Return the rates of a waveform's pieces, and what kinds of pieces there are, for lanes.
+    """Return the rates of the pieces of a set of waveforms, and what kinds of pieces there are, for lanes.
 
-    None instead of the kinds where the waveform has more rates than lanes provide for.
+    None instead of the kinds where the waveforms have more rates than lanes provide for.
     """
-    pieces = table[:-1]
+    pieces = table[table[:, 1] != END]
     kind = pieces[:, 1]
     decays = np.unique(pieces[kind == _EXPONENTIAL, 4])
     frequencies = np.unique(pieces[kind == _SINE, 4])
@@ -252,6 +254,7 @@ class Job:
             group.rates,
             group.firing_starts,
             group.firings,
+            group.begins,
             group.replace,
             group.states,
             group.ends,
@@ -295,6 +298,7 @@ class Job:
                 group.pieces,
                 group.firing_starts,
                 group.firings,
+                group.begins,
                 group.replace,
                 group.states,
                 group.ends,

@@ -64,8 +64,8 @@ class Parameter:
         Change of the packed constants with ``value / scale``.
     firings : array, shape (f,)
         Change of the firing times [s].
-    pieces : array, shape (m + 1, 6)
-        Change of the waveform's table, see `printhammer.segments`.
+    pieces : array, shape (m, 6)
+        Change of the tables of the waveforms, see `Drive.kernel_arrays`.
     """
 
     name: str
@@ -81,10 +81,12 @@ class Parameter:
 def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
     """List the constants of a hammer and a drive: those of the hammer, of the pulse, of the firing times.
 
-    A train of even spacing has its period, others up to 20 firings the time of each but the first.
+    A train of even spacing has its period, others up to 20 firings the time of each but the first. A drive
+    whose firings have waveforms of their own has no constants of the pulse.
     """
     names = [key for key in hammer.constants if not key.startswith("waveform.")]
-    names += [f"waveform.{name}" for name in _of_waveform(drive.waveform)]
+    if drive.uniform:
+        names += [f"waveform.{name}" for name in _of_waveform(drive.waveform)]
     count = len(drive.times)
     if drive.period is not None and count > 1:
         names.append("period")
@@ -142,9 +144,9 @@ def _rest_change(hammer: Hammer, parameter: Parameter) -> float:
 def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
     section, _, last = name.rpartition(".")
     firings = np.zeros(len(drive.times))
-    pieces = np.zeros(drive.segments().shape)
+    pieces = np.zeros(drive.kernel_arrays()[2].shape)
     packed = np.zeros(len(constants_of(hammer)))
-    if section == "waveform":
+    if section == "waveform" and drive.uniform:
         waveform = drive.waveform
         fields = _of_waveform(waveform)
         if last in fields:
@@ -181,7 +183,7 @@ def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
     if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
         raise InputError(f"constant = {name!r}, expected a drive with a single period and several firings")
     value, unit, sign = (period, "s", 1.0) if name == "period" else (1.0 / period, "Hz", -1.0)
-    firings, pieces = np.zeros(count), np.zeros(drive.segments().shape)
+    firings, pieces = np.zeros(count), np.zeros(drive.kernel_arrays()[2].shape)
     waveform = drive.waveform
     if isinstance(waveform, Sine):
         frequency = waveform.frequency
@@ -255,7 +257,7 @@ def _natural(unit: str, hammer: Hammer, drive: Drive) -> float:
         "kg": hammer.mass,
         "Hz": 1.0 / time,
         "Pa": force / (way * way),
-        "A": drive.waveform.peak or 1.0,
+        "A": drive.largest_pulse or 1.0,
     }
     result, divides = 1.0, False
     for factor in unit.replace("/", " / ").split():

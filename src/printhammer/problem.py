@@ -134,7 +134,7 @@ def scales_of(hammer: Hammer, drive: Drive, state: tuple[float, float]) -> tuple
 
     static = StaticForce(hammer)
     origin = hammer.origin
-    largest_value = drive.waveform.peak
+    largest_value = drive.largest_pulse
     current, push = (0.0, largest_value) if drive.quantity == "force" else (largest_value, 0.0)
 
     def force(x: float) -> float:
@@ -184,9 +184,10 @@ class Problem:
         self.tolerance = tolerance
         self.laws = laws_of(hammer, drive)
         self.constants = constants_of(hammer)
-        firings, pieces, self.replace, _force = drive.kernel_arrays()
+        firings, begins, pieces, self.replace, _force = drive.kernel_arrays()
         # The kernel is compiled for arrays that may be written to.
         self.firings = np.array(firings, dtype=np.float64)
+        self.begins = np.array(begins, dtype=np.int64)
         self.pieces = np.array(pieces, dtype=np.float64)
         self.scales = scales_of(hammer, drive, state)
         # The eighth order is controlled through the estimates of the sixth and the seventh.
@@ -204,7 +205,8 @@ class Problem:
     def drive_arrays(self) -> tuple[Any, ...]:
         """Return what the kernel needs of the drive, with working space of its own."""
         count = self.firings.size
-        return (self.firings, self.pieces, self.replace, np.zeros(count, np.int64), np.zeros(1 + 7 * count))
+        under_way, live = np.zeros(count, np.int64), np.zeros(1 + 7 * count)
+        return (self.firings, self.begins, self.pieces, self.replace, under_way, live)
 
     def run(self, end: float) -> Record:
         """Integrate to time `end`, s."""
@@ -213,11 +215,12 @@ class Problem:
         capacity = _NODES + int(_NODES_A_FLIGHT * flights)
         contact_capacity = _CONTACTS + int(flights)
         while True:
-            firings, pieces, replace, under_way, live = self.drive_arrays()
+            firings, begins, pieces, replace, under_way, live = self.drive_arrays()
             nodes = np.empty((capacity, 5))
             contacts = np.empty((contact_capacity, 7))
             status, used, touched, steps = self.kernel.run(
                 firings,
+                begins,
                 pieces,
                 replace,
                 self.constants,

@@ -33,6 +33,8 @@ FloatArray = npt.NDArray[np.float64]
 POLYNOMIAL: Final = 0
 EXPONENTIAL: Final = 1
 SINE: Final = 2
+END: Final = 3
+"""Kind that the last row has where the kernel gets several tables in one array."""
 COLUMNS: Final = 6
 
 _CHUNK: Final = 1024
@@ -63,6 +65,24 @@ def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:
     result = np.array([*kept, given[-1]], dtype=np.float64)
     result.flags.writeable = False
     return result
+
+
+def stacked(tables: Sequence[FloatArray]) -> tuple[list[int], FloatArray]:
+    """Put segment tables one after the other for the kernel, the longest support last, each end marked.
+
+    Returns
+    -------
+    The row at which each table begins; all rows, shape (all rows, 6), read-only.
+    """
+    order = sorted(range(len(tables)), key=lambda number: float(tables[number][-1, 0]))
+    begins, row = [0] * len(tables), 0
+    for number in order:
+        begins[number] = row
+        row += len(tables[number])
+    pieces = np.concatenate([tables[number] for number in order])
+    pieces[[begins[number] + len(tables[number]) - 1 for number in order], 1] = END
+    pieces.flags.writeable = False
+    return begins, pieces
 
 
 def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0) -> FloatArray:
@@ -136,8 +156,8 @@ def largest(segments: FloatArray) -> float:
     return best
 
 
-def largest_sum(segments: FloatArray, times: FloatArray, value: Callable[[FloatArray], FloatArray]) -> float:
-    """Find the largest absolute value of the sum of pulses fired at the given times.
+def largest_sum(edges: FloatArray, value: Callable[[FloatArray], FloatArray]) -> float:
+    """Find the largest absolute value of a sum of pulses.
 
     Every interval between neighbouring edges, inside which the sum is smooth, is sampled (densely near its
     start, where exponentials change), and the intervals with the largest samples are refined until the
@@ -145,15 +165,12 @@ def largest_sum(segments: FloatArray, times: FloatArray, value: Callable[[FloatA
 
     Parameters
     ----------
-    segments
-        Segment table with a finite support.
-    times
-        Firing times, s, ascending.
+    edges
+        Times at which a segment of one of them begins or ends, s, ascending, at least two.
     value
         The sum at given times.
     """
     fractions = np.union1d(np.linspace(0.0, 1.0, 33), np.geomspace(1e-6, 1.0, 31))
-    edges = np.unique(np.add.outer(times, segments[:, 0]))
     starts, ends = edges[:-1], np.nextafter(edges[1:], -np.inf)
     sampled = np.empty(len(starts))
     for k in range(0, len(starts), _CHUNK):

@@ -424,7 +424,7 @@ def _stretches(
     status = PAUSED
     while status == PAUSED:
         status, used, _touched, _steps = problem.kernel.run(
-            *arrays[:3],
+            *arrays[:4],
             problem.constants,
             problem.start,
             float(problem.state[0]),
@@ -433,7 +433,7 @@ def _stretches(
             problem.control,
             problem.bounds,
             MAX_STEPS,
-            *arrays[3:],
+            *arrays[4:],
             nodes,
             contacts,
             state,

@@ -83,7 +83,7 @@ def _stretches(
     count, status = 0, PAUSED
     while status == PAUSED and count < most:
         status, _used, touched, _steps = problem.kernel.run(
-            *arrays[:3],
+            *arrays[:4],
             problem.constants,
             problem.start,
             float(problem.state[0]),
@@ -92,7 +92,7 @@ def _stretches(
             problem.control,
             problem.bounds,
             MAX_STEPS,
-            *arrays[3:],
+            *arrays[4:],
             nodes,
             contacts,
             state,

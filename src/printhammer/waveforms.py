@@ -13,12 +13,14 @@ from typing import ClassVar, Final, Self
 from printhammer.constants import quantity
 from printhammer.segments import EXPONENTIAL, POLYNOMIAL, SINE, FloatArray, table
 from printhammer.waveform_base import QUANTITY_UNITS, QuantityName, Waveform
+from printhammer.waveform_chain import Chain
 from printhammer.waveform_sampled import Sampled
 
 __all__ = [
     "DECAY_TIMES",
     "QUANTITY_UNITS",
     "SHAPES",
+    "Chain",
     "HalfSine",
     "QuantityName",
     "Rectangle",

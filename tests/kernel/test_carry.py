@@ -36,6 +36,7 @@ def stretches(problem: Problem, end: float, pause_after: float) -> Iterator[tupl
     while status == PAUSED:
         status, used, touched, steps = problem.kernel.run(
             problem.firings,
+            problem.begins,
             problem.pieces,
             problem.replace,
             problem.constants,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compiling import compiled
 from printhammer.kernel.influence import BACKSTOP_MOVES, DELAYED, ENERGIES, MIDDLE, SPACING
-from printhammer.kernel.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, POSITION
+from printhammer.kernel.layout import BACKSTOP_PART, END, FRONT, INVERSE_MASS, MAGNET, POSITION
 from printhammer.kernel.modes import (
     BACKSTOP,
     BACKSTOP_RELEASED,
@@ -147,7 +147,7 @@ def pass_switch(node: Any, after: Any, columns: Any, hammer: Hammer, drive: Driv
 @compiled
 def piece_value(t: float, fired: float, piece: int, pieces: Any) -> float:
     """Return the value [A or N] of one piece of a pulse fired at time `fired` [s]."""
-    if piece >= pieces.shape[0] - 1:
+    if pieces[piece, 1] == END:
         return 0.0
     s = (t - fired) - pieces[piece, 0]
     kind, p0, p1 = pieces[piece, 1], pieces[piece, 2], pieces[piece, 3]
@@ -193,6 +193,7 @@ def pass_edge(
 def pass_moving_edges(
     node: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -206,31 +207,34 @@ def pass_moving_edges(
 ) -> None:
     """Carry the columns through all edges of the drive at a node, which `pass_edges` has not passed yet."""
     t = node[0]
-    final = pieces.shape[0] - 1
     value = drive_value(t, drive)
     for p in range(first, last):
-        for piece in range(under_way[p] + 1, final + 1):
+        piece = under_way[p]
+        while pieces[piece, 1] != END:
+            piece += 1
             if firings[p] + pieces[piece, 0] > t:
                 break
             change = piece_value(t, firings[p], piece, pieces) - piece_value(t, firings[p], piece - 1, pieces)
             value = pass_edge(node, value, change, p, piece, columns, hammer, fire_moves, piece_moves)
     while last < firings.size and firings[last] <= t:
-        change = piece_value(t, firings[last], 0, pieces)
+        change = piece_value(t, firings[last], begins[last], pieces)
         if replace:
             change -= value
-        value = pass_edge(node, value, change, last, 0, columns, hammer, fire_moves, piece_moves)
+        value = pass_edge(node, value, change, last, begins[last], columns, hammer, fire_moves, piece_moves)
         last += 1
 
 
 @compiled
 def set_live_moves(
-    first: int, last: int, under_way: Any, fire_moves: Any, piece_moves: Any, live_moves: Any
+    first: int, last: int, pieces: Any, under_way: Any, fire_moves: Any, piece_moves: Any, live_moves: Any
 ) -> None:
     """Rewrite the changes of the pieces under way, in the order in which `pass_edges` has them."""
     for k in range(fire_moves.shape[0]):
         j = 0
         for p in range(first, last):
             piece = under_way[p]
+            if pieces[piece, 1] == END:
+                continue
             live_moves[k, j] = fire_moves[k, p] + piece_moves[k, piece, 0]
             for i in range(4):
                 live_moves[k, j + 1 + i] = piece_moves[k, piece, 2 + i]

@@ -193,6 +193,7 @@ def note_strobes(
     times: Any,
     strobes: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -214,7 +215,7 @@ def note_strobes(
         x0 = hammer[POSITION] - kept * kept
     elif which == R.UNLOADING_POOL:
         kept = pool[R.PEAK * R.BLOCK + i]
-    edges_at(t0, firings, pieces, replace, under_way, live)
+    edges_at(t0, firings, begins, pieces, replace, under_way, live)
     while strobe < times.size and (times[strobe] < until or (last and times[strobe] == until)):
         x, v, _w = state_in_step(times[strobe], t0, x0, v0, mode, kept, hammer, live)
         strobes[strobe, 0] = x
@@ -359,6 +360,7 @@ def new_edge(
     which: int,
     end: float,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -367,7 +369,7 @@ def new_edge(
 ) -> None:
     """Take over the pieces of the drive that begin at the time of a lane."""
     t = pool[R.T * R.BLOCK + i]
-    _first, _last, edge = edges_at(t, firings, pieces, replace, under_way, live)
+    _first, _last, edge = edges_at(t, firings, begins, pieces, replace, under_way, live)
     add_up(t, live, rates, pool, i)
     pool[R.NEXT * R.BLOCK + i] = min(edge, end)
     x, v = pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i]

@@ -84,6 +84,7 @@ def begin_member(
     end: float,
     rates: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -102,7 +103,7 @@ def begin_member(
     slot[R.DOT] = -1.0
     slot[R.END] = end
     slot[R.CAREFUL] = 0.0
-    _first, _last, edge = edges_at(t, firings, pieces, replace, under_way, live)
+    _first, _last, edge = edges_at(t, firings, begins, pieces, replace, under_way, live)
     a = acceleration(t, x, v, FREE, 0.0, hammer, live)
     mode = first_mode(x, v, a, hammer)
     if state[3] >= 0.0 or not end > t:
@@ -150,6 +151,7 @@ def look_after(
     slot: Any,
     rates: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -185,7 +187,7 @@ def look_after(
                 return STAYS
         if switch == NEAR_TOUCH:
             slot[R.CAREFUL] = 0.0
-            edges_at(pool[i], firings, pieces, replace, under_way, live)
+            edges_at(pool[i], firings, begins, pieces, replace, under_way, live)
             switch, t, x, v = locate(pool, i, which, hammer, live, control)
         if switch == UNRESOLVED:
             pool[R.H * R.BLOCK + i] = 0.5 * pool[R.LENGTH * R.BLOCK + i]
@@ -208,6 +210,7 @@ def look_after(
                 times,
                 strobes,
                 firings,
+                begins,
                 pieces,
                 replace,
                 under_way,
@@ -227,7 +230,7 @@ def look_after(
             return LEAVES
         which = target
     if t >= pool[R.NEXT * R.BLOCK + i]:
-        new_edge(pool, i, which, slot[R.END], firings, pieces, replace, under_way, live, rates)
+        new_edge(pool, i, which, slot[R.END], firings, begins, pieces, replace, under_way, live, rates)
     return target
 
 
@@ -244,6 +247,7 @@ def lanes(
     rates: Any,
     firing_starts: Any,
     firings: Any,
+    begins: Any,
     replace: bool,
     states: Any,
     ends: Any,
@@ -272,11 +276,11 @@ def lanes(
     Parameters as in :func:`printhammer.kernel.members.members`, and
 
     rates : float64 array, shape (W, 3)
-        Rates of the two exponentials and angular frequency of the sine in each waveform.
+        Rates of the two exponentials and angular frequency of the sine in the waveforms of each set.
     under_way, live : array
         Working space as in :func:`printhammer.kernel.run.run`.
     uniform : bool
-        Whether all members have the same hammer and waveform.
+        Whether all members have the same hammer and waveforms.
     pools : float64 array, shape (POOLS + 1, POOL_SIZE)
     counts : int64 array, shape (POOLS,)
     members_in : int64 array, shape (POOLS, LANES)
@@ -339,6 +343,7 @@ def lanes(
                 ends[m],
                 rates[wave],
                 firings[firing_starts[m] : firing_starts[m + 1]],
+                begins[firing_starts[m] : firing_starts[m + 1]],
                 pieces[piece_starts[wave] : piece_starts[wave + 1]],
                 replace,
                 under_way,
@@ -391,6 +396,7 @@ def lanes(
                     slot,
                     rates[wave],
                     firings[firing_starts[m] : firing_starts[m + 1]],
+                    begins[firing_starts[m] : firing_starts[m + 1]],
                     pieces[piece_starts[wave] : piece_starts[wave + 1]],
                     replace,
                     under_way,

@@ -16,5 +16,8 @@ PLACES = {"spring": SPRING, "pack": PACK, "backstop": BACKSTOP_PART, "magnet": M
 SLOT = 16
 """Number of constants that a spring, pack or backstop may have."""
 
+END = 3.0
+"""Kind of the row of a table of pieces at which a waveform ends, see `printhammer.kernel.pulses`."""
+
 Control = tuple[float, float, float, float]
 """Scales of displacement and velocity, allowances of the error estimates of order 6 and 7."""

@@ -29,6 +29,7 @@ def members(
     pieces: Any,
     firing_starts: Any,
     firings: Any,
+    begins: Any,
     replace: bool,
     states: Any,
     ends: Any,
@@ -56,13 +57,14 @@ def members(
     which : int64 array
         Numbers of the members.
     hammer_of, waveform_of : int64 array, shape (M,)
-        Row of `hammers`, `controls` and `bounds`, and waveform, of each member.
+        Row of `hammers`, `controls` and `bounds`, and set of waveforms, of each member.
     hammers, controls, bounds : float64 array, shape (H, any), (H, 4), (H, 4)
         As `hammer`, `control` and `bounds` in :func:`printhammer.kernel.run.run`.
     piece_starts, pieces
-        Rows of the waveforms' tables one after the other, and the first row of each.
-    firing_starts, firings
-        Firing times [s] of all members one after the other, and the first of each.
+        Pieces of all sets of waveforms one after the other, and the first of each set.
+    firing_starts, firings, begins
+        Firing times [s] and first pieces of all members one after the other, and the first of each; pieces
+        are counted within the member's set.
     replace : bool
         Whether a firing cuts off the pulses before it.
     states : float64 array, shape (M, 5)
@@ -102,6 +104,7 @@ def members(
         control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
         limits = (bounds[row, 0], bounds[row, 1], bounds[row, 2], bounds[row, 3])
         own = firings[firing_starts[m] : firing_starts[m + 1]]
+        own_begins = begins[firing_starts[m] : firing_starts[m + 1]]
         wave = waveform_of[m]
         table = pieces[piece_starts[wave] : piece_starts[wave + 1]]
         own_dots = dots[firing_starts[m] : firing_starts[m + 1]]
@@ -127,6 +130,7 @@ def members(
         while code == PAUSED:
             code, used, touched, count = run(
                 own,
+                own_begins,
                 table,
                 replace,
                 hammer,
@@ -152,6 +156,7 @@ def members(
                     contacts[:touched],
                     record,
                     own,
+                    own_begins,
                     table,
                     replace,
                     under_way[1],
@@ -168,6 +173,7 @@ def members(
                 code != PAUSED,
                 record,
                 own,
+                own_begins,
                 table,
                 replace,
                 under_way[1],

@@ -76,6 +76,7 @@ def quadratures(
     ends: Any,
     nodes: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -91,16 +92,16 @@ def quadratures(
         Number of the node at which the step begins; ascending.
     starts, ends : float64 array, shape (n,)
         Times [s] between which to integrate, inside that step.
-    nodes, firings, pieces, replace, under_way, live, hammer
+    nodes, firings, begins, pieces, replace, under_way, live, hammer
         As in :func:`printhammer.kernel.resample.resample`.
     """
     first, last = 0, 0
     for row in range(steps.size):
         i = steps[row]
         if row == 0:
-            first, last, _edge = edges_at(nodes[i, 0], firings, pieces, replace, under_way, live)
+            first, last, _edge = edges_at(nodes[i, 0], firings, begins, pieces, replace, under_way, live)
         t0, x0, v0, mode, kept = nodes[i, 0], nodes[i, 1], nodes[i, 2], int(nodes[i, 3]), nodes[i, 4]
-        first, last, _edge = pass_edges(t0, firings, pieces, replace, under_way, first, last, live)
+        first, last, _edge = pass_edges(t0, firings, begins, pieces, replace, under_way, first, last, live)
         for j in range(4):
             out[row, j] = 0.0
         if i + 1 < nodes.shape[0] and nodes[i + 1, 0] == t0 and nodes[i + 1, 1] == x0:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -60,6 +60,12 @@ class Piece:
 def waveform_pieces(waveform: Any) -> list[Piece]:
     """Write one pulse of a waveform, fired at zero, as analytic pieces."""
     shape = waveform.shape
+    if shape == "chain":
+        return [
+            replace(piece, start=piece.start + offset, end=piece.end + offset)
+            for offset, part in waveform.parts
+            for piece in waveform_pieces(part)
+        ]
     if shape == "sampled":
         return _sampled_pieces(waveform)
     a = float(waveform.amplitude)
@@ -116,9 +122,16 @@ class ReferenceDrive:
         self.is_current = drive.quantity == "current"
         self.add = drive.overlap == "add"
         self.times = [float(time) for time in np.atleast_1d(drive.times)]
-        self.pieces = waveform_pieces(drive.waveform)
-        self.support = max((piece.end for piece in self.pieces), default=0.0)
-        edges = {time + edge for time in self.times for p in self.pieces for edge in (p.start, p.end)}
+        waveforms = getattr(drive, "waveforms", None) or (drive.waveform,) * len(self.times)
+        once = {id(waveform): waveform_pieces(waveform) for waveform in waveforms}
+        self.pieces = [once[id(waveform)] for waveform in waveforms]
+        self.support = max((piece.end for pieces in once.values() for piece in pieces), default=0.0)
+        edges = {
+            time + edge
+            for time, pieces in zip(self.times, self.pieces, strict=True)
+            for piece in pieces
+            for edge in (piece.start, piece.end)
+        }
         self.edges = sorted(edge for edge in edges.union(self.times) if math.isfinite(edge))
 
     def next_edge(self, t: float) -> float:
@@ -132,7 +145,7 @@ class ReferenceDrive:
         latest = bisect_right(self.times, t) - 1
         for i in range(latest, -1, -1):
             fired = self.times[i]
-            for piece in self.pieces:
+            for piece in self.pieces[i]:
                 # Edges are compared as the sums they are, so that none is missed by a rounding.
                 if fired + piece.start <= t < fired + piece.end:
                     out += piece.series(t - (fired + piece.start), h)

@@ -114,6 +114,7 @@ def resample(
     times: Any,
     nodes: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -127,13 +128,13 @@ def resample(
     ----------
     times : float64 array, shape (n,)
         Ascending, inside the run [s].
-    nodes, firings, pieces, replace, under_way, live, hammer
+    nodes, firings, begins, pieces, replace, under_way, live, hammer
         As recorded and given in :func:`printhammer.kernel.run.run`.
     out : float64 array, shape (n, 9)
         Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
         the backstop, mode. At the time of an impact or a switch: the state after it.
     """
-    first, last, _edge = edges_at(nodes[0, 0], firings, pieces, replace, under_way, live)
+    first, last, _edge = edges_at(nodes[0, 0], firings, begins, pieces, replace, under_way, live)
     i = 0
     for row in range(times.size):
         t = times[row]
@@ -143,7 +144,7 @@ def resample(
             moved = True
         if moved:
             first, last, _edge = pass_edges(
-                nodes[i, 0], firings, pieces, replace, under_way, first, last, live
+                nodes[i, 0], firings, begins, pieces, replace, under_way, first, last, live
             )
         mode = int(nodes[i, 3])
         kept = nodes[i, 4]
@@ -202,6 +203,7 @@ def peaks_of(
     contact: Any,
     nodes: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -219,10 +221,12 @@ def peaks_of(
     strongest = (begin, 0)
     deepest_value = 0.0
     strongest_value = 0.0
-    first, last, _edge = edges_at(nodes[begin, 0], firings, pieces, replace, under_way, live)
+    first, last, _edge = edges_at(nodes[begin, 0], firings, begins, pieces, replace, under_way, live)
     while end + 1 < nodes.shape[0] and not (nodes[end, 0] >= contact[3]):
         node = nodes[end]
-        first, last, _edge = pass_edges(node[0], firings, pieces, replace, under_way, first, last, live)
+        first, last, _edge = pass_edges(
+            node[0], firings, begins, pieces, replace, under_way, first, last, live
+        )
         for j in range(SAMPLES + 1):
             t = node[0] + (nodes[end + 1, 0] - node[0]) * j / SAMPLES
             depth, force = depth_and_force(t, node, surface, hammer, live)
@@ -248,7 +252,7 @@ def peaks_of(
             high = nodes[k, 0] + part * min(highest, SAMPLES)
             if not high > low:
                 continue
-            edges_at(nodes[k, 0], firings, pieces, replace, under_way, live)
+            edges_at(nodes[k, 0], firings, begins, pieces, replace, under_way, live)
             t, value = refined(which, low, high, nodes[k], surface, hammer, live)
             if which == 0 and value > deepest_value:
                 peak_time, deepest_value = t, value
@@ -262,6 +266,7 @@ def peaks(
     contacts: Any,
     nodes: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -272,5 +277,5 @@ def peaks(
     """Fill `out`, shape (m, 3), with what `peaks_of` tells of all recorded contacts."""
     for row in range(contacts.shape[0]):
         out[row, 0], out[row, 1], out[row, 2] = peaks_of(
-            contacts[row], nodes, firings, pieces, replace, under_way, live, hammer
+            contacts[row], nodes, firings, begins, pieces, replace, under_way, live, hammer
         )

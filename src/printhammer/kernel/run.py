@@ -219,6 +219,7 @@ def contact_unit(v: float, control: Control) -> float:
 @entry
 def run(
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     hammer: Hammer,
@@ -241,8 +242,10 @@ def run(
     ----------
     firings : float64 array, shape (n,)
         Firing times [s], ascending.
-    pieces : float64 array, shape (m + 1, 6)
-        The waveform's table of pieces, see :mod:`printhammer.kernel.pulses`.
+    begins : int64 array, shape (n,)
+        Row of `pieces` at which the table of each firing's waveform begins.
+    pieces : float64 array, shape (m, 6)
+        The tables of all waveforms, see :mod:`printhammer.kernel.pulses`.
     replace : bool
         Whether a firing cuts off the pulses before it.
     hammer : float64 array
@@ -295,7 +298,7 @@ def run(
         steps = int(carry[C.STEPS])
         touched = carry_contact(contacts, mode)
     else:
-        first, last, edge = pass_edges(t, firings, pieces, replace, under_way, 0, 0, live)
+        first, last, edge = pass_edges(t, firings, begins, pieces, replace, under_way, 0, 0, live)
         a = acceleration(t, x, v, FREE, memory, hammer, drive)
         mode = first_mode(x, v, a, hammer)
         if carry[C.STATE] == C.ON_BRANCH:
@@ -333,7 +336,7 @@ def run(
             break
         t_next = min(edge, t_end)
         if t_next <= t:
-            first, last, edge = pass_edges(t, firings, pieces, replace, under_way, first, last, live)
+            first, last, edge = pass_edges(t, firings, begins, pieces, replace, under_way, first, last, live)
             a = acceleration(t, x, v, mode, memory, hammer, drive)
             entered = True
             continue
@@ -416,7 +419,7 @@ def run(
         status = left if left != OK else out_of_bounds(x, bounds)
         entered = entered or switch != NO_SWITCH
         if switch == EDGE:
-            first, last, edge = pass_edges(t, firings, pieces, replace, under_way, first, last, live)
+            first, last, edge = pass_edges(t, firings, begins, pieces, replace, under_way, first, last, live)
             a = acceleration(t, x, v, mode, memory, hammer, drive)
             if mode == BACKSTOP:
                 kv = contact_rate(w, v, t, hammer, drive)

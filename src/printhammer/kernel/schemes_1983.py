@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from printhammer.kernel.layout import END
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
@@ -69,7 +71,7 @@ class SchemeRun:
 def integrate(
     laws: Mapping[str, Callable[..., float]],
     constants: Mapping[str, Array],
-    drive: tuple[Array, Array, bool, bool],
+    drive: tuple[Array, Array, Array, bool, bool],
     *,
     mass: float,
     front: float,
@@ -92,8 +94,8 @@ def integrate(
         Packed constants of "magnet", "spring", "pack" and "backstop", float64 arrays (empty for an absent
         part).
     drive : tuple
-        Firing times (s), segment table, whether a pulse replaces the one before, whether the drive is a
-        force.
+        Firing times (s), first row of the table of each, tables of the waveforms, whether a pulse replaces
+        the one before, whether the drive is a force.
     mass : float
         kg.
     front, position : float
@@ -128,7 +130,7 @@ def integrate(
     if not (scale > 0.0 and t_end > 0.0 and math.isfinite(scale) and math.isfinite(t_end)):
         raise ValueError(f"scale {scale} and duration {t_end} s are expected to be positive")
     program = _program(tuple(laws[name] for name in LAW_NAMES))
-    firings, segments, replace, is_force = drive
+    firings, begins, segments, replace, is_force = drive
     contact = CONTACT_STEP * scale
     n = math.ceil(t_end / contact) + 8
     t, x, v = np.empty(n), np.empty(n), np.empty(n)
@@ -140,7 +142,11 @@ def integrate(
     )
     options = (bool(replace), bool(is_force), scheme == "trapezoid", rigid, reload_along_unloading)
     places = np.array([mass, front, position, t_end, far])
-    table = (np.array(firings, dtype=np.float64), np.array(segments, dtype=np.float64))
+    table = (
+        np.array(firings, dtype=np.float64),
+        np.array(begins, dtype=np.int64),
+        np.array(segments, dtype=np.float64),
+    )
     size, status = program(packed, table, options, places, steps, t, x, v)
     return SchemeRun(t[:size].copy(), x[:size].copy(), v[:size].copy(), _STATUS[status])
 
@@ -157,18 +163,22 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
 
     @numba.njit(**options)  # type: ignore[untyped-decorator]
     def drive_value(time: float, table: Any, replace: bool) -> float:
-        firings, segments = table
-        last = segments.shape[0] - 1
+        firings, begins, segments = table
+        longest = segments[segments.shape[0] - 1, 0]
         total = 0.0
         for i in range(firings.size - 1, -1, -1):
             tau = time - firings[i]
             if tau < 0.0:
                 continue
-            if tau >= segments[last, 0]:
+            if tau >= longest:
                 break
-            k = last - 1
-            while segments[k, 0] > tau:
-                k -= 1
+            k = begins[i]
+            while segments[k, 1] != END and segments[k + 1, 0] <= tau:
+                k += 1
+            if segments[k, 1] == END:
+                if replace:
+                    break
+                continue
             s = tau - segments[k, 0]
             p0, p1, p2, p3 = segments[k, 2], segments[k, 3], segments[k, 4], segments[k, 5]
             if segments[k, 1] == 1.0:

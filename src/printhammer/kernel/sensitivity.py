@@ -265,6 +265,7 @@ def note_seen(
 def sensitivity(
     nodes: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -293,7 +294,7 @@ def sensitivity(
 
     Parameters
     ----------
-    nodes, firings, pieces, replace, under_way, live, hammer
+    nodes, firings, begins, pieces, replace, under_way, live, hammer
         As recorded and given in :func:`printhammer.kernel.run.run`.
     scales, bounds : tuple of float
         As in :func:`printhammer.kernel.tangent.tangent`.
@@ -301,8 +302,8 @@ def sensitivity(
         The hammer's constants moved by -4 to 4 times `SPACING` of their changes, and the changes.
     of_hammer : int64 array, shape (n,)
         Which laws a column changes, sum of the bits of :mod:`printhammer.kernel.influence`.
-    fire_moves, piece_moves : float64 arrays, shapes (n, f) and (n, m + 1, 6)
-        Changes of the firing times [s] and of the waveform's table.
+    fire_moves, piece_moves : float64 arrays, shapes (n, f) and (n, m, 6)
+        Changes of the firing times [s] and of the waveforms' tables.
     live_moves, memories : float64 arrays, shapes (n, 5 f) and (n, 9)
         Working space.
     value_spacing : float
@@ -331,8 +332,8 @@ def sensitivity(
     count = nodes.shape[0]
     smooth = True
     due, asked = 0, 0
-    first, last, _edge = edges_at(nodes[0, 0], firings, pieces, replace, under_way, live)
-    set_live_moves(first, last, under_way, fire_moves, piece_moves, live_moves)
+    first, last, _edge = edges_at(nodes[0, 0], firings, begins, pieces, replace, under_way, live)
+    set_live_moves(first, last, pieces, under_way, fire_moves, piece_moves, live_moves)
     for i in range(count):
         if due == marks.size:
             return smooth
@@ -342,11 +343,13 @@ def sensitivity(
         t_end = after[0]
         if due > 0:
             pass_moving_edges(
-                node, firings, pieces, replace, under_way, first, last, columns, hammer, live, fire_moves,
-                piece_moves,
+                node, firings, begins, pieces, replace, under_way, first, last, columns, hammer, live,
+                fire_moves, piece_moves,
             )  # fmt: skip
-        first, last, _edge = pass_edges(node[0], firings, pieces, replace, under_way, first, last, live)
-        set_live_moves(first, last, under_way, fire_moves, piece_moves, live_moves)
+        first, last, _edge = pass_edges(
+            node[0], firings, begins, pieces, replace, under_way, first, last, live
+        )
+        set_live_moves(first, last, pieces, under_way, fire_moves, piece_moves, live_moves)
         begin_step(node, work)
         # A mark at the time of several nodes belongs to the last of them.
         while due < marks.size and (marks[due] < t_end or (final and marks[due] == t_end)):

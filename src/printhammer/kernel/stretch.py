@@ -66,6 +66,7 @@ def note_dots(
     contacts: Any,
     nodes: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -86,7 +87,9 @@ def note_dots(
         if MEMORY:
             depth, force = deepest_node(contact, nodes, hammer)
         else:
-            _t, depth, force = peaks_of(contact, nodes, firings, pieces, replace, under_way, live, hammer)
+            _t, depth, force = peaks_of(
+                contact, nodes, firings, begins, pieces, replace, under_way, live, hammer
+            )
         dots[fired, 1] = contact[1]
         dots[fired, 2] = contact[2]
         dots[fired, 3] = contact[3]
@@ -105,6 +108,7 @@ def note_states(
     final: bool,
     nodes: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -117,7 +121,7 @@ def note_states(
     first strobe and sample that are left.
     """
     n = nodes.shape[0]
-    first, last, _edge = edges_at(nodes[0, 0], firings, pieces, replace, under_way, live)
+    first, last, _edge = edges_at(nodes[0, 0], firings, begins, pieces, replace, under_way, live)
     i = 0
     while True:
         due = np.inf
@@ -134,7 +138,7 @@ def note_states(
             moved = True
         if moved:
             first, last, _edge = pass_edges(
-                nodes[i, 0], firings, pieces, replace, under_way, first, last, live
+                nodes[i, 0], firings, begins, pieces, replace, under_way, first, last, live
             )
         mode, kept = int(nodes[i, 3]), nodes[i, 4]
         displacement, velocity, _w = state_in_step(

@@ -208,6 +208,7 @@ def scale_or_note(factor: float, renormalise: bool, columns: Any, scales: Any, g
 def tangent(
     nodes: Any,
     firings: Any,
+    begins: Any,
     pieces: Any,
     replace: bool,
     under_way: Any,
@@ -228,7 +229,7 @@ def tangent(
 
     Parameters
     ----------
-    nodes, firings, pieces, replace, under_way, live, hammer
+    nodes, firings, begins, pieces, replace, under_way, live, hammer
         As recorded and given in :func:`printhammer.kernel.run.run`.
     scales : tuple of float
         Scales of displacement and velocity.
@@ -253,7 +254,7 @@ def tangent(
         of the columns since the mark before.
     """
     count = nodes.shape[0]
-    first, last, _edge = edges_at(nodes[0, 0], firings, pieces, replace, under_way, live)
+    first, last, _edge = edges_at(nodes[0, 0], firings, begins, pieces, replace, under_way, live)
     grown = track[GROWN:]
     for i in range(count):
         due = int(track[DUE])
@@ -263,7 +264,9 @@ def tangent(
         after = nodes[min(i + 1, count - 1)]
         final = i + 1 == count
         t_end = after[0]
-        first, last, _edge = pass_edges(node[0], firings, pieces, replace, under_way, first, last, live)
+        first, last, _edge = pass_edges(
+            node[0], firings, begins, pieces, replace, under_way, first, last, live
+        )
         begin_step(node, work)
         # A mark at the time of several nodes belongs to the last of them.
         while due < marks.size and (marks[due] < t_end or (final and ended and marks[due] == t_end)):

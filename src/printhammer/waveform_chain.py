@@ -1,0 +1,97 @@
+"""A waveform made of several that follow one another, such as a print pulse and a later brake pulse."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Self
+
+from pydantic import model_validator
+
+from printhammer.errors import InputError
+from printhammer.segments import FloatArray, table
+from printhammer.waveform_base import Waveform
+
+
+class Chain(Waveform):
+    """Several waveforms in one firing, each begun at an offset from it; between them the drive is zero.
+
+    `parts` holds pairs of the offset, s or a string with a unit, and the waveform. They ascend, none begins
+    before the one before it has ended, and all are currents or all are forces. The part of a chain fired at
+    an offset has its edges at the rounded sums of offset and edge.
+    """
+
+    shape: ClassVar[str] = "chain"
+    parts: tuple[tuple[float, Waveform], ...]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_parts(cls, data: Any) -> Any:
+        """Check the parts one by one; what they drive, the chain drives."""
+        if not isinstance(data, dict) or "parts" not in data:
+            return data
+        parts = _checked(data["parts"])
+        driven = parts[0][1].quantity
+        if data.get("quantity", driven) != driven:
+            raise InputError(
+                f"quantity = {data['quantity']!r} is expected to be that of the parts, {driven!r}"
+            )
+        return {**data, "parts": parts, "quantity": driven}
+
+    def segments(self) -> FloatArray:
+        """Return the segment table: those of the parts one after the other, zero in between."""
+        rows: list[tuple[float, ...]] = []
+        for offset, part in self.parts:
+            own = [tuple(float(number) for number in row) for row in part.segments()]
+            if rows and offset <= rows[-1][0]:
+                # The end of the part before gives way to what begins there.
+                rows.pop()
+            rows += [(offset + start, *rest) for start, *rest in own]
+        return table(rows[:-1], rows[-1][0])
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same chain with every value multiplied by a factor."""
+        return type(self)(parts=tuple((offset, part.scaled(factor)) for offset, part in self.parts))
+
+
+def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
+    """Return offsets, s, and waveforms of a chain, none beginning before the one before it has ended."""
+    try:
+        pairs = [tuple(pair) for pair in parts]  # type: ignore[attr-defined]
+    except TypeError:
+        pairs = []
+    if not pairs or any(len(pair) != 2 for pair in pairs):
+        raise InputError(f"parts = {parts!r} is expected to be pairs of an offset and a waveform")
+    found: list[tuple[float, Waveform]] = []
+    end = 0.0
+    for number, (given, waveform) in enumerate(pairs):
+        if not isinstance(waveform, Waveform):
+            raise InputError(f"parts[{number}]: {waveform!r} is expected to be a waveform")
+        if waveform.quantity != pairs[0][1].quantity:
+            raise InputError(
+                f"parts[{number}] is a {waveform.quantity}, expected a {pairs[0][1].quantity} like the first"
+            )
+        if not math.isfinite(waveform.support):
+            raise InputError(f"parts[{number}] is a {waveform.shape}, expected a waveform that ends")
+        offset = _offset(given, number)
+        if offset < end:
+            sooner = "the firing" if number == 0 else f"the end of parts[{number - 1}]"
+            raise InputError(
+                f"parts[{number}] begins at {offset:.9g} s, expected at or after {end:.9g} s, {sooner}"
+            )
+        end = offset + waveform.support
+        found.append((offset, waveform))
+    return tuple(found)
+
+
+def _offset(given: object, number: int) -> float:
+    """Read the offset of a part: a number in s, or a string with a unit."""
+    if isinstance(given, str):
+        from printhammer.units import parse
+
+        try:
+            return parse(given, "s")
+        except InputError as error:
+            raise InputError(f"parts[{number}]: {error}") from None
+    if isinstance(given, bool) or not isinstance(given, float | int) or not math.isfinite(given):
+        raise InputError(f"parts[{number}]: offset {given!r} is expected to be a finite number in s")
+    return float(given)
