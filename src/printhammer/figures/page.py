@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
@@ -35,15 +36,18 @@ View = Literal["page", "zoom", "sheet"]
 VIEWS: Final = get_args(View)
 """The page with all that there is to see; its worst place alone; the paper alone, at its true size."""
 
-ZOOM_SLOTS: Final = 27
-"""Slots of the worst place that are shown."""
+ZOOM_SHAPE: Final = 3.5
+"""How many times wider than the height of the wires the worst place is."""
 
 _WIDTH: Final = 7.6
 _SIDE: Final = 0.2
 _LABEL: Final = 0.24
 _GAP: Final = 0.1
 _BAR: Final = 1.5
+_LEAST_MARK: Final = 1.8
+_NEUTRAL: Final = "#c6ccd1"
 _TALLEST: Final = 3.2
+_LARGEST: Final = 0.1
 _FOOT: Final = 0.62
 _INCH: Final = 25.4e-3
 _FINENESS: Final = 10
@@ -83,7 +87,9 @@ def plot(page: Page, view: View = "page") -> Figure:
         raise InputError(f"view = {view!r}, expected one of {', '.join(VIEWS)}")
     sheet = whole_sheet(page)
     wide = _WIDTH - 2.0 * _SIDE
-    strip = min(_TALLEST, wide * sheet.height / sheet.width)
+    scale = min(wide / sheet.width, _TALLEST / sheet.height, _LARGEST / page.head.pitch)
+    strip = scale * sheet.height
+    sheet = replace(sheet, right=sheet.left + wide / scale)
     place = zoomed_sheet(page)
     zoom = wide * place.height / place.width
     height = 3 * (_LABEL + strip + _GAP) + 1.5 * _LABEL + zoom + _FOOT + 0.1
@@ -114,12 +120,17 @@ def whole_sheet(page: Page) -> Sheet:
     return Sheet(-margin, across + margin, -margin, down + margin)
 
 
-def zoomed_sheet(page: Page, slots: int = ZOOM_SLOTS) -> Sheet:
+def zoom_slots(page: Page) -> int:
+    """Return the slots of the worst place that are shown."""
+    return max(1, round(ZOOM_SHAPE * page.head.wires * page.head.wire_pitch / page.head.pitch))
+
+
+def zoomed_sheet(page: Page) -> Sheet:
     """Return the paper about the worst place of a page."""
-    head = page.head
+    head, slots = page.head, zoom_slots(page)
     line, first = page.worst_place(slots)
     top = line * head.line_pitch
-    last = first + min(slots, page.pattern.slots) - 1
+    last = first + slots - 1
     margin = 1.2 * head.pitch
     return Sheet(
         first * head.pitch - margin,
@@ -156,8 +167,8 @@ def _printed_title(page: Page) -> str:
 
 
 def _zoom_title(page: Page) -> str:
-    line, first = page.worst_place(ZOOM_SLOTS)
-    last = min(first + ZOOM_SLOTS, page.pattern.slots)
+    line, first = page.worst_place(zoom_slots(page))
+    last = min(first + zoom_slots(page), page.pattern.slots)
     return (
         f"The worst place: print line {line + 1}, slots {first + 1} to {last} (rings: where dots are wanted)"
     )
@@ -211,6 +222,13 @@ def _discs(
     return discs
 
 
+def _in_points(ax: Axes, length: float) -> float:
+    """Return how long a length on the paper, m, is drawn, points."""
+    width, _height = ax.get_figure(root=True).get_size_inches()
+    left, right = ax.get_xlim()
+    return float(72.0 * width * ax.get_position().width * length / (right - left))
+
+
 def _differences(figure: Figure, ax: Axes, page: Page, across: FloatArray, down: FloatArray) -> None:
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
@@ -219,7 +237,7 @@ def _differences(figure: Figure, ax: Axes, page: Page, across: FloatArray, down:
     # At least as wide as the limits, so that nothing shines that is nothing.
     bound = float(_MICRONS.shown(page.limits.arrival * page.speed))
     widest = max(float(np.abs(error).max(initial=0.0)), bound)
-    colours = LinearSegmentedColormap.from_list("off", [BLUE, "#cfd4d8", ORANGE])
+    colours = LinearSegmentedColormap.from_list("off", [BLUE, _NEUTRAL, ORANGE])
     discs = _discs(
         ax,
         across[on],
@@ -232,7 +250,10 @@ def _differences(figure: Figure, ax: Axes, page: Page, across: FloatArray, down:
         gid="placement error",
     )
     lost_across, lost_down = (part[page.lost] for part in page.intended)
-    ax.plot(lost_across, lost_down, ls="none", marker="x", ms=2.2, mew=0.6, color=INK, gid="lost")
+    mark = max(_in_points(ax, head.wire_diameter), _LEAST_MARK)
+    ax.plot(
+        lost_across, lost_down, ls="none", marker="x", ms=0.9 * mark, mew=0.25 * mark, color=INK, gid="lost"
+    )
     width, whole = figure.get_size_inches()
     box = ax.get_position()
     bar_axes = figure.add_axes(
@@ -257,10 +278,11 @@ def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
     near = (across > sheet.left - reach) & (across < sheet.right + reach)
     near &= (down > sheet.top - reach) & (down < sheet.bottom + reach)
     on, lost = near & page.printed, near & page.lost
-    rings = {"facecolors": "none", "linewidths": THIN}
+    mark = _in_points(ax, head.wire_diameter)
+    rings = {"facecolors": "none", "linewidths": min(THIN, 0.07 * mark)}
     _discs(ax, across[on], down[on], head.wire_diameter, edgecolors=BLUE, gid="wanted", **rings)
     _discs(ax, across[lost], down[lost], head.wire_diameter, edgecolors=ORANGE, gid="lost", **rings)
-    ax.plot(across[lost], down[lost], ls="none", marker="x", ms=5.0, mew=1.2, color=ORANGE)
+    ax.plot(across[lost], down[lost], ls="none", marker="x", ms=0.4 * mark, mew=0.1 * mark, color=ORANGE)
     more = near[page.extra_of]
     extra_across, extra_down = (part[more] for part in page.extra_places)
     _discs(ax, extra_across, extra_down, head.wire_diameter, edgecolors=GREEN, gid="extra", **rings)
