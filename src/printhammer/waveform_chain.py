@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Final, Self
 
+import numpy as np
 from pydantic import model_validator
 
 from printhammer.errors import InputError
-from printhammer.segments import FloatArray, table
+from printhammer.segments import FloatArray, evaluate, largest, table
 from printhammer.waveform_base import Waveform
+
+TAIL: Final = 1e-3
+"""What may be cut off of a decaying part where the next one begins, in parts of its peak."""
+
+_SAMPLES: Final = 257
 
 
 class Chain(Waveform):
     """Several waveforms in one firing, each begun at an offset from it; between them the drive is zero.
 
-    `parts` holds pairs of the offset, s or a string with a unit, and the waveform. They ascend, none begins
-    before the one before it has ended, and all are currents or all are forces. The part of a chain fired at
-    an offset has its edges at the rounded sums of offset and edge.
+    `parts` holds pairs of the offset, s or a string with a unit, and the waveform. They ascend, and all are
+    currents or all are forces. None begins before the one before it has ended, or decayed to `TAIL` of its
+    peak: what is left of that is cut off then. The part of a chain fired at an offset has its edges at the
+    rounded sums of offset and edge.
     """
 
     shape: ClassVar[str] = "chain"
@@ -42,7 +49,7 @@ class Chain(Waveform):
         rows: list[tuple[float, ...]] = []
         for offset, part in self.parts:
             own = [tuple(float(number) for number in row) for row in part.segments()]
-            if rows and offset <= rows[-1][0]:
+            while rows and offset <= rows[-1][0]:
                 # The end of the part before gives way to what begins there.
                 rows.pop()
             rows += [(offset + start, *rest) for start, *rest in own]
@@ -54,7 +61,7 @@ class Chain(Waveform):
 
 
 def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
-    """Return offsets, s, and waveforms of a chain, none beginning before the one before it has ended."""
+    """Return offsets, s, and waveforms of a chain, none beginning before the one before it is over."""
     try:
         pairs = [tuple(pair) for pair in parts]  # type: ignore[attr-defined]
     except TypeError:
@@ -62,7 +69,6 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
     if not pairs or any(len(pair) != 2 for pair in pairs):
         raise InputError(f"parts = {parts!r} is expected to be pairs of an offset and a waveform")
     found: list[tuple[float, Waveform]] = []
-    end = 0.0
     for number, (given, waveform) in enumerate(pairs):
         if not isinstance(waveform, Waveform):
             raise InputError(f"parts[{number}]: {waveform!r} is expected to be a waveform")
@@ -73,14 +79,27 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
         if not math.isfinite(waveform.support):
             raise InputError(f"parts[{number}] is a {waveform.shape}, expected a waveform that ends")
         offset = _offset(given, number)
-        if offset < end:
-            sooner = "the firing" if number == 0 else f"the end of parts[{number - 1}]"
+        sooner = "the firing" if number == 0 else f"parts[{number - 1}]"
+        if offset < (found[-1][0] if found else 0.0) or (
+            found and not _over(found[-1][1], offset - found[-1][0])
+        ):
             raise InputError(
-                f"parts[{number}] begins at {offset:.9g} s, expected at or after {end:.9g} s, {sooner}"
+                f"parts[{number}] begins at {offset:.9g} s, expected a time not before {sooner}"
+                f"{' is over' if found else ''}"
             )
-        end = offset + waveform.support
         found.append((offset, waveform))
     return tuple(found)
+
+
+def _over(waveform: Waveform, tau: float) -> bool:
+    """Tell whether a waveform has ended or decayed to its tail at a time after its firing, s."""
+    segments = waveform.segments()
+    end = float(segments[-1, 0])
+    if tau >= end:
+        return True
+    edges = segments[:, 0]
+    times = np.concatenate([np.linspace(tau, end, _SAMPLES), edges[edges > tau]])
+    return bool(np.abs(evaluate(segments, times)).max() <= TAIL * largest(segments))
 
 
 def _offset(given: object, number: int) -> float:
