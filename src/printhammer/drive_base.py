@@ -170,7 +170,8 @@ class Drive:
 
     def _ends(self) -> FloatArray:
         """Return the times at which the pulses end, s."""
-        return self._times + self._segments[-1, 0]
+        ends: FloatArray = self._times + self._segments[-1, 0]
+        return ends
 
     def _reach(self) -> int:
         """Return how many of the latest firings may be under way, with all between them."""

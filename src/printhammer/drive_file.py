@@ -273,7 +273,7 @@ def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]
 
 def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
     shape = table.get("shape")
-    known = {**SHAPES, Chain.shape: Chain}
+    known: dict[str, type[Waveform]] = {**SHAPES, Chain.shape: Chain}
     if not isinstance(shape, str) or shape not in known:
         raise InputError(f"{where}.shape = {shown(shape)} is expected to be one of {', '.join(known)}")
     model = known[shape]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from copy import copy
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -97,7 +97,9 @@ class PulseSequence(Drive):
     @property
     def largest_pulse(self) -> float:
         """Largest absolute value of any one pulse, A or N."""
-        return max(largest(table) for table in self._tables)
+        if math.isnan(self._largest):
+            self._largest = max(largest(table) for table in self._tables)
+        return self._largest
 
     @property
     def peak(self) -> float:
@@ -149,6 +151,8 @@ class PulseSequence(Drive):
         self._waveform = self._waveforms[0]
         self._segments = tables[0]
         self._tables = tables
+        # Looked for when first asked for.
+        self._largest = math.nan
         self._which = np.array([known[id(waveform)] for waveform in waveforms], dtype=np.int64)
         rows, self._pieces = stacked(tables)
         self._rows = np.array(rows, dtype=np.int64)[self._which]
@@ -186,7 +190,7 @@ class PulseSequence(Drive):
         return f"<PulseSequence: {kinds} of {self.quantity}, {fired}, overlap {self._overlap}>"
 
 
-def _checked(waveforms: Iterable[Waveform]) -> list[Waveform]:
+def _checked(waveforms: Any) -> list[Waveform]:
     """Return the waveforms of a sequence, all of one quantity and with an end."""
     try:
         given = [] if isinstance(waveforms, Waveform) else list(waveforms)
