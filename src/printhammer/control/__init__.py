@@ -1,0 +1,1 @@
+"""Better drives: compensation tables, feedback, bursts of least work."""

@@ -1,0 +1,183 @@
+"""From a compensation table to a drive: a pulse of its own for each dot, and a brake pulse after it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.control.histories import histories_of
+from printhammer.drive_input import read_positive
+from printhammer.errors import InputError
+from printhammer.printing.nominal import pulse_of
+from printhammer.printing.slots import slot_times
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.control.table import CompensationTable, Settings
+    from printhammer.drive import Drive
+    from printhammer.hammer import Hammer
+    from printhammer.segments import FloatArray
+    from printhammer.waveforms import Waveform
+
+WIDEST: Final = 2.0
+"""Largest width of a pulse, in parts of that of the hammer's own."""
+
+LARGEST_CURRENT: Final = 2.0
+"""Largest current in any drive unless told otherwise, A."""
+
+_ROUNDING: Final = 1e-9
+_HALVINGS: Final = 50
+
+
+def of_width(pulse: Waveform, width: float) -> Waveform:
+    """Return a pulse like another one, but of another width, s."""
+    return type(pulse)(**{**dict(pulse), "width": width})
+
+
+def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
+    """Return the pulse of a hammer, and the largest width, s, at which its current keeps to a bound, A.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform, one without a width, one that is a force, or one above the bound.
+    """
+    pulse = pulse_of(hammer)
+    width = getattr(pulse, "width", None)
+    if not isinstance(width, float):
+        raise InputError(f"{hammer.path}: a {pulse.shape} has no width, expected a pulse that has one")
+    if pulse.quantity != "current":
+        raise InputError(f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current")
+    if pulse.peak > largest * (1.0 + _ROUNDING):
+        raise InputError(
+            f"{hammer.path}: the waveform peaks at {pulse.peak:.4g} A, expected at most {largest:g} A"
+        )
+    low, high = width, WIDEST * width
+    if of_width(pulse, high).peak <= largest:
+        return pulse, high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if of_width(pulse, middle).peak <= largest else (low, middle)
+    return pulse, low
+
+
+def with_brake(pulse: Waveform, brake: Waveform | None, offset: float) -> Waveform:
+    """Return a pulse followed by a brake pulse, s after its firing; without one the pulse itself."""
+    from printhammer.waveforms import Chain
+
+    return pulse if brake is None else Chain(parts=((0.0, pulse), (offset, brake)))
+
+
+class TableStrategy:
+    """A compensation table as a way to drive a hammer.
+
+    Parameters
+    ----------
+    table : CompensationTable
+        The table.
+    hammer : Hammer
+        The hammer it is made for, whose waveform gets other widths.
+
+    Raises
+    ------
+    InputError
+        A pulse of the table peaks above its largest current.
+    """
+
+    name = "table"
+
+    def __init__(self, table: CompensationTable, hammer: Hammer) -> None:
+        self.table = table
+        self._pulse, widest = print_pulse(hammer, table.largest_current)
+        for column in ("width", "brake_width"):
+            found = float(getattr(table, column).max())
+            if found > widest * (1.0 + _ROUNDING):
+                raise InputError(
+                    f"the table for {table.hammer!r} has a {column} of {found:.9g} s, expected at most"
+                    f" {widest:.9g} s, so that the current is at most {table.largest_current:g} A"
+                )
+
+    def __call__(self, _hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
+        """Return a drive for each pattern; the hammer that is driven does not change them.
+
+        Raises
+        ------
+        InputError
+            The table does not reach to this rate, or a firing would come before the one before it has ended.
+        """
+        speed = read_positive(rate, "Hz", "rate")
+        settings = self.table.at(speed)
+        known: dict[tuple[float, float, float], Waveform] = {}
+        every = (pulses_of(settings, self.table.gaps, self.table.reach, slots, speed) for slots in patterns)
+        return [sequence(pulses, self._pulse, known) for pulses in every]
+
+
+@dataclass(frozen=True)
+class Pulses:
+    """What the dots of one pattern are made with: arrays of shape (dots,), s.
+
+    Attributes
+    ----------
+    due : array
+        Slot times.
+    advance, fired : array
+        Advance, and firing time.
+    width : array
+        Widths of the pulses.
+    braked : array
+        Widths of the brake pulses that follow; 0 for none.
+    offset : array
+        From firing to brake pulse.
+    """
+
+    due: FloatArray
+    advance: FloatArray
+    fired: FloatArray
+    width: FloatArray
+    braked: FloatArray
+    offset: FloatArray
+
+
+def pulses_of(settings: Settings, gaps: int, reach: int, slots: Sequence[int], rate: float) -> Pulses:
+    """Return what the dots of a pattern are made with."""
+    numbers = histories_of(slots, gaps, reach)
+    here, after = numbers[:-1], numbers[1:]
+    due = slot_times(slots, rate)
+    advance = settings.advance[here]
+    return Pulses(
+        due=due,
+        advance=advance,
+        fired=due - advance,
+        width=settings.width[here],
+        braked=settings.brake_width[after],
+        offset=settings.brake_delay[after] + advance,
+    )
+
+
+def sequence(pulses: Pulses, pulse: Waveform, known: dict[tuple[float, float, float], Waveform]) -> Drive:
+    """Return the drive of a pattern.
+
+    Parameters
+    ----------
+    pulses : Pulses
+        What its dots are made with.
+    pulse : Waveform
+        The pulse that gets these widths.
+    known : dict
+        Waveforms that were made before, by their three numbers; added to.
+    """
+    from printhammer.drive_sequence import PulseSequence
+
+    waveforms = []
+    for row in np.column_stack([pulses.width, pulses.braked, pulses.offset]).tolist():
+        width, braked, offset = row
+        key = (width, braked, offset if braked else 0.0)
+        if key not in known:
+            known[key] = with_brake(
+                of_width(pulse, width), of_width(pulse, braked) if braked else None, offset
+            )
+        waveforms.append(known[key])
+    return PulseSequence(waveforms, at=pulses.fired.tolist())

@@ -1,0 +1,172 @@
+"""A second dot after a first one, on a plane of firing time and width: where tables begin their search.
+
+A dot made right leaves the hammer as every dot does. What the next dot needs is therefore a function of the
+time since then, and one plane serves all rates: each of its cells is a dot at some place with some force.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.control.table_drive import of_width, with_brake
+from printhammer.drive_sequence import PulseSequence
+from printhammer.ensemble import Ensemble
+
+if TYPE_CHECKING:
+    from printhammer.control.table_brake import Brake
+    from printhammer.control.table_polish import Work
+    from printhammer.hammer import Hammer
+    from printhammer.printing.limits import Limits
+    from printhammer.segments import FloatArray
+
+STEP: Final = 5e-6
+"""Step of the firing times of a plane, s."""
+
+WIDTHS: Final = 40
+"""Number of widths of a plane."""
+
+LEAST_WIDTH: Final = 0.5
+"""Least width of a plane, in parts of that of the hammer's pulse."""
+
+ROOM: Final = 150e-6
+"""How far from its slot a dot is fired at most, s."""
+
+_PIECE: Final = 8192
+_WAIT: Final = 1e-3
+_SLACK: Final = 0.1
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Second dots: arrays of shape (firing times, widths).
+
+    Attributes
+    ----------
+    brake : Brake or None
+        The brake pulse between the two dots.
+    fired : array
+        Firing times after the slot of the first dot, s.
+    widths : array
+        Widths, s.
+    force : array
+        Deviation of the force, in parts of that of the single pulse; infinite for a lost or a doubled dot.
+    arrival : array
+        Touch less single-pulse flight time, s after the slot of the first dot: where a slot would have to be.
+    """
+
+    brake: Brake | None
+    fired: FloatArray
+    widths: FloatArray
+    force: FloatArray
+    arrival: FloatArray
+
+    def off(self, period: float, limits: Limits) -> FloatArray:
+        """Return how far each cell is off for a slot at a time after the first, in parts of the limits."""
+        return np.maximum(np.abs(self.force) / limits.force, np.abs(self.arrival - period) / limits.arrival)
+
+
+def plane(work: Work, hammer: Hammer, brake: Brake | None, periods: FloatArray) -> Plane:
+    """Compute a plane, from the time at which the armature leaves the pack on.
+
+    Parameters
+    ----------
+    work : Work
+        What the table is to be like, and what the single pulse does to the hammer it is for.
+    hammer : Hammer
+        What is driven, this hammer or another one.
+    brake : Brake or None
+        A brake pulse between the dots; the second one is not fired before it has ended.
+    periods : array
+        Times from slot to slot that are of interest, s: only firings near them are tried.
+    """
+    single, nominal, pulse = work.single, work.single.nominal, work.pulse
+    begin = single.left if brake is None else brake.delay + brake.width
+    steps = np.arange(max(0, math.floor((float(periods.max()) + ROOM - begin) / STEP) + 1))
+    every = begin + STEP * steps
+    near = np.abs(every[:, np.newaxis] - periods).min(axis=1, initial=math.inf) <= ROOM
+    fired = every[near]
+    own: Any = pulse
+    widths = np.linspace(LEAST_WIDTH * own.width, work.widest, WIDTHS)
+    first = pulse if brake is None else with_brake(pulse, of_width(pulse, brake.width), brake.delay)
+    seconds = [of_width(pulse, width) for width in widths.tolist()]
+    force, arrival = np.full((2, fired.size, widths.size), np.inf)
+    rows = max(1, _PIECE // widths.size)
+    for start in range(0, fired.size, rows):
+        times = fired[start : start + rows]
+        drives = [
+            PulseSequence([first, second], at=[0.0, time]) for time in times.tolist() for second in seconds
+        ]
+        result = Ensemble(
+            hammer, drives, np.repeat(times + _WAIT, widths.size), tolerance=work.tolerance
+        ).run(dots=True, threads=work.threads)
+        dots = result.dots
+        assert dots is not None
+        good = result.ok & dots.struck.all(axis=1) & (dots.extra_contacts == 0).all(axis=1)
+        shape = times.size, widths.size
+        off = np.where(good, dots.peak_force[:, 1] / nominal.force - 1.0, np.inf)
+        touched = np.where(good, dots.fired_at[:, 1] + dots.flight_time[:, 1] - nominal.flight_time, np.inf)
+        force[start : start + rows] = off.reshape(shape)
+        arrival[start : start + rows] = touched.reshape(shape)
+    return Plane(brake, fired, widths, force, arrival)
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A cell of a plane that comes next to what is asked.
+
+    Attributes
+    ----------
+    brake : Brake or None
+        Of the plane.
+    fired, width : float
+        Of the cell, s.
+    off : float
+        Worst deviation, in parts of the limits, of the hammer the table is made for.
+    off_others : float
+        The same over all hammers.
+    """
+
+    brake: Brake | None
+    fired: float
+    width: float
+    off: float
+    off_others: float
+
+
+def guess(planes: list[Plane], period: float, limits: Limits) -> Guess | None:
+    """Return the best cell for a slot at a time after the first.
+
+    Parameters
+    ----------
+    planes : list of Plane
+        With the same brake: that of the hammer itself first, then those of others that differ a little.
+    period : float
+        Time from slot to slot, s.
+    limits : Limits
+        By which deviations are measured.
+
+    Returns
+    -------
+    Guess or None
+        None where no cell is a dot near the slot. Among the cells that are as good as the best for the hammer
+        itself, the one that is best for all.
+    """
+    own = planes[0].off(period, limits)
+    if not own.size or not np.isfinite(own).any():
+        return None
+    every = np.max([each.off(period, limits) for each in planes], axis=0)
+    allowed = own <= own.min() + _SLACK
+    place = np.unravel_index(int(np.argmin(np.where(allowed, every, np.inf))), own.shape)
+    if not allowed[place]:
+        place = np.unravel_index(int(np.argmin(own)), own.shape)
+    return Guess(
+        planes[0].brake,
+        float(planes[0].fired[place[0]]),
+        float(planes[0].widths[place[1]]),
+        float(own[place]),
+        float(every[place]),
+    )

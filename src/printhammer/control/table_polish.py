@@ -1,0 +1,273 @@
+"""The last dot of many patterns, and how its pulse is to change: Newton's method on force and arrival."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.control.histories import REST, History, histories, number_of, pattern_of, plain
+from printhammer.control.table import COLUMNS, Settings
+from printhammer.control.table_drive import pulses_of, sequence
+from printhammer.ensemble import Ensemble
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.control.table_single import Single
+    from printhammer.drive import Drive
+    from printhammer.hammer import Hammer
+    from printhammer.printing.limits import Limits
+    from printhammer.segments import FloatArray
+    from printhammer.waveforms import Waveform
+
+ROUNDS: Final = 5
+"""Steps of Newton's method for each length of history."""
+
+GOOD: Final = 1e-3
+"""Deviation, in parts of the limits, from which on an entry is left as it is."""
+
+LEAST_WIDTH: Final = 0.3
+"""Least width, in parts of the largest one."""
+
+_DENSE: Final = 5
+_STEP: Final = 0.5e-6
+_LONGEST_STEP: Final = 25e-6
+_TAIL: Final = 1e-3
+_PIECE: Final = 4096
+
+
+VALUES: Final = (*COLUMNS, "deviation")
+"""Names of the arrays of a table."""
+
+
+@dataclass
+class Work:
+    """A table in the making: arrays of shape (rates, entries), and what is asked of it."""
+
+    rates: FloatArray
+    gaps: int
+    reach: int
+    advance: FloatArray
+    width: FloatArray
+    brake_delay: FloatArray
+    brake_width: FloatArray
+    deviation: FloatArray
+    hammers: Sequence[Hammer]
+    pulse: Waveform
+    widest: float
+    single: Single
+    limits: Limits
+    tolerance: float
+    threads: int | None
+
+    def settings(self, row: int) -> Settings:
+        """Return what the table says at one of its rates."""
+        return Settings(self.advance[row], self.width[row], self.brake_delay[row], self.brake_width[row])
+
+
+def subset(work: Work, rows: npt.NDArray[np.int64]) -> Work:
+    """Return some rows of a table in the making, as a copy."""
+    values: dict[str, Any] = {name: getattr(work, name)[rows] for name in VALUES}
+    return replace(work, rates=work.rates[rows], **values)
+
+
+def joined(work: Work, other: Work) -> Work:
+    """Return the rows of two tables in the making, by ascending rate."""
+    rates = np.concatenate([work.rates, other.rates])
+    order = np.argsort(rates, kind="stable")
+    values: dict[str, Any] = {
+        name: np.concatenate([getattr(work, name), getattr(other, name)])[order] for name in VALUES
+    }
+    return replace(work, rates=rates[order], **values)
+
+
+def befores(history: History, reach: int) -> list[tuple[int, ...]]:
+    """Return gaps before a history, of patterns with which it is tuned: from rest, and after other dots."""
+    late = (reach + 1,)
+    if REST in history:
+        return [(), late]
+    return [(), late, (1,) * _DENSE]
+
+
+def polish(work: Work, told: Callable[[], None]) -> None:
+    """Improve all entries, those of short histories first, since they come before the others.
+
+    Parameters
+    ----------
+    work : Work
+        With a first guess for every history; changed in place. The entry from rest stays as it is.
+    told : callable
+        Called after each round.
+    """
+    for known in range(1, work.gaps + 1):
+        level = level_of(work, known)
+        for history in level if known > 1 else []:
+            parent = number_of((*history[: known - 1], *[REST] * (work.gaps - known + 1)), work.reach)
+            column = number_of(history, work.reach)
+            for values in (work.advance, work.width, work.brake_delay, work.brake_width):
+                values[:, column] = values[:, parent]
+        polish_level(work, level, told)
+    # Entries that come before others may have changed since they were looked at.
+    for known in range(1, work.gaps + 1):
+        look_at(work, level_of(work, known))
+    told()
+
+
+def level_of(work: Work, known: int) -> list[History]:
+    """List the histories that hold a number of gaps before they are rest."""
+    every = histories(work.gaps, work.reach)
+    return [history for history in every if work.gaps - history.count(REST) == known]
+
+
+def look_at(work: Work, level: Sequence[History]) -> None:
+    """Put down how far off some histories are at all rates."""
+    cells = [(row, history) for row in range(work.rates.size) for history in level]
+    rows = np.array([row for row, _history in cells])
+    columns = np.array([number_of(history, work.reach) for _row, history in cells])
+    now = np.column_stack([work.advance[rows, columns], work.width[rows, columns]])
+    size = np.abs(last_dots(work, cells, now, [(0.0, 0.0)])).max(axis=(1, 2, 3))
+    work.deviation[rows, columns] = np.where(np.isnan(size), np.inf, size)
+
+
+def polish_level(work: Work, level: Sequence[History], told: Callable[[], None]) -> None:
+    """Improve the entries of some histories at all rates."""
+    cells = [(row, history) for row in range(work.rates.size) for history in level]
+    columns = np.array([number_of(history, work.reach) for _row, history in cells])
+    rows = np.array([row for row, _history in cells])
+    now = np.column_stack([work.advance[rows, columns], work.width[rows, columns]])
+    gap = np.array([history[0] for _row, history in cells]) / work.rates[rows]
+    brake = work.brake_width[rows, columns]
+    # No dot is fired before the brake pulse has ended.
+    earliest = np.where(brake > 0.0, work.brake_delay[rows, columns] + brake, 0.0)
+    best, best_off = now.copy(), np.full(len(cells), np.inf)
+    for turn in range(ROUNDS + 1):
+        active = np.flatnonzero(best_off > GOOD)
+        if not active.size:
+            break
+        # Dots before the last one may have the same history.
+        work.advance[rows, columns], work.width[rows, columns] = now.T
+        shifts = [(0.0, 0.0)] if turn == ROUNDS else [(0.0, 0.0), (_STEP, 0.0), (0.0, -_STEP)]
+        off = last_dots(work, [cells[k] for k in active], now[active], shifts)
+        told()
+        here = off[:, 0]
+        size = np.abs(here).max(axis=(1, 2))
+        size = np.where(np.isnan(size), np.inf, size)
+        better = size < best_off[active]
+        best[active[better]] = now[active[better]]
+        best_off[active[better]] = size[better]
+        if turn == ROUNDS:
+            break
+        for place, k in enumerate(active.tolist()):
+            if not better[place]:
+                # Half the way back to the best that is known.
+                now[k] = 0.5 * (now[k] + best[k])
+                continue
+            slopes = np.stack(
+                [
+                    (off[place, number + 1] - here[place]).ravel() / sum(shifts[number + 1])
+                    for number in range(2)
+                ],
+                axis=1,
+            )
+            if not np.isfinite(slopes).all():
+                continue
+            least = LEAST_WIDTH * work.widest - now[k, 1]
+            change = _step(slopes, here[place].ravel(), least, work.widest - now[k, 1])
+            now[k] = now[k] + change
+            now[k, 0] = min(now[k, 0], gap[k] - earliest[k])
+    work.advance[rows, columns], work.width[rows, columns] = best.T
+
+
+def _step(slopes: FloatArray, off: FloatArray, least: float, most: float) -> FloatArray:
+    """Return changes of advance and width, s, after which deviations are least in the mean square.
+
+    Parameters
+    ----------
+    slopes : array, shape (deviations, 2)
+        Their derivatives, 1/s.
+    off : array, shape (deviations,)
+        What they are now.
+    least, most : float
+        Bounds on the change of the width, s.
+    """
+    change = -np.linalg.lstsq(slopes, off, rcond=None)[0]
+    wider = min(max(float(change[1]), least), most)
+    if wider != change[1]:
+        rest = off + slopes[:, 1] * wider
+        change = np.array([-float(slopes[:, 0] @ rest) / float(slopes[:, 0] @ slopes[:, 0]), wider])
+    return np.clip(change, -_LONGEST_STEP, _LONGEST_STEP)
+
+
+def last_dots(
+    work: Work,
+    cells: Sequence[tuple[int, History]],
+    values: FloatArray,
+    shifts: Sequence[tuple[float, float]],
+) -> FloatArray:
+    """Return deviations of last dots of patterns, in parts of the limits.
+
+    Parameters
+    ----------
+    work : Work
+        The table.
+    cells : sequence of tuple
+        Row and history of each entry.
+    values : array, shape (cells, 2)
+        Advance and width of the last dot, s.
+    shifts : sequence of tuple
+        Changes of these to be tried, s.
+
+    Returns
+    -------
+    array, shape (cells, shifts, patterns and hammers, 2)
+        Of force and arrival; NaN for a lost dot or one with extra contacts. Where an entry has fewer patterns
+        than others, its first one is repeated.
+    """
+    most = max(len(befores(history, work.reach)) for _row, history in cells)
+    drives: list[Drive] = []
+    due: list[float] = []
+    known: dict[tuple[float, float, float], Waveform] = {}
+    for (row, history), value in zip(cells, values, strict=True):
+        settings, rate = work.settings(row), float(work.rates[row])
+        given = befores(history, work.reach)
+        for shift in shifts:
+            for before in [*given, *[given[0]] * (most - len(given))]:
+                slots = pattern_of(plain(history), before)
+                pulses = pulses_of(settings, work.gaps, work.reach, slots, rate)
+                advance, width = value + shift
+                pulses.fired[-1] = pulses.due[-1] - advance
+                pulses.width[-1] = width
+                pulses.offset[-1] += advance - pulses.advance[-1]
+                drives.append(sequence(pulses, work.pulse, known))
+                due.append(float(pulses.due[-1]))
+    slot = np.array(due)
+    found = []
+    for hammer in work.hammers:
+        off = np.empty((len(drives), 2))
+        for start in range(0, len(drives), _PIECE):
+            part = slice(start, start + _PIECE)
+            off[part] = _off(work, hammer, drives[part], slot[part])
+        found.append(off)
+    shape = len(cells), len(shifts), most, 2
+    return np.concatenate([off.reshape(shape) for off in found], axis=2)
+
+
+def _off(work: Work, hammer: Hammer, drives: Sequence[Drive], due: FloatArray) -> FloatArray:
+    nominal = work.single.nominal
+    result = Ensemble(hammer, list(drives), due + nominal.flight_time + _TAIL, tolerance=work.tolerance).run(
+        dots=True, threads=work.threads
+    )
+    dots = result.dots
+    assert dots is not None
+    last = np.array([len(drive.times) - 1 for drive in drives])
+    rows = np.arange(len(drives))
+    force = dots.peak_force[rows, last] / nominal.force - 1.0
+    arrival = dots.fired_at[rows, last] + dots.flight_time[rows, last] - (due + nominal.flight_time)
+    bad = ~result.ok | (dots.extra_contacts > work.limits.extra_contacts).any(axis=1)
+    off = np.column_stack([force / work.limits.force, arrival / work.limits.arrival])
+    off[bad] = np.nan
+    return off
