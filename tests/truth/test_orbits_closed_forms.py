@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from tests.hammers import MASS, made_of, preload
+from tests.hammers import MASS, made_of, preload, rigid
+from tests.truth.impact_orbits import BouncingBall
 
 import printhammer as ph
 from printhammer.chaos import orbit
@@ -181,3 +182,17 @@ def test_a_damped_oscillator() -> None:
     np.testing.assert_allclose([found.x[0], found.v[0]], [response.imag, omega * response.real], atol=1e-9)
     expected = np.exp([rate * period, rate.conjugate() * period])
     np.testing.assert_allclose(np.sort_complex(found.multipliers), np.sort_complex(expected), atol=1e-9)
+
+
+@pytest.mark.parametrize("gamma", [0.8, 1.1])
+def test_a_search_finds_both_orbits_of_the_bouncing_ball(gamma: float) -> None:
+    """From nothing but the hammer and its drive: there is no pack that would tell how far to look."""
+    exact = BouncingBall(gravity=9.80665, restitution=0.8, frequency=50.0)
+    ball = made_of(backstop=rigid(0.8, position=0.0), spring=preload(-MASS * exact.gravity))
+    drive = ph.SineForce(gamma * MASS * exact.gravity, exact.frequency)
+    found = ph.orbits(ball, drive=drive, longest=1)
+    sums = np.array([one.multipliers.sum().real for one in found])
+    products = np.array([one.multipliers.prod().real for one in found])
+    for stable in (True, False):
+        near = np.abs(sums - exact.trace(gamma, stable)) < 1e-6
+        assert products[near] == pytest.approx([exact.restitution**2], rel=1e-6)

@@ -40,6 +40,7 @@ _LOOKED_AT: Final = 4000
 _EARLY: Final = 2
 """Firings of a record that count as early."""
 _ROOM: Final = 1.2
+_SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746
 """The real root of x^3 = x + 1, whose powers spread points evenly over a square."""
 
@@ -132,6 +133,10 @@ def record(
 def spread(regime: Regime, count: int, seen: FloatArray) -> FloatArray:
     """Return states spread evenly: half of them over the window, half over all that a motion visits.
 
+    Where the way is not bounded by both backstop and pack, the latter is no smaller than six times the scales
+    of the motion, which then are the half-widths of the window: a ball that bounces once a period rises five
+    of them high.
+
     Parameters
     ----------
     regime : Regime
@@ -156,6 +161,10 @@ def spread(regime: Regime, count: int, seen: FloatArray) -> FloatArray:
         wide_high = np.maximum(high, middle + _ROOM * half)
     if regime.hammer.front is not None:
         wide_high[0] = max(wide_high[0], regime.hammer.front)
+    if regime.hammer.front is None or regime.hammer.position is None:
+        reach = _SCALES * window.half_widths
+        wide_low = np.minimum(wide_low, np.array([regime.hammer.origin, 0.0]) - reach)
+        wide_high = np.maximum(wide_high, np.array([regime.hammer.origin, 0.0]) + reach)
     wide_high[1] = max(wide_high[1], -wide_low[1])
     wide_low[1] = -wide_high[1]
     number = np.arange(1, count + 1)[:, np.newaxis]

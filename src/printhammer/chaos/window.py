@@ -27,6 +27,7 @@ PAPER_BACKSTOP: Final = 50.8e-6
 PAPER_FRONT: Final = 203.2e-6
 
 _SAME: Final = 1e-3
+_PART: Final = 1.0 / 6.0
 
 
 @dataclass(frozen=True)
@@ -63,9 +64,9 @@ def window_of(hammer: Hammer, drive: Drive) -> Window:
 
     That of Fig. 11 for a hammer whose backstop and pack are where the paper has them. For others its
     half-widths are a sixth of the way from backstop to pack, as in Fig. 11, and a sixth of the speed that
-    the largest force gives the armature over that way; where a hammer lacks one of them, a sixth of the
-    scales of its motion (`printhammer.problem.scales_of`). As in Fig. 11 the backstop, or the origin, lies a
-    quarter of its width from the left.
+    the largest force gives the armature over that way; where a hammer lacks one of them and nothing bounds
+    the motion, the whole of its scales (`printhammer.problem.scales_of`). As in Fig. 11 the backstop, or the
+    origin, lies a quarter of its width from the left.
     """
     place, front = hammer.position, hammer.front
     if (
@@ -75,5 +76,6 @@ def window_of(hammer: Hammer, drive: Drive) -> Window:
         and math.isclose(front, PAPER_FRONT, rel_tol=_SAME)
     ):
         return PAPER_WINDOW
-    way, speed = (scale / 6.0 for scale in scales_of(hammer, drive, (hammer.origin, 0.0)))
+    part = _PART if place is not None and front is not None else 1.0
+    way, speed = (part * scale for scale in scales_of(hammer, drive, (hammer.origin, 0.0)))
     return Window((hammer.origin - 0.5 * way, hammer.origin + 1.5 * way), (-speed, speed))
