@@ -146,10 +146,10 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
     firings = np.zeros(len(drive.times))
     pieces = np.zeros(drive.kernel_arrays()[2].shape)
     packed = np.zeros(len(constants_of(hammer)))
-    if section == "waveform" and drive.uniform:
+    if section == "waveform":
         waveform = drive.waveform
         fields = _of_waveform(waveform)
-        if last in fields:
+        if drive.uniform and last in fields:
             value, unit, meaning = fields[last]
             scale = abs(value) or _natural(unit, hammer, drive)
             pieces = _table_change(lambda moved: _changed(waveform, last, moved), value, scale, name)

@@ -16,6 +16,7 @@ TAIL: Final = 1e-3
 """What may be cut off of a decaying part where the next one begins, in parts of its peak."""
 
 _SAMPLES: Final = 257
+_ROUNDING: Final = 1e-14
 
 
 class Chain(Waveform):
@@ -79,25 +80,23 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
         if not math.isfinite(waveform.support):
             raise InputError(f"parts[{number}] is a {waveform.shape}, expected a waveform that ends")
         offset = _offset(given, number)
-        sooner = "the firing" if number == 0 else f"parts[{number - 1}]"
-        if offset < (found[-1][0] if found else 0.0) or (
-            found and not _over(found[-1][1], offset - found[-1][0])
-        ):
-            raise InputError(
-                f"parts[{number}] begins at {offset:.9g} s, expected a time not before {sooner}"
-                f"{' is over' if found else ''}"
-            )
+        if not (_over(*found[-1], offset) if found else offset >= 0.0):
+            sooner = f"parts[{number - 1}] is over" if found else "the firing"
+            raise InputError(f"parts[{number}] begins at {offset:.9g} s, expected a time not before {sooner}")
         found.append((offset, waveform))
     return tuple(found)
 
 
-def _over(waveform: Waveform, tau: float) -> bool:
-    """Tell whether a waveform has ended or decayed to its tail at a time after its firing, s."""
+def _over(begun: float, waveform: Waveform, time: float) -> bool:
+    """Tell whether a waveform that has begun has ended or decayed to its tail at a time, both in s."""
     segments = waveform.segments()
     end = float(segments[-1, 0])
-    if tau >= end:
+    # Two parts may meet, by rounding a little early.
+    if time >= begun + end or math.isclose(time, begun + end, rel_tol=_ROUNDING):
         return True
-    edges = segments[:, 0]
+    if time <= begun:
+        return False
+    edges, tau = segments[:, 0], time - begun
     times = np.concatenate([np.linspace(tau, end, _SAMPLES), edges[edges > tau]])
     return bool(np.abs(evaluate(segments, times)).max() <= TAIL * largest(segments))
 

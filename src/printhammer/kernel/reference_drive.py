@@ -61,10 +61,13 @@ def waveform_pieces(waveform: Any) -> list[Piece]:
     """Write one pulse of a waveform, fired at zero, as analytic pieces."""
     shape = waveform.shape
     if shape == "chain":
+        # What a part has left when the next one begins is cut off.
+        ends = [offset for offset, _part in waveform.parts[1:]] + [math.inf]
         return [
-            replace(piece, start=piece.start + offset, end=piece.end + offset)
-            for offset, part in waveform.parts
+            replace(piece, start=piece.start + offset, end=min(piece.end + offset, end))
+            for (offset, part), end in zip(waveform.parts, ends, strict=True)
             for piece in waveform_pieces(part)
+            if piece.start + offset < end
         ]
     if shape == "sampled":
         return _sampled_pieces(waveform)
