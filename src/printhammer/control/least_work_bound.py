@@ -1,0 +1,93 @@
+"""How little positive work of the coil a burst can do with, whatever its current.
+
+The positive work of a dot is at least what lifts the armature from where it turned to its largest
+indentation and indents the pack: L + U(x_max) - U(x_turn), with L the loading work of the pack, and U the
+energy stored in magnet and spring at zero current. The first dot starts from rest; each later one can turn no
+nearer to the paper than at the front of the pack, since the contact before has to end, and no nearer than the
+largest current can throw it from. A backstop that gives energy back would lessen the work by that energy;
+this bound holds as long as the backstop is not touched between the dots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.equilibrium import rest_state
+from printhammer.static_force import StaticForce
+
+if TYPE_CHECKING:
+    from printhammer.hammer import Hammer
+    from printhammer.printing.nominal import Nominal
+
+_POINTS: Final = 4001
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Least positive work of the coil, J, without touches of the backstop between the dots.
+
+    Attributes
+    ----------
+    first : float
+        For a dot from rest.
+    later : float
+        For each dot after it.
+    turn : float
+        Displacement nearest to the paper from which a later dot can be thrown, m.
+    loading : float
+        Loading work of the pack for one dot.
+    """
+
+    first: float
+    later: float
+    turn: float
+    loading: float
+
+    def burst(self, dots: int) -> float:
+        """Return the least positive work of a burst of some dots, J."""
+        return self.first + (dots - 1) * self.later
+
+
+def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Bound:
+    """Bound the positive work of dots of a given force.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        A hammer with magnet, pack and backstop.
+    single : Nominal
+        Its single pulse.
+    force : float
+        Force of the dots in parts of that of the single pulse.
+    largest : float
+        Largest current, A.
+    """
+    static = StaticForce(hammer)
+    deepest, loading = _indented(static, single, force)
+    x = np.linspace(rest_state(hammer), static.front + deepest, _POINTS)
+    step = float(x[1] - x[0])
+    held = -np.array([static.free(place) for place in x.tolist()])
+    thrown = np.array([static.free(place, largest) for place in x.tolist()])
+
+    def up_to_the_top(values: np.ndarray) -> np.ndarray:
+        # Trapezoidal rule from every place to the last one.
+        parts = 0.5 * step * (values[1:] + values[:-1])
+        return np.append(np.cumsum(parts[::-1])[::-1], 0.0)
+
+    lift = up_to_the_top(held)
+    enough = np.flatnonzero((up_to_the_top(thrown) >= loading) & (x <= static.front))
+    turn = int(enough[-1]) if enough.size else 0
+    return Bound(float(loading + lift[0]), float(loading + lift[turn]), float(x[turn]), loading)
+
+
+def _indented(static: StaticForce, single: Nominal, force: float) -> tuple[float, float]:
+    """Return indentation, m, and loading work, J, at which the pack presses with a force, by its law."""
+    depth = np.linspace(0.0, 2.0 * single.indentation, _POINTS)
+    pressed = -np.array([static.pack(static.front + place) for place in depth.tolist()])
+    over = np.flatnonzero(pressed >= force * single.force)
+    last = int(over[0]) if over.size else depth.size - 1
+    inside = slice(0, last + 1)
+    return float(depth[last]), float(np.trapezoid(pressed[inside], depth[inside]))
