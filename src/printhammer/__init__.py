@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.stability_chart import stability_chart
     from printhammer.chaos.strobe import strobe
     from printhammer.chaos.zero_one import zero_one
+    from printhammer.control.least_work import least_work
     from printhammer.drive import Burst, PulseTrain, SineForce
     from printhammer.drive_sequence import PulseSequence
     from printhammer.ensemble import Ensemble, EnsembleResult
@@ -36,8 +37,14 @@ if TYPE_CHECKING:
     from printhammer.identify.laboratory import measure
     from printhammer.maps import frequency_map
     from printhammer.motion import Motion
+    from printhammer.printing.damping import damping_study
+    from printhammer.printing.limits import Limits
     from printhammer.printing.page import print_page
     from printhammer.printing.pattern import Pattern
+    from printhammer.printing.perturbation import Perturbation, perturbed
+    from printhammer.printing.quality import quality
+    from printhammer.printing.safe_rate import safe_rate
+    from printhammer.printing.tolerance import tolerance_yield
     from printhammer.simulate import simulate
     from printhammer.sweep import sweep
     from printhammer.waveforms import Waveform
@@ -50,8 +57,10 @@ __all__ = [
     "EnsembleResult",
     "Hammer",
     "InputError",
+    "Limits",
     "Motion",
     "Pattern",
+    "Perturbation",
     "PrinthammerError",
     "PulseSequence",
     "PulseTrain",
@@ -61,27 +70,33 @@ __all__ = [
     "basins",
     "bifurcation",
     "continuation",
+    "damping_study",
     "equilibria",
     "fit",
     "frequency_map",
     "holding_margin",
     "impact_train",
+    "least_work",
     "load",
     "lyapunov",
     "measure",
     "orbits",
+    "perturbed",
     "print_page",
+    "quality",
     "quench_map",
     "recurrence",
     "regimes",
     "release_current",
     "rest_state",
+    "safe_rate",
     "section",
     "sensitivities",
     "simulate",
     "stability_chart",
     "strobe",
     "sweep",
+    "tolerance_yield",
     "zero_one",
 ]
 
@@ -91,8 +106,10 @@ _HOME = {
     "EnsembleResult": "ensemble",
     "Hammer": "hammer",
     "InputError": "errors",
+    "Limits": "printing.limits",
     "Motion": "motion",
     "Pattern": "printing.pattern",
+    "Perturbation": "printing.perturbation",
     "PrinthammerError": "errors",
     "PulseSequence": "drive_sequence",
     "PulseTrain": "drive",
@@ -101,27 +118,33 @@ _HOME = {
     "basins": "chaos.basins",
     "bifurcation": "chaos.bifurcation",
     "continuation": "chaos.continuation",
+    "damping_study": "printing.damping",
     "equilibria": "equilibrium",
     "fit": "identify.fitting",
     "frequency_map": "maps",
     "holding_margin": "equilibrium",
     "impact_train": "chaos.impact_train",
+    "least_work": "control.least_work",
     "load": "hammer",
     "lyapunov": "chaos.lyapunov",
     "measure": "identify.laboratory",
     "orbits": "chaos.orbit_search",
+    "perturbed": "printing.perturbation",
     "print_page": "printing.page",
-    "recurrence": "chaos.recurrence",
+    "quality": "printing.quality",
     "quench_map": "chaos.quench",
+    "recurrence": "chaos.recurrence",
     "regimes": "chaos.continuation_regimes",
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
-    "sensitivities": "chaos.sensitivity",
+    "safe_rate": "printing.safe_rate",
     "section": "chaos.sections",
+    "sensitivities": "chaos.sensitivity",
     "simulate": "simulate",
     "stability_chart": "chaos.stability_chart",
     "strobe": "chaos.strobe",
     "sweep": "sweep",
+    "tolerance_yield": "printing.tolerance",
     "zero_one": "chaos.zero_one",
 }
 

@@ -17,6 +17,7 @@ from printhammer.cli import (
     bench,
     bifurcation,
     continuation,
+    energy,
     figure,
     fit,
     hammer,
@@ -24,6 +25,7 @@ from printhammer.cli import (
     measure,
     orbits,
     paper,
+    quality,
     print_,
     reconstruct,
     run,
@@ -64,6 +66,8 @@ app.command("basins", epilog=basins.EXAMPLE)(basins.basins)
 app.command("continue", epilog=continuation.EXAMPLE)(continuation.continue_)
 app.command("lyapunov", epilog=lyapunov.EXAMPLE)(lyapunov.lyapunov)
 app.command("print", epilog=print_.EXAMPLE)(print_.print_)
+app.command("energy", epilog=energy.EXAMPLE)(energy.energy)
+app.command("quality", epilog=quality.EXAMPLE)(quality.quality)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)
 app.command("studio", epilog=studio.EXAMPLE)(studio.studio)
 app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)

@@ -1,0 +1,207 @@
+"""The verb `energy`: a burst of dots with least work, rest to rest."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from printhammer.cli.numbers import number, whole
+from printhammer.cli.run import HAMMER, HammerArgument, UnitsOption
+from printhammer.cli.units import Units
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from printhammer.control.least_work import LeastWork
+    from printhammer.control.least_work_supply import SupplyCheck
+
+EXAMPLE: Final = "Example: printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png"
+
+_PICTURES: Final = (".svg", ".png", ".pdf")
+_SUFFIXES: Final = (".nc", ".csv")
+
+
+def energy(
+    hammer: HammerArgument = HAMMER,
+    rate: Annotated[str, typer.Option(metavar="RATE", help="Dots per second, such as '1.2 kHz'.")] = "1 kHz",
+    dots: Annotated[str, typer.Option(metavar="N", help="Number of dots.")] = "8",
+    force: Annotated[
+        str | None,
+        typer.Option(metavar="X", help="Least force in parts of that of the single pulse (0.9)."),
+    ] = None,
+    largest: Annotated[
+        str, typer.Option(metavar="CURRENT", help="Largest current of either sign, such as '2 A'.")
+    ] = "2 A",
+    slew: Annotated[
+        str | None,
+        typer.Option(metavar="A/S", help="Largest slope of the current, A/s (the hammer's own waveform's)."),
+    ] = None,
+    spacing: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Time between nodes of the current ('62.5 us').")
+    ] = None,
+    heat: Annotated[
+        bool, typer.Option("--heat", help="Make the squared current least instead of the positive work.")
+    ] = False,
+    supply: Annotated[
+        bool,
+        typer.Option("--supply", help="Show as well how the burst fares with other currents, up to 3 %."),
+    ] = False,
+    tolerance: Annotated[
+        str | None, typer.Option(metavar="X", help="Error allowed in one step of the search.")
+    ] = None,
+    units: UnitsOption = Units.SI,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Burst (.nc), its current as a sampled waveform (.csv), or picture (.svg, .png, .pdf);"
+            " may be given repeatedly.",
+        ),
+    ] = None,
+) -> None:
+    """Find the current that prints a burst with least work: the swing drive of the paper's discussion.
+
+    Every dot has the force asked for, the hammer starts from rest and comes to rest again. Ends with status 1
+    where a dot of the burst found is not adequate.
+    """
+    from rich.markup import escape
+
+    from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
+    from printhammer.control.least_work import least_work
+    from printhammer.control.least_work_tables import save_least_work
+    from printhammer.errors import InputError
+    from printhammer.outputs import check_outputs
+
+    wanted = out or []
+    for path in wanted:
+        if path.suffix.lower() not in (*_SUFFIXES, *_PICTURES):
+            known = ", ".join((*_SUFFIXES, *_PICTURES))
+            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    check_outputs(wanted, [Path(hammer)])
+    given: dict[str, Any] = {
+        "force": number(force, "force"),
+        "slew": number(slew, "slew"),
+        "spacing": spacing,
+        "tolerance": number(tolerance, "tolerance"),
+    }
+    options = {key: value for key, value in given.items() if value is not None}
+    count = whole(dots, "dots")
+    assert count is not None
+    loaded = load_checked(hammer)
+    announce_compiling()
+    found = _planned(
+        loaded,
+        rate=rate,
+        dots=count,
+        largest=largest,
+        least="heat" if heat else "positive work",
+        function=least_work,
+        **options,
+    )
+    screen = console()
+    screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}\n")
+    screen.print(told(found, units))
+    if supply:
+        screen.print()
+        screen.print(supplied(found.under_supply(), found.count, units))
+    for path in wanted:
+        if path.suffix.lower() in _PICTURES:
+            _draw(found, path)
+        else:
+            save_least_work(found, path)
+        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    if found.adequate < found.count:
+        complain(f"{found.adequate} of {found.count} dots are adequate")
+        raise typer.Exit(1)
+
+
+def told(found: LeastWork, units: Units) -> Table:
+    """Return what the burst prints, and what it costs."""
+    from printhammer.cli.terminal import plain_table
+    from printhammer.cli.units import with_unit
+
+    table = plain_table(("", "left"), ("", "left"))
+    table.show_header = False
+    table.columns[0].style = "dim"
+    work, ledger = found.work, found.ledger
+    weakest = (
+        f", the weakest with {found.forces.min():.4f} of the single pulse's force" if found.contacts else ""
+    )
+    table.add_row("dots", f"{found.adequate} of {found.count} adequate at {found.rate:.6g} Hz{weakest}")
+    table.add_row(
+        "current", f"at most {with_unit(found.drive.peak, 'current', units)}, {found.slew:.4g} A/s allowed"
+    )
+    table.add_row("at rest", f"after {with_unit(found.rest_time, 'time', units)}")
+    table.add_row("absorbed by the pack", with_unit(ledger.pack_loss, "energy", units))
+    table.add_row("lost at the backstop", with_unit(ledger.backstop_loss, "energy", units))
+    table.add_row(
+        "net work W",
+        f"{with_unit(work.net, 'energy', units)}, [bold]{found.net_ratio:.4f}[/bold] of what the pack"
+        f" absorbs; {found.single_ratio:.2f} with single pulses",
+    )
+    table.add_row(
+        "positive work W+",
+        f"{with_unit(work.positive, 'energy', units)}, [bold]{found.positive_ratio:.4f}[/bold] of it;"
+        f" no current does with less than {found.bound_ratio:.4f}",
+    )
+    if work.heat is not None:
+        table.add_row("heat of the coil", with_unit(work.heat, "energy", units))
+    table.add_row("ledger", f"residual {ledger.residual / ledger.throughput:.1e} of the throughput")
+    return table
+
+
+def supplied(found: SupplyCheck, count: int, units: Units) -> Table:
+    """Return how the burst fares with other currents."""
+    import math
+
+    from printhammer.cli.terminal import plain_table
+    from printhammer.cli.units import shown, unit
+
+    time = unit("time", units)
+    table = plain_table(
+        ("current", "right"),
+        ("adequate dots", "right"),
+        ("weakest force", "right"),
+        (f"late by [{time}]", "right"),
+    )
+    rows = zip(
+        found.changes.tolist(),
+        found.adequate.tolist(),
+        found.weakest.tolist(),
+        found.spread.tolist(),
+        strict=True,
+    )
+    for change, adequate, weakest, late in rows:
+        told_late = shown(None if math.isnan(late) else late, "time", units)
+        table.add_row(f"{100.0 * change:+.1f} %", f"{adequate} of {count}", f"{weakest:.3f}", told_late)
+    return table
+
+
+def _planned(hammer: Any, *, function: Any, **options: Any) -> LeastWork:
+    """Plan the burst, and show how far it is."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    with Progress(
+        TextColumn("dots planned"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as shown:
+        task = shown.add_task("dots planned", total=None)
+        found: LeastWork = function(
+            hammer, progress=lambda done, total: shown.update(task, completed=done, total=total), **options
+        )
+        return found
+
+
+def _draw(found: LeastWork, path: Path) -> None:
+    from printhammer.outputs import write_file
+
+    buffer = BytesIO()
+    found.plot().savefig(buffer, format=path.suffix[1:].lower(), dpi=200.0)
+    write_file(path, buffer.getvalue())
