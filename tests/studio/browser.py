@@ -156,7 +156,7 @@ def browser() -> Iterator[Any]:
     """Start a Chromium and give a function that opens a new tab."""
     program = chromium()
     assert program is not None
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         command = (program, *FLAGS, f"--user-data-dir={folder}", "about:blank")
         process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
         sockets: list[Any] = []

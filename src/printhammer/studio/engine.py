@@ -7,10 +7,12 @@ come, and what is under way is then given up.
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.drive import PulseTrain
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.errors import InputError
 from printhammer.maps import TAIL
@@ -21,8 +23,10 @@ from printhammer.studio.frames import frame
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from printhammer.drive_base import Overlap
     from printhammer.motion import Motion
     from printhammer.studio.state import State
+    from printhammer.waveforms import Waveform
 
 PREVIEW: Final = (64, 128)
 """Rates and times of the map that is shown while a slider moves."""
@@ -59,13 +63,13 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
     # Every switch of a force is the end of a step.
     times = np.union1d(np.linspace(motion.start, motion.end, POINTS), motion.step_times)
     places, speeds = motion.at(times)
-    force = motion.forces_at(times)
+    force, values = motion.forces_at(times), drive.value(times)
     fired, x, v = motion.strobe
     arrays: dict[str, Any] = {
         "t": times,
         "x": np.float32(places),
         "v": np.float32(speeds),
-        "drive": np.float32(drive.value(times)),
+        "drive": np.float32(values),
         **{f"F {name}": np.float32(values) for name, values in force.items()},
         "strobe t": fired,
         "strobe x": np.float32(x),
@@ -81,7 +85,7 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
             "thickness": getattr(hammer.pack, "thickness", None),
         },
         "quantity": drive.quantity,
-        "peak": drive.peak,
+        "peak": float(np.abs(values).max()),
         "fired": drive.times.tolist(),
         "steps": motion.steps,
         "pulse": pulse_of(state),
@@ -164,18 +168,15 @@ def map_frame(state: State, serial: int, size: tuple[int, int], newer: Callable[
     InputError
         The rates are not ascending, or as `motion_frame`.
     """
-    from printhammer.drive import PulseTrain
-
     if not state.low < state.high:
         raise InputError(f"map: rates from {state.low:g} Hz to {state.high:g} Hz, expected ascending ones")
     hammer, waveform = state.changed, state.fired
     rates = np.linspace(state.low, state.high, size[0])
     end = (state.pulses - 1) / state.low + TAIL
     times = np.linspace(0.0, end, size[1])
-    count, overlap = state.pulses, state.overlap
-    drives = [PulseTrain(waveform, rate=rate, pulses=count, overlap=overlap) for rate in rates.tolist()]
+    drives = _trains(waveform, tuple(rates.tolist()), state.pulses, state.overlap)
     runs = Ensemble(hammer, drives, end, tolerance=DISPLAY_TOLERANCE)
-    result = runs.run(times=times, progress=_watch(newer))
+    result = runs.run(times=times, progress=watch(newer))
     assert result.x is not None
     low, high = _limits(hammer.position, hammer.platen, result.x)
     arrays = {"codes": codes_of(result.x, low, high)}
@@ -189,6 +190,12 @@ def map_frame(state: State, serial: int, size: tuple[int, int], newer: Callable[
         "detail": "full" if size == FULL else "preview",
     }
     return frame("map", serial, arrays, **told)
+
+
+@lru_cache(maxsize=8)
+def _trains(waveform: Waveform, rates: tuple[float, ...], pulses: int, overlap: Overlap) -> list[PulseTrain]:
+    """Return a train for each rate; kept, since they stay the same while a constant of the hammer changes."""
+    return [PulseTrain(waveform, rate=rate, pulses=pulses, overlap=overlap) for rate in rates]
 
 
 def _limits(low: float | None, high: float | None, x: Any) -> tuple[float, float]:
@@ -208,7 +215,9 @@ def codes_of(x: Any, low: float, high: float) -> Any:
     return scaled.astype(np.uint16)
 
 
-def _watch(newer: Callable[[], bool]) -> Callable[[int, int], None]:
+def watch(newer: Callable[[], bool]) -> Callable[[int, int], None]:
+    """Return what gives work up when a newer state has come, to be called as it goes on."""
+
     def progress(_done: int, _all: int) -> None:
         if newer():
             raise GivenUp

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.errors import InputError
 from printhammer.studio import engine
 from printhammer.studio.frames import frame
+from printhammer.studio.printed import line_frame, line_key
 from printhammer.studio.state import ProtocolError, State, names, offered, read_state
 
 if TYPE_CHECKING:
@@ -147,6 +148,9 @@ class Session:
         if "map" in state.views and self._sent.get("map") != engine.map_key(state):
             self._tell(engine.map_frame(state, serial, engine.FULL, newer))
             self._sent["map"] = engine.map_key(state)
+        if "line" in state.views and state.line.strip() and self._sent.get("line") != line_key(state):
+            self._tell(line_frame(state, serial, newer))
+            self._sent["line"] = line_key(state)
         if "strobe" in state.views and self._sent.get("strobe") != engine.strobe_key(state):
             if newer():
                 raise engine.GivenUp
@@ -180,7 +184,7 @@ def read_message(text: str) -> tuple[str, int, Any]:
     if isinstance(serial, bool) or not isinstance(serial, int) or not 0 < serial < 2**53:
         raise ProtocolError("serial is expected to be a positive whole number")
     contents = {"state": {"state"}, "hammer": {"name", "text"}, "texts": {"state"}, "drop": {"name", "text"}}
-    if kind not in contents:
+    if not isinstance(kind, str) or kind not in contents:
         raise ProtocolError(f"kind is expected to be one of {', '.join(contents)}")
     if set(message) != {"kind", "serial", *contents[kind]}:
         raise ProtocolError(

@@ -2,6 +2,9 @@
 import { colours, FONT } from "./theme.js";
 import { digits } from "./units.js";
 
+const NEAR = 0.7; // pixels
+const CHUNK = 64;
+
 export const MARGIN = { left: 46, right: 10, top: 8, bottom: 32 };
 
 /** Return round numbers between two ends, about one every `space` pixels. */
@@ -68,15 +71,26 @@ export function line(pen, x0, y0, x1, y1) {
   pen.stroke();
 }
 
-/** Draw a curve through the points that `use` lets pass; a gap where it does not. */
+/**
+ * Draw a curve through the points that `use` lets pass; a gap where it does not. Points that would lie on the one
+ * before are left out, and many short strokes are faster than a long one.
+ */
 export function curve(pen, plane, xs, ys, use = null) {
+  let [on, count, lastX, lastY] = [false, 0, 0, 0];
   pen.beginPath();
-  let on = false;
   for (let k = 0; k < xs.length; k += 1) {
     if (use && !use(k)) { on = false; continue; }
-    if (on) pen.lineTo(plane.X(xs[k]), plane.Y(ys[k]));
-    else pen.moveTo(plane.X(xs[k]), plane.Y(ys[k]));
-    on = true;
+    const [x, y] = [plane.X(xs[k]), plane.Y(ys[k])];
+    if (!on) pen.moveTo(x, y);
+    else if (Math.abs(x - lastX) + Math.abs(y - lastY) < NEAR && k < xs.length - 1) continue;
+    else pen.lineTo(x, y);
+    [on, lastX, lastY] = [true, x, y];
+    count += 1;
+    if (count % CHUNK === 0) {
+      pen.stroke();
+      pen.beginPath();
+      pen.moveTo(x, y);
+    }
   }
   pen.stroke();
 }
@@ -119,23 +133,24 @@ export function before(values, value) {
   return low;
 }
 
-/** A key: coloured strokes with names, from the right end of a box to the left. */
+/** A key: coloured strokes with names in rows from the right end of a box, a new row where one is full. */
 export function key(pen, box, entries) {
   const c = colours();
   pen.save();
   pen.font = FONT;
   pen.textBaseline = "middle";
   pen.textAlign = "right";
-  let place = box.x + box.w - 4;
+  let [place, row] = [box.x + box.w - 4, box.y + 8];
   for (const { name, colour, dash = [] } of [...entries].reverse()) {
+    const wide = pen.measureText(name).width + 4 + 14;
+    if (place - wide < box.x) [place, row] = [box.x + box.w - 4, row + 14];
     pen.fillStyle = c.ink;
-    pen.fillText(name, place, box.y + 8);
-    place -= pen.measureText(name).width + 4;
+    pen.fillText(name, place, row);
     pen.strokeStyle = colour;
     pen.lineWidth = 2;
     pen.setLineDash(dash);
-    line(pen, place - 14, box.y + 8, place, box.y + 8);
-    place -= 24;
+    line(pen, place - wide, row, place - wide + 14, row);
+    place -= wide + 10;
   }
   pen.restore();
 }

@@ -1,8 +1,8 @@
 // What each firing did: energies of the dots, and the line that they print.
-import { axes, line } from "./axes.js";
+import { axes, extent, line } from "./axes.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
-import { shown, unitOf } from "./units.js";
+import { digits, shown, unitOf } from "./units.js";
 
 /** Energy that each dot put into the pack, and what the pack kept. */
 export function energyView(body, studio) {
@@ -50,6 +50,10 @@ export function lineView(body, studio) {
   const paint = (pen, width, height) => {
     const [frame, motion] = [studio.frames.dots, studio.frames.motion];
     if (!frame || !motion) return;
+    if (studio.store.state.line.trim()) {
+      if (studio.frames.line) printed(pen, width, height, studio.frames.line);
+      return;
+    }
     const c = colours();
     const { dots, quality } = frame;
     const first = dots.find((dot) => dot.struck);
@@ -98,10 +102,54 @@ export function lineView(body, studio) {
   return barsOf(body, studio, "The line as it is printed", paint, ["flight_time", "peak_force"], "SI");
 }
 
+/** Draw a printed text: where dots are wanted, and how they came out. */
+function printed(pen, width, height, frame) {
+  const c = colours();
+  pen.save();
+  pen.font = FONT;
+  pen.fillStyle = c.ink;
+  pen.textAlign = "center";
+  if (frame.reason) {
+    pen.fillText(frame.reason.slice(0, Math.floor(width / 6)), width / 2, height / 2);
+    pen.restore();
+    return;
+  }
+  const { data } = frame;
+  const [left, right] = extent(data["wanted x"]);
+  const [top, bottom] = extent(data["wanted y"]);
+  const scale = Math.min((width - 40) / (right - left + 2 * frame.wire), (height - 64) / (bottom - top + 2 * frame.wire));
+  const X = (x) => width / 2 + (x - 0.5 * (left + right)) * scale;
+  const Y = (y) => 0.5 * (height - 44) + (y - 0.5 * (top + bottom)) * scale;
+  const radius = Math.max(0.5 * frame.wire * scale, 1);
+  const dot = (x, y) => { pen.beginPath(); pen.arc(X(x), Y(y), radius, 0, 2 * Math.PI); };
+  for (let k = 0; k < data.x.length; k += 1) {
+    if (Number.isFinite(data.x[k])) {
+      pen.globalAlpha = Math.min(Math.max(data.darkness[k], 0.05), 1);
+      dot(data.x[k], data.y[k]);
+      pen.fill();
+    } else {
+      pen.globalAlpha = 1;
+      pen.strokeStyle = c.lost;
+      pen.lineWidth = 1;
+      dot(data["wanted x"][k], data["wanted y"][k]);
+      pen.stroke();
+    }
+  }
+  pen.globalAlpha = 0.5;
+  pen.fillStyle = c.drive;
+  for (let k = 0; k < data["extra x"].length; k += 1) { dot(data["extra x"][k], data["extra y"][k]); pen.fill(); }
+  pen.globalAlpha = 1;
+  pen.fillStyle = c.ink;
+  const faults = Object.entries(frame.faults).map(([name, count]) => `${count} ${name}`).join(", ");
+  pen.fillText(`${frame.good} of ${frame.wanted} dots within limits${faults ? `: ${faults}` : ""}`, width / 2, height - 26);
+  if (frame.force) pen.fillText(`force ${digits(100 * frame.force[0], 3)} to ${digits(100 * frame.force[1], 3)} % of the single pulse, off by ${shown(frame.placement[0], "m", 3)} to ${shown(frame.placement[1], "m", 3)}`, width / 2, height - 10);
+  pen.restore();
+}
+
 function barsOf(body, studio, label, paint, columns, unit) {
   const area = surface(body, paint, label);
   return {
-    update: (what) => what === "dots" && area.draw(), draw: area.draw, cursor: () => {}, paint,
+    update: (what) => (what === "dots" || what === "line") && area.draw(), draw: area.draw, cursor: () => {}, paint,
     table: () => {
       const dots = studio.frames.dots?.dots;
       return dots && { firing: dots.map((dot) => dot.index), "fired_at [s]": dots.map((dot) => dot.fired_at), struck: dots.map((dot) => Number(dot.struck)), ...Object.fromEntries(columns.map((name) => [`${name} [${unit}]`, dots.map((dot) => dot[name] ?? NaN)])), extra_contacts: dots.map((dot) => dot.extra_contacts) };

@@ -33,6 +33,10 @@ export function buildControls(holder, studio) {
   drive.append(overlap.element);
   rows.push(overlap);
 
+  const line = textRow("line", "Text that is printed, nine wires high, slot by slot at this rate; empty: the dots of the burst.", (state) => state.line, (value) => ({ line: value.slice(0, studio.limits.line) }), studio);
+  drive.append(line.element);
+  rows.push(line);
+
   const pulse = group(holder, "Pulse", true);
   rows.push(waveformEditor(pulse, studio, sliderRow));
 

@@ -4,8 +4,8 @@ import { axes, before, curve, extent, inside, key, line, widened } from "./axes.
 import { colours, FONT } from "./theme.js";
 import { timeUnit, unitOf } from "./units.js";
 
-const FORCES = ["magnet", "spring", "pack", "backstop", "damping", "total"];
-const DASHES = { total: [6, 3], damping: [2, 2] };
+const FORCES = ["total", "magnet", "spring", "damping", "backstop", "pack"];
+const DASHES = { damping: [2, 2] };
 
 /** Displacement against time, with backstop, pack and platen, firings, and the drive on the right axis. */
 export function motionView(body, studio) {
@@ -26,7 +26,7 @@ export function forcesView(body, studio) {
   return curveView(body, studio, {
     label: "Forces against time",
     series: () => FORCES.map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
-    scales: (frame) => ({ x: widened(...FORCES.slice(0, -1).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
+    scales: (frame) => ({ x: widened(...FORCES.slice(1).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
     under: () => {},
     over: () => {},
   });
@@ -120,7 +120,7 @@ function curveView(body, studio, kind) {
     const right = series.find((entry) => entry.scale === "drive");
     const axis = (scale, si, label, side) => ({
       scale, side, font: FONT, labelFont: FONT, stroke: right && side !== 2 ? (side === 3 ? c.x : c.drive) : c.muted, labelSize: 16, labelGap: 0, gap: 3,
-      size: side === 2 ? 18 : 36, label, space: side === 2 ? 60 : 30,
+      size: side === 2 ? 18 : 36, label, space: { 1: 14, 2: 60, 3: 30 }[side],
       grid: { stroke: c.faint, width: 1, show: side !== 1 }, ticks: { show: false },
       values: (u, ticks) => ticks.map((tick) => (tick === null ? "" : Number((tick * shownIn(u, si).factor).toPrecision(6)))),
       splits: (u, _axis, low, high, step) => roundSplits(low, high, step, shownIn(u, si).factor),
@@ -133,7 +133,7 @@ function curveView(body, studio, kind) {
       cursor: { sync: { key: "time", setSeries: false, scales: ["t", null] }, drag: { x: true, y: false, setScale: true }, points: { show: false }, bind: { dblclick: () => () => { studio.zoom(null); return null; } } },
       scales: { t: { time: false, auto: false }, x: { auto: false }, drive: { auto: false } },
       axes: [axis("t", "s", (u) => `time, ${shownIn(u, "s").name}`, 2), axis("x", main.si, `${kind.series().length > 2 ? "force" : main.name}, ${unitOf(main.si).name}`, 3), ...(right ? [axis("drive", right.si, `${right.name}, ${unitOf(right.si).name}`, 1)] : [])],
-      series: [{ scale: "t" }, ...series.map((entry) => ({ scale: entry.scale, stroke: entry.colour, width: 1.3, dash: entry.dash, points: { show: false } }))],
+      series: [{ scale: "t" }, ...series.map((entry) => ({ scale: entry.scale, stroke: entry.colour, width: entry.name === "total" ? 0.8 : 1.3, dash: entry.dash, points: { show: false } }))],
       hooks: {
         drawAxes: [(u) => { if (studio.frames.motion) scaled(u, kind.under); }],
         draw: [(u) => { if (studio.frames.motion) scaled(u, (pen, plane, box) => { kind.over(pen, plane, box); if (!right) key(pen, box, series); }); }],
@@ -188,7 +188,7 @@ function curveView(body, studio, kind) {
       const ends = scales[entry.scale];
       const own = { X: plane.X, Y: (value) => plane.box.y + plane.box.h * (1 - (value - ends[0]) / (ends[1] - ends[0])) };
       pen.strokeStyle = entry.colour;
-      pen.lineWidth = 1.3;
+      pen.lineWidth = entry.name === "total" ? 0.8 : 1.3;
       pen.setLineDash(entry.dash ?? []);
       curve(pen, own, t, entry.values(frame));
     }

@@ -26,7 +26,6 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     described: null, offered: [], limits: {}, shapes: {}, views: {}, serial: Math.floor(Math.random() * 2 ** 40), sentAt: new Map(), busy: false, stale: false,
   };
   let follow = () => {};
-  let queue = [];
   let writing = 0;
   let begun = false;
   const asked = new Map();
@@ -57,7 +56,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     if (!t) return;
     studio.cursor = Math.min(Math.max(time, t[0]), t[t.length - 1]);
     studio.cursorFrom = from;
-    redraw("cursor");
+    turn();
   };
   studio.zoom = (range) => {
     studio.window = range;
@@ -76,29 +75,25 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     box.select();
   };
 
-  const dirty = new Set();
-  let pending = 0;
-  function redraw(what) {
-    dirty.add(what);
-    pending ||= requestAnimationFrame(() => {
-      pending = 0;
-      const list = [...dirty];
-      dirty.clear();
-      for (const name of studio.store.state.views) {
-        const view = studio.views[name];
-        if (!view) continue;
-        for (const kind of list) {
-          if (kind === "cursor") { if (!list.includes("motion")) view.cursor(); } else view.update(kind);
-        }
-      }
-      if (list.includes("motion")) follow();
-      report(queue.splice(0));
+  const shownViews = () => studio.store.state.views.map((name) => studio.views[name]).filter(Boolean);
+  let turning = 0;
+  /** Draw all cursors anew with the next picture. */
+  function turn() {
+    turning ||= requestAnimationFrame(() => {
+      turning = 0;
+      for (const view of shownViews()) view.cursor();
     });
+  }
+  /** Draw at once what has arrived: it is seen with the next picture. */
+  function arrived(frame) {
+    for (const view of shownViews()) view.update(frame.kind);
+    if (frame.kind === "motion") follow();
+    const { kind, detail, serial } = frame;
+    requestAnimationFrame(() => report([{ kind, detail, serial }]));
   }
 
   /** Tell, after the next paint, how long a state took to be seen. */
   function report(seen) {
-    if (!seen.length) return;
     const channel = new MessageChannel();
     channel.port1.onmessage = () => {
       for (const { kind, detail, serial } of seen) {
@@ -165,10 +160,10 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   studio.store.listeners.add((state) => {
     const wanted = state.text || state.hammer;
     if (wanted !== studio.loaded) { load(state, false); return; }
-    studio.changedAt ??= performance.now();
+    studio.changedAt ??= globalThis.event?.timeStamp ?? performance.now();
     studio.sendState();
     follow();
-    redraw("state");
+    for (const view of shownViews()) view.update("state");
     studio.layout.show(state.views);
     clearTimeout(writing);
     writing = setTimeout(() => address.write(toText(studio.store.state)), 150);
@@ -176,6 +171,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
 
   studio.parts = layout(studio, MAKERS);
   studio.layout = studio.parts.layout;
+  studio.hint("The equation and the source of a constant are told here, where its control is pointed at or focused.");
   studio.address = address.address;
   bindKeys(studio);
   readColours(element.querySelector(".studio"));
@@ -211,8 +207,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
         const t = frame.data.t;
         studio.cursor = Math.min(studio.cursor, t[t.length - 1]);
       }
-      queue.push({ kind: frame.kind, detail: frame.detail, serial: frame.serial });
-      redraw(frame.kind);
+      arrived(frame);
     },
   };
 }

@@ -5,7 +5,7 @@ import { surface } from "./pen.js";
 import { colours } from "./theme.js";
 import { unitOf } from "./units.js";
 
-const MARGIN = { left: 34, right: 8, top: 6, bottom: 30 };
+const MARGIN = { left: 42, right: 8, top: 6, bottom: 30 };
 const START = { amplitude: 1, width: 3e-4, rise: 5e-5, decay: 5e-5, fall: 5e-5 };
 const LONGEST = 2e-3;
 

@@ -1,0 +1,64 @@
+"""The line that the studio prints: a text, each of its dots where and as dark as it comes out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.studio.engine import watch
+from printhammer.studio.frames import frame
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.studio.state import State
+
+
+def line_key(state: State) -> tuple[Any, ...]:
+    """Return what the line depends on."""
+    return (state.hammer, state.text, state.constants, state.waveform, state.rate, state.line)
+
+
+def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
+    """Return the dots of the line; where it cannot be printed, the reason instead.
+
+    Raises
+    ------
+    GivenUp
+        A newer state has come before it was done.
+    """
+    from printhammer.printing.page import print_page
+
+    try:
+        hammer = state.changed
+        if state.waveform is not None:
+            hammer = hammer.replace("waveform", state.fired, source="set in the studio")
+        page = print_page(hammer, state.line, state.rate, progress=watch(newer))
+    except InputError as error:
+        return frame("line", serial, reason=str(error))
+    (x, y), (wanted_x, wanted_y) = page.places, page.intended
+    arrays = {
+        "x": np.float32(x),
+        "y": np.float32(y),
+        "wanted x": np.float32(wanted_x),
+        "wanted y": np.float32(wanted_y),
+        "darkness": np.float32(page.darkness),
+        "fault": page.fault.astype(np.int32),
+        "extra x": np.float32(page.extra_places[0]),
+        "extra y": np.float32(page.extra_places[1]),
+    }
+    force, error = page.force_ratio[page.printed], page.placement_error[page.printed]
+    told = {
+        "wanted": int(page.lost.size),
+        "good": int(page.good.sum()),
+        "lost": int(page.lost.sum()),
+        "faults": {name: count for name, count in page.fault_counts.items() if count},
+        "wire": page.head.wire_diameter,
+        "pitch": page.head.pitch,
+        "force": [float(force.min()), float(force.max())] if force.size else None,
+        "placement": [float(error.min()), float(error.max())] if error.size else None,
+        "failed": int((page.status != "ok").sum()),
+    }
+    return frame("line", serial, arrays, reason="", **told)

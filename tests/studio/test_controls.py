@@ -1,0 +1,62 @@
+"""Controls: one for each constant, with a range that holds its value."""
+
+import pytest
+from tests.hammers import CRUDE
+
+from printhammer.hammer import Hammer, load, shipped
+from printhammer.studio import controls
+from printhammer.units import to_si
+
+HAMMERS = [*shipped(), str(CRUDE)]
+
+
+@pytest.mark.parametrize("name", HAMMERS)
+def test_every_constant_has_a_control_whose_range_holds_it(name: str) -> None:
+    hammer = load(name)
+    told = controls.describe(hammer)
+    keys = [constant["key"] for constant in told["constants"]]
+    assert keys == [key for key in hammer.constants if not key.startswith("waveform.")]
+    for constant in told["constants"]:
+        assert constant["low"] <= constant["value"] <= constant["high"], constant["key"]
+        assert constant["low"] < constant["high"]
+        assert constant["source"]
+        assert constant["low"] > 0.0 or not constant["log"]
+
+
+@pytest.mark.parametrize("name", HAMMERS)
+def test_every_law_has_its_equation_or_first_line(name: str) -> None:
+    hammer = load(name)
+    for role, part in hammer.parts.items():
+        assert len(controls.equation_of(role, part.law)) > 10
+
+
+def test_the_equations_are_of_laws_that_there_are() -> None:
+    from printhammer.parts import PARTS
+
+    assert {tuple(key.split(".")) for key in controls.EQUATIONS if "." in key} <= set(PARTS)
+
+
+def test_the_paper_lies_on_the_platen_whatever_is_moved() -> None:
+    """Of platen, front and thickness each combined control keeps platen = front + thickness."""
+    hammer = load(CRUDE)
+    (distance, thickness) = controls.describe(hammer)["combined"]
+    assert distance["value"] == pytest.approx(hammer.platen - hammer.position)
+    assert thickness["value"] == pytest.approx(hammer.pack.thickness)
+    for control in (distance, thickness):
+        moves = control["moves"]
+        assert moves.get("platen", 0.0) == moves["pack.front"] + moves.get("pack.thickness", 0.0)
+        for end in ("low", "high"):
+            change = control[end] - control["value"]
+            moved = {key: hammer.constants[key].si + weight * change for key, weight in moves.items()}
+            for key, value in moved.items():
+                low, high = controls.range_of(hammer, key)
+                assert low <= value <= high, (control["key"], end, key)
+            assert isinstance(hammer.replace(moved), Hammer)
+
+
+def test_units_are_shown_by_factors_of_the_unit_table() -> None:
+    units = controls.vocabulary()["units"]
+    for si, systems in units.items():
+        for shown in systems:
+            plain = shown["name"].replace("µ", "u").replace("·", " ")
+            assert shown["factor"] * to_si(1.0, plain, si) == pytest.approx(1.0, rel=1e-12)
