@@ -159,6 +159,13 @@ def test_a_scaled_sequence() -> None:
         drive.scaled(math.nan)
 
 
+def test_the_same_pulses_at_other_times() -> None:
+    drive = PulseSequence([PULSE, SHORT], [0.0, 1e-3], "replace")
+    assert drive.with_times(["0 s", "2 ms"]) == PulseSequence([PULSE, SHORT], [0.0, 2e-3], "replace")
+    with pytest.raises(InputError, match="1 firing times are expected to be as many"):
+        drive.with_times([0.0])
+
+
 def test_the_start_shifts_the_firings() -> None:
     assert PulseSequence([PULSE, SHORT], [0.0, 1e-3], start="1 ms").times.tolist() == [1e-3, 2e-3]
 

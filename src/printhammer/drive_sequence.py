@@ -50,6 +50,8 @@ class PulseSequence(Drive):
         many times as waveforms; times negative, not finite, duplicate or descending.
     """
 
+    _largest: float
+
     def __init__(
         self,
         waveforms: Iterable[Waveform],
@@ -122,6 +124,16 @@ class PulseSequence(Drive):
         result = copy(self)
         result._place([scaled[id(waveform)] for waveform in self._waveforms])
         return result
+
+    def with_times(self, times: Iterable[float | str]) -> PulseSequence:
+        """Return a drive that fires the same waveforms in the same order at as many other times, s.
+
+        Raises
+        ------
+        InputError
+            Not as many times as waveforms; times negative, not finite, duplicate or descending.
+        """
+        return PulseSequence(self._waveforms, times, self._overlap)
 
     def to_toml(self) -> str:
         """Return the text of a drive file; reading it back gives an equal drive."""
