@@ -17,6 +17,7 @@ ORDER = (
     "sweep",
     "backstops",
     "energy_ledger",
+    "least_work",
     "sensitivities",
     "inch_pound_file",
     "measured_magnet",

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.equilibrium import rest_state
+from printhammer.roots import bisect
 from printhammer.static_force import StaticForce
 
 if TYPE_CHECKING:
@@ -85,9 +86,11 @@ def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Boun
 
 def _indented(static: StaticForce, single: Nominal, force: float) -> tuple[float, float]:
     """Return indentation, m, and loading work, J, at which the pack presses with a force, by its law."""
-    depth = np.linspace(0.0, 2.0 * single.indentation, _POINTS)
-    pressed = -np.array([static.pack(static.front + place) for place in depth.tolist()])
-    over = np.flatnonzero(pressed >= force * single.force)
-    last = int(over[0]) if over.size else depth.size - 1
-    inside = slice(0, last + 1)
-    return float(depth[last]), float(np.trapezoid(pressed[inside], depth[inside]))
+    wanted, front = force * single.force, static.front
+    deepest = single.indentation
+    while -static.pack(front + deepest) < wanted:
+        deepest *= 1.25
+    depth = bisect(lambda place: wanted + static.pack(front + place), 0.0, deepest)
+    places = np.linspace(0.0, depth, _POINTS)
+    pressed = -np.array([static.pack(front + place) for place in places.tolist()])
+    return depth, float(np.trapezoid(pressed, places))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from printhammer.control.least_work import LeastWork
 
-_AFTER: Final = 0.3
+_AFTER: Final = 0.08
 
 
 @styled
@@ -71,7 +71,7 @@ def plot(found: LeastWork) -> Figure:
     power.fill_between(time, np.minimum(watts, 0.0), 0.0, color=GREEN, lw=0.0, gid="taken back")
     power.set_ylabel("Coil power (W)")
     power.set_xlabel("Time (ms)")
-    last = found.drive.end + _AFTER * (run.end - found.drive.end)
+    last = min((1.0 + _AFTER) * found.rest_time, run.end)
     motion.set_xlim(0.0, float(_ms(np.array([last]))[0]))
     for ax in (motion, current):
         ax.tick_params(axis="x", labelbottom=False)
