@@ -68,8 +68,8 @@ def test_curves_come_first_and_previews_before_detail() -> None:
         found = page.until("map", detail="full")
     assert [(frame["kind"], frame.get("detail")) for frame in found] == [
         ("motion", None),
-        ("dots", None),
         ("map", "preview"),
+        ("dots", None),
         ("map", "full"),
     ]
 

@@ -19,6 +19,7 @@ from printhammer.maps import TAIL
 from printhammer.simulate import end_of_run, simulate
 from printhammer.studio import bounds
 from printhammer.studio.frames import frame
+from printhammer.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,6 +45,9 @@ GAP: Final = 65535
 """Code of a displacement that is not known, in a map."""
 
 _EXPONENT_STEPS: Final = 40.0
+
+
+_RATES_OF_PIECE: Final = 64
 
 
 class GivenUp(Exception):
@@ -158,7 +162,9 @@ def map_key(state: State) -> tuple[Any, ...]:
     )
 
 
-def map_frame(state: State, serial: int, size: tuple[int, int], newer: Callable[[], bool]) -> bytes:
+def map_frame(
+    state: State, serial: int, size: tuple[int, int], newer: Callable[[], bool], threads: int | None = None
+) -> bytes:
     """Return the displacement against time and rate, as 16-bit codes between two displacements.
 
     Raises
@@ -170,29 +176,37 @@ def map_frame(state: State, serial: int, size: tuple[int, int], newer: Callable[
     """
     if not state.low < state.high:
         raise InputError(f"map: rates from {state.low:g} Hz to {state.high:g} Hz, expected ascending ones")
-    hammer, waveform = state.changed, state.fired
-    rates = np.linspace(state.low, state.high, size[0])
+    hammer, count = state.changed, size[0]
+    rates = np.linspace(state.low, state.high, count)
     end = (state.pulses - 1) / state.low + TAIL
+    x = np.empty(size, np.float32)
+    ok = np.empty(count, bool)
     times = np.linspace(0.0, end, size[1])
-    drives = _trains(waveform, tuple(rates.tolist()), state.pulses, state.overlap)
-    runs = Ensemble(hammer, drives, end, tolerance=DISPLAY_TOLERANCE)
-    result = runs.run(times=times, progress=watch(newer))
-    assert result.x is not None
-    low, high = _limits(hammer.position, hammer.platen, result.x)
-    arrays = {"codes": codes_of(result.x, low, high)}
+
+    def piece(first: int, last: int) -> None:
+        if newer():
+            raise GivenUp
+        trains = _trains(state.fired, tuple(rates[first:last].tolist()), state.pulses, state.overlap)
+        runs = Ensemble(hammer, trains, end, tolerance=DISPLAY_TOLERANCE)
+        ok[first:last] = runs.run(times=times, x=x[first:last], threads=1).ok
+
+    # While one piece is integrated, another is made ready.
+    in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE])
+    low, high = _limits(hammer.position, hammer.platen, x)
+    arrays = {"codes": codes_of(x, low, high)}
     told = {
         "rates": [state.low, state.high],
         "end": end,
         "low": low,
         "high": high,
         "front": hammer.front,
-        "failed": int((~result.ok).sum()),
+        "failed": int((~ok).sum()),
         "detail": "full" if size == FULL else "preview",
     }
     return frame("map", serial, arrays, **told)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=64)
 def _trains(waveform: Waveform, rates: tuple[float, ...], pulses: int, overlap: Overlap) -> list[PulseTrain]:
     """Return a train for each rate; kept, since they stay the same while a constant of the hammer changes."""
     return [PulseTrain(waveform, rate=rate, pulses=pulses, overlap=overlap) for rate in rates]

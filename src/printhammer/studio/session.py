@@ -113,13 +113,14 @@ class Session:
         try:
             data, motion = engine.motion_frame(state, serial)
             self._tell(data)
-            self._tell(engine.dots_frame(serial, motion))
             if reason := engine.too_long(state, motion):
                 raise InputError(reason)
             if "map" in state.views and self._sent.get("preview") != engine.map_key(state):
-                # Never given up: a coarse map is to arrive while a slider moves.
-                self._tell(engine.map_frame(state, serial, engine.PREVIEW, lambda: False))
+                # Never given up: a coarse map is to arrive while a slider moves. The browser draws meanwhile,
+                # and has another core for that.
+                self._tell(engine.map_frame(state, serial, engine.PREVIEW, lambda: False, threads=1))
                 self._sent["preview"] = engine.map_key(state)
+            self._tell(engine.dots_frame(serial, motion))
         except InputError as error:
             self._tell(frame("refusal", serial, reason=str(error)))
             return

@@ -113,6 +113,7 @@ function sliderRow(options, studio) {
   const box = element("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": `${name}, number`, "data-number": id });
   const sign = element("span", { class: "unit" });
   const reset = element("button", { type: "button", class: "reset", title: "reset", "aria-label": `reset ${name}` }, "↺");
+  let seen = "";
   const change = (number) => {
     const patch = options.set(round(Math.min(Math.max(number, low), high)));
     if (patch) studio.store.set(patch, id);
@@ -121,6 +122,7 @@ function sliderRow(options, studio) {
   box.addEventListener("change", () => {
     const number = Number(box.value.replace(",", ".")) / unitOf(unit).factor;
     if (Number.isFinite(number)) change(number);
+    seen = "";
     follow(studio.store.state);
   });
   reset.addEventListener("click", () => studio.store.set(options.reset(), `reset ${id}`));
@@ -129,6 +131,9 @@ function sliderRow(options, studio) {
 
   function follow(state) {
     const number = options.get(state);
+    const now = `${number} ${unitOf(unit).name}`;
+    if (now === seen) return;
+    seen = now;
     slider.value = String(Math.round(part(number) * STEPS));
     slider.setAttribute("aria-valuetext", shown(number, unit));
     if (document.activeElement !== box) box.value = digits(number * unitOf(unit).factor, whole ? 6 : 5);

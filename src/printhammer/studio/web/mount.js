@@ -9,12 +9,13 @@ import { mapView } from "./map.js";
 import { layout } from "./panels.js";
 import { loopsView, phaseView, strobeView } from "./planes.js";
 import { sketchView } from "./sketch.js";
-import { fromText, START, Store, toText } from "./state.js";
+import { fromText, START, Store, toText, VIEWS } from "./state.js";
 import { readColours } from "./theme.js";
 import { setSystem, setUnits } from "./units.js";
 
 const MAKERS = { motion: motionView, sketch: sketchView, map: mapView, forces: forcesView, phase: phaseView, strobe: strobeView, loops: loopsView, energy: energyView, line: lineView };
 const MOST_GHOSTS = 4;
+const QUICK = ["motion", "forces", "phase"];
 
 /**
  * Build the studio.
@@ -84,22 +85,30 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       for (const view of shownViews()) view.cursor();
     });
   }
-  /** Draw at once what has arrived: it is seen with the next picture. */
+  let later = false;
+  /** Draw at once what has arrived, to be seen with the next picture; what matters less comes with the one after. */
   function arrived(frame) {
-    for (const view of shownViews()) view.update(frame.kind);
-    if (frame.kind === "motion") follow();
+    const first = frame.kind === "motion" ? QUICK : VIEWS;
+    for (const name of studio.store.state.views) if (first.includes(name)) studio.views[name].update(frame.kind);
     const { kind, detail, serial } = frame;
-    requestAnimationFrame(() => report([{ kind, detail, serial }]));
+    requestAnimationFrame(() => {
+      report({ kind, detail, serial });
+      if (frame.kind !== "motion" || later) return;
+      later = true;
+      requestAnimationFrame(() => {
+        later = false;
+        for (const name of studio.store.state.views) if (!first.includes(name)) studio.views[name].update("motion");
+        follow();
+      });
+    });
   }
 
   /** Tell, after the next paint, how long a state took to be seen. */
   function report(seen) {
     const channel = new MessageChannel();
     channel.port1.onmessage = () => {
-      for (const { kind, detail, serial } of seen) {
-        const took = studio.sentAt.has(serial) ? performance.now() - studio.sentAt.get(serial) : null;
-        element.dispatchEvent(new CustomEvent("painted", { detail: { kind, detail, serial, took } }));
-      }
+      const took = studio.sentAt.has(seen.serial) ? performance.now() - studio.sentAt.get(seen.serial) : null;
+      element.dispatchEvent(new CustomEvent("painted", { detail: { ...seen, took } }));
     };
     channel.port2.postMessage(0);
   }
