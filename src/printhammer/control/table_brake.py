@@ -1,8 +1,8 @@
-"""The brake pulse: catch the armature on its way back, so that it lands on the backstop and stays there.
+"""The brake pulse: what a current does to the armature on its way back from a dot.
 
 The bucking current that releases the armature slows it down when it returns; Fig. 6 of F. Hendriks, *Bounce
-and Chaotic Motion in Impact Print Hammers* (1983), calls that a quenched response. A pulse that is fired at
-the right time after a dot, and has the right width, leaves next to nothing of the rebounds.
+and Chaotic Motion in Impact Print Hammers* (1983), calls that a quenched response. Where a dot cannot be made
+well at its time because the armature falls back from a rebound just then, a pulse before changes the rebound.
 """
 
 from __future__ import annotations
@@ -12,112 +12,130 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.control.table_drive import of_width, with_brake
-from printhammer.drive import PulseTrain
+from printhammer.control.table_drive import fading, of_width, with_brake
+from printhammer.drive_sequence import PulseSequence
 from printhammer.ensemble import Ensemble
-from printhammer.equilibrium import rest_state
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.control.table_single import Single
-    from printhammer.hammer import Hammer
+    from printhammer.control.table_polish import Work
     from printhammer.segments import FloatArray
     from printhammer.waveforms import Waveform
 
-LATE: Final = 12.5e-6
-"""By how much a dot may be early or late, s, without the brake pulse doing harm."""
+LATE: Final = 6e-6
+"""By how much the first dot may be early or late, s."""
 
-_SAMPLE: Final = 4e-6
-_DELAY: Final = 5e-6
-_WIDTHS: Final = 40
+HARD: Final = 0.015
+"""By how much the pulse of the first dot may be wide or narrow, in parts of its width."""
+
+_DELAYS: Final = 9
+_BRAKES: Final = 8
+_FIRED: Final = 11
+_ROOM: Final = 50e-6
+_WIDTHS: Final = 6
+_LEAST: Final = 0.8
+_CANDIDATES: Final = 120
+_WAIT: Final = 1e-3
+_FIRST: Final = ((0.0, 0.0), (LATE, 0.0), (-LATE, 0.0), (0.0, HARD), (0.0, -HARD))
 
 
 @dataclass(frozen=True)
-class Brake:
-    """A brake pulse.
+class Braked:
+    """A brake pulse and the dot after it, times from the slot of the dot before, s.
 
     Attributes
     ----------
-    delay : float
-        From the firing of a pulse from rest to the brake pulse, s.
-    width : float
-        Its width, s.
-    unrest : float
-        Integral of the distance from rest, from the time on at which the armature would hit the backstop
-        without a brake pulse, in parts of that without one; the worst of the hammers.
+    delay, brake : float
+        Beginning and width of the brake pulse.
+    fired, width : float
+        Of the dot after it.
+    off : float
+        Worst deviation, in parts of the limits, over first dots that are a little off themselves.
     """
 
     delay: float
+    brake: float
+    fired: float
     width: float
-    unrest: float
+    off: float
 
 
-def best_brake(
-    hammers: Sequence[Hammer], pulse: Waveform, widest: float, single: Single, **options: Any
-) -> Brake | None:
-    """Search for the brake pulse after which the hammer is at rest soonest.
+def braked(work: Work, period: float) -> Braked | None:
+    """Search for a brake pulse with which a dot is well made one period after another.
 
-    The best one of all is of no use: it ends as the armature lands, and where that is a little early, fires
-    it again. What counts here is the worst of pulses that are a little early, late, wide or narrow.
+    The best one for a perfect first dot may be of no use: a brake pulse that ends just as the armature lands
+    fires it again where it lands a little early. So what counts is the worst over first dots that are early,
+    late, hard or soft.
 
     Parameters
     ----------
-    hammers : sequence of Hammer
-        Hammers that it is to serve; the worst counts.
-    pulse : Waveform
-        The pulse that prints, fired from rest.
-    widest : float
-        Largest width, s.
-    single : Single
-        What the pulse does.
-    **options
-        Tolerance and threads.
+    work : Work
+        What the table is to be like.
+    period : float
+        From slot to slot, s.
 
     Returns
     -------
-    Brake or None
-        None where no brake pulse does better than none.
+    Braked or None
+        None where no brake pulse fits between the dots, or none leads to a dot.
     """
-    from scipy.ndimage import maximum_filter
-
-    delays = np.arange(single.left, single.returned, _DELAY)
-    widths = np.linspace(0.0, widest, _WIDTHS + 1)[1:]
-    cells = [(delay, width) for delay in delays.tolist() for width in widths.tolist()]
-    without = float(_unrest(hammers, pulse, [(single.left, 0.0)], single, **options)[0])
-    unrest = _unrest(hammers, pulse, cells, single, **options).reshape(delays.size, widths.size)
-    around = 2 * round(LATE / _DELAY) + 1
-    worst = maximum_filter(unrest, size=(around, 3), mode="nearest")
-    place = np.unravel_index(int(np.argmin(worst)), worst.shape)
-    if not worst[place] < without:
-        return None
-    return Brake(float(delays[place[0]]), float(widths[place[1]]), float(unrest[place] / without))
-
-
-def _unrest(
-    hammers: Sequence[Hammer],
-    pulse: Waveform,
-    cells: Sequence[tuple[float, float]],
-    single: Single,
-    *,
-    tolerance: float,
-    threads: int | None,
-) -> FloatArray:
-    """Return the largest of the integrals of |x - rest|, m s, over the hammers; infinite with another dot."""
-    drives = [
-        PulseTrain(with_brake(pulse, of_width(pulse, width) if width else None, delay))
-        for delay, width in cells
+    own: Any = work.pulse
+    single, fade = work.single, fading(work.pulse)
+    cells = [
+        (delay, brake, fired, width)
+        for delay in np.linspace(single.left, single.returned, _DELAYS).tolist()
+        for brake in np.linspace(0.0, work.widest, _BRAKES + 1)[1:].tolist()
+        for fired in np.linspace(period - _ROOM, period + _ROOM, _FIRED).tolist()
+        for width in np.linspace(_LEAST * own.width, work.widest, _WIDTHS).tolist()
+        if delay + brake + fade <= fired
     ]
-    times = np.arange(single.returned, single.settled, _SAMPLE)
-    worst = np.zeros(len(cells))
-    for hammer in hammers:
-        result = Ensemble(hammer, drives, float(times[-1]), tolerance=tolerance).run(
-            dots=True, times=times, threads=threads
-        )
-        dots, x = result.dots, result.x
+    if not cells:
+        return None
+    off = _off(work, period, cells, _FIRST[:1])
+    best = np.argsort(off, kind="stable")[:_CANDIDATES]
+    best = best[np.isfinite(off[best])]
+    if not best.size:
+        return None
+    chosen = [cells[k] for k in best]
+    worst = _off(work, period, chosen, _FIRST)
+    place = int(np.argmin(worst))
+    return Braked(*chosen[place], off=float(worst[place])) if np.isfinite(worst[place]) else None
+
+
+def _off(
+    work: Work,
+    period: float,
+    cells: Sequence[tuple[float, float, float, float]],
+    firsts: Sequence[tuple[float, float]],
+) -> FloatArray:
+    """Return the worst deviation of the second dot over several first ones; infinite for a lost dot."""
+    own: Any = work.pulse
+    nominal = work.single.nominal
+    firsts_of: dict[tuple[float, float, float, float], Waveform] = {}
+    seconds: dict[float, Waveform] = {}
+    drives = []
+    # The run begins a little before the first slot, at which a first dot may be early.
+    begin = LATE
+    for delay, brake, fired, width in cells:
+        if width not in seconds:
+            seconds[width] = of_width(own, width)
+        for late, hard in firsts:
+            key = (late, hard, delay, brake)
+            if key not in firsts_of:
+                pulse = of_width(own, own.width * (1.0 + hard))
+                firsts_of[key] = with_brake(pulse, of_width(own, brake), delay - late)
+            waveforms = [firsts_of[key], seconds[width]]
+            drives.append(PulseSequence(waveforms, at=[begin + late, begin + fired]))
+    ends = np.array([float(drive.times[-1]) for drive in drives]) + _WAIT
+    worst = np.zeros(len(drives))
+    for hammer in work.hammers:
+        result = Ensemble(hammer, drives, ends, tolerance=work.tolerance).run(dots=True, threads=work.threads)
+        dots = result.dots
         assert dots is not None
-        assert x is not None
-        away = np.abs(x - rest_state(hammer)).sum(axis=1, dtype=np.float64) * _SAMPLE
-        good = result.ok & (dots.extra_contacts[:, 0] == 0)
-        worst = np.maximum(worst, np.where(good, away, np.inf))
-    return worst
+        good = result.ok & dots.struck.all(axis=1) & (dots.extra_contacts == 0).all(axis=1)
+        force = np.abs(dots.peak_force[:, 1] / nominal.force - 1.0) / work.limits.force
+        touched = dots.fired_at[:, 1] + dots.flight_time[:, 1]
+        arrival = np.abs(touched - (begin + period + nominal.flight_time)) / work.limits.arrival
+        worst = np.maximum(worst, np.where(good, np.maximum(force, arrival), np.inf))
+    return np.asarray(worst.reshape(len(cells), len(firsts)).max(axis=1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -28,8 +28,15 @@ WIDEST: Final = 2.0
 LARGEST_CURRENT: Final = 2.0
 """Largest current in any drive unless told otherwise, A."""
 
+MARGIN: Final = 1e-3
+"""Part of the largest current that a single pulse stays below it, for what is left of a brake pulse."""
+
+FADED: Final = 0.02
+"""What is left of a brake pulse when the next dot is fired, in parts of its peak."""
+
 _ROUNDING: Final = 1e-9
 _HALVINGS: Final = 50
+_SAMPLES: Final = 4001
 
 
 def of_width(pulse: Waveform, width: float) -> Waveform:
@@ -56,12 +63,21 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
             f"{hammer.path}: the waveform peaks at {pulse.peak:.4g} A, expected at most {largest:g} A"
         )
     low, high = width, WIDEST * width
-    if of_width(pulse, high).peak <= largest:
+    bound = max(pulse.peak, largest * (1.0 - MARGIN))
+    if of_width(pulse, high).peak <= bound:
         return pulse, high
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if of_width(pulse, middle).peak <= largest else (low, middle)
+        low, high = (middle, high) if of_width(pulse, middle).peak <= bound else (low, middle)
     return pulse, low
+
+
+def fading(pulse: Waveform) -> float:
+    """Return the time, s, after its width in which a pulse has faded to `FADED` of its peak for good."""
+    own: Any = pulse
+    times = np.linspace(own.width, max(pulse.support, own.width), _SAMPLES)
+    loud = np.flatnonzero(np.abs(pulse.value(times)) > FADED * pulse.peak)
+    return float(times[min(loud[-1] + 1, _SAMPLES - 1)] - own.width) if loud.size else 0.0
 
 
 def with_brake(pulse: Waveform, brake: Waveform | None, offset: float) -> Waveform:

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.control.table_drive import of_width, with_brake
+from printhammer.control.table_drive import of_width
 from printhammer.drive_sequence import PulseSequence
 from printhammer.ensemble import Ensemble
 
 if TYPE_CHECKING:
-    from printhammer.control.table_brake import Brake
     from printhammer.control.table_polish import Work
     from printhammer.hammer import Hammer
     from printhammer.printing.limits import Limits
@@ -46,8 +45,6 @@ class Plane:
 
     Attributes
     ----------
-    brake : Brake or None
-        The brake pulse between the two dots.
     fired : array
         Firing times after the slot of the first dot, s.
     widths : array
@@ -58,7 +55,6 @@ class Plane:
         Touch less single-pulse flight time, s after the slot of the first dot: where a slot would have to be.
     """
 
-    brake: Brake | None
     fired: FloatArray
     widths: FloatArray
     force: FloatArray
@@ -69,7 +65,7 @@ class Plane:
         return np.maximum(np.abs(self.force) / limits.force, np.abs(self.arrival - period) / limits.arrival)
 
 
-def plane(work: Work, hammer: Hammer, brake: Brake | None, periods: FloatArray) -> Plane:
+def plane(work: Work, hammer: Hammer, periods: FloatArray) -> Plane:
     """Compute a plane, from the time at which the armature leaves the pack on.
 
     Parameters
@@ -78,27 +74,24 @@ def plane(work: Work, hammer: Hammer, brake: Brake | None, periods: FloatArray) 
         What the table is to be like, and what the single pulse does to the hammer it is for.
     hammer : Hammer
         What is driven, this hammer or another one.
-    brake : Brake or None
-        A brake pulse between the dots; the second one is not fired before it has ended.
     periods : array
         Times from slot to slot that are of interest, s: only firings near them are tried.
     """
     single, nominal, pulse = work.single, work.single.nominal, work.pulse
-    begin = single.left if brake is None else brake.delay + brake.width
+    begin = single.left
     steps = np.arange(max(0, math.floor((float(periods.max()) + ROOM - begin) / STEP) + 1))
     every = begin + STEP * steps
     near = np.abs(every[:, np.newaxis] - periods).min(axis=1, initial=math.inf) <= ROOM
     fired = every[near]
     own: Any = pulse
     widths = np.linspace(LEAST_WIDTH * own.width, work.widest, WIDTHS)
-    first = pulse if brake is None else with_brake(pulse, of_width(pulse, brake.width), brake.delay)
     seconds = [of_width(pulse, width) for width in widths.tolist()]
     force, arrival = np.full((2, fired.size, widths.size), np.inf)
     rows = max(1, _PIECE // widths.size)
     for start in range(0, fired.size, rows):
         times = fired[start : start + rows]
         drives = [
-            PulseSequence([first, second], at=[0.0, time]) for time in times.tolist() for second in seconds
+            PulseSequence([pulse, second], at=[0.0, time]) for time in times.tolist() for second in seconds
         ]
         result = Ensemble(
             hammer, drives, np.repeat(times + _WAIT, widths.size), tolerance=work.tolerance
@@ -111,7 +104,7 @@ def plane(work: Work, hammer: Hammer, brake: Brake | None, periods: FloatArray) 
         touched = np.where(good, dots.fired_at[:, 1] + dots.flight_time[:, 1] - nominal.flight_time, np.inf)
         force[start : start + rows] = off.reshape(shape)
         arrival[start : start + rows] = touched.reshape(shape)
-    return Plane(brake, fired, widths, force, arrival)
+    return Plane(fired, widths, force, arrival)
 
 
 @dataclass(frozen=True)
@@ -120,8 +113,6 @@ class Guess:
 
     Attributes
     ----------
-    brake : Brake or None
-        Of the plane.
     fired, width : float
         Of the cell, s.
     off : float
@@ -130,7 +121,6 @@ class Guess:
         The same over all hammers.
     """
 
-    brake: Brake | None
     fired: float
     width: float
     off: float
@@ -143,7 +133,7 @@ def guess(planes: list[Plane], period: float, limits: Limits) -> Guess | None:
     Parameters
     ----------
     planes : list of Plane
-        With the same brake: that of the hammer itself first, then those of others that differ a little.
+        That of the hammer itself first, then those of others that differ a little.
     period : float
         Time from slot to slot, s.
     limits : Limits
@@ -164,7 +154,6 @@ def guess(planes: list[Plane], period: float, limits: Limits) -> Guess | None:
     if not allowed[place]:
         place = np.unravel_index(int(np.argmin(own)), own.shape)
     return Guess(
-        planes[0].brake,
         float(planes[0].fired[place[0]]),
         float(planes[0].widths[place[1]]),
         float(own[place]),

@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.control.histories import REST, History, histories, number_of, pattern_of, plain
 from printhammer.control.table import COLUMNS, Settings
-from printhammer.control.table_drive import pulses_of, sequence
+from printhammer.control.table_drive import fading, pulses_of, sequence
 from printhammer.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 ROUNDS: Final = 5
 """Steps of Newton's method for each length of history."""
 
-GOOD: Final = 1e-3
+GOOD: Final = 3e-4
 """Deviation, in parts of the limits, from which on an entry is left as it is."""
 
 LEAST_WIDTH: Final = 0.3
@@ -73,16 +73,6 @@ def subset(work: Work, rows: npt.NDArray[np.int64]) -> Work:
     """Return some rows of a table in the making, as a copy."""
     values: dict[str, Any] = {name: getattr(work, name)[rows] for name in VALUES}
     return replace(work, rates=work.rates[rows], **values)
-
-
-def joined(work: Work, other: Work) -> Work:
-    """Return the rows of two tables in the making, by ascending rate."""
-    rates = np.concatenate([work.rates, other.rates])
-    order = np.argsort(rates, kind="stable")
-    values: dict[str, Any] = {
-        name: np.concatenate([getattr(work, name), getattr(other, name)])[order] for name in VALUES
-    }
-    return replace(work, rates=rates[order], **values)
 
 
 def befores(history: History, reach: int) -> list[tuple[int, ...]]:
@@ -141,8 +131,9 @@ def polish_level(work: Work, level: Sequence[History], told: Callable[[], None])
     now = np.column_stack([work.advance[rows, columns], work.width[rows, columns]])
     gap = np.array([history[0] for _row, history in cells]) / work.rates[rows]
     brake = work.brake_width[rows, columns]
-    # No dot is fired before the brake pulse has ended.
-    earliest = np.where(brake > 0.0, work.brake_delay[rows, columns] + brake, 0.0)
+    # No dot is fired before the brake pulse has faded.
+    faded = work.brake_delay[rows, columns] + brake + fading(work.pulse)
+    earliest = np.where(brake > 0.0, faded, 0.0)
     best, best_off = now.copy(), np.full(len(cells), np.inf)
     for turn in range(ROUNDS + 1):
         active = np.flatnonzero(best_off > GOOD)

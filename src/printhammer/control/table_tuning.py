@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 import numpy as np
 
 from printhammer.control.histories import REST, checked_size, entries_of, histories, number_of, shared_numbers
-from printhammer.control.table import COLUMNS, CompensationTable
-from printhammer.control.table_brake import Brake, best_brake
+from printhammer.control.table import CompensationTable
+from printhammer.control.table_brake import braked
 from printhammer.control.table_drive import LARGEST_CURRENT, print_pulse
 from printhammer.control.table_maps import guess, plane
 from printhammer.control.table_polish import (
     ROUNDS,
     VALUES,
     Work,
-    joined,
     level_of,
     look_at,
     polish,
@@ -33,16 +32,14 @@ from printhammer.printing.perturbation import Perturbation, perturbed
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy.typing as npt
-
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
 FIRST: Final = 100.0
 """Lowest rate of a table over all rates, Hz: every dot is printed from rest."""
 
-STEP: Final = 0.015
-"""Step between the rates of such a table, in parts of the period."""
+STEP: Final = 5.0
+"""Step between the rates of such a table, Hz."""
 
 SPREAD: Final = (
     Perturbation(current=0.03),
@@ -53,9 +50,8 @@ SPREAD: Final = (
 """By how much the hammers differ that a robust table is tuned on, beside the hammer itself."""
 
 _FREE: Final = 0.2
+_HOPELESS: Final = 3.0
 _USABLE: Final = 0.9
-_BETWEEN: Final = 0.2
-_REFINEMENTS: Final = 4
 
 
 def tune(
@@ -145,13 +141,27 @@ def tune(
         tolerance=tolerance,
         threads=threads,
     )
-    tuner = _Tuner(blank, brake, steps)
-    work = tuner.rows(grid)
+    work = _tuned(blank, grid, brake, steps)
+    lost = np.flatnonzero(~np.isfinite(work.deviation.max(axis=1)))
     if asked is None:
-        work = _refined(tuner, work, hammer, largest)
-    else:
-        _refuse_lost(work)
-    return _table(work, hammer, largest)
+        work = subset(work, np.arange(_kept(work)))
+    elif lost.size:
+        speed = float(grid[lost[0]])
+        raise InputError(
+            f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before,"
+            " expected a lower rate"
+        )
+    shared = shared_numbers(gaps, far)
+    values: dict[str, Any] = {name: getattr(work, name)[:, shared] for name in VALUES}
+    return CompensationTable(
+        hammer=hammer.name,
+        fingerprint=hammer.fingerprint,
+        rates=work.rates,
+        gaps=gaps,
+        reach=far,
+        largest_current=largest,
+        **values,
+    )
 
 
 class _Steps:
@@ -167,10 +177,9 @@ class _Steps:
 
 
 def _all_rates(single: Single) -> FloatArray:
-    """Return rates from that at which all is rest to one that no hammer keeps to, evenly in log period."""
-    longest = single.settled + single.nominal.flight_time
-    count = int(np.log(longest / single.left) / np.log1p(STEP))
-    return np.array([FIRST, *(1.0 / (longest * (1.0 + STEP) ** -np.arange(count))).tolist()])
+    """Return rates from that at which all is rest to one at which the armature is not back from the pack."""
+    lowest = STEP * np.floor(1.0 / (single.settled * STEP))
+    return np.array([FIRST, *np.arange(lowest, 1.0 / single.left, STEP).tolist()])
 
 
 def _given_rates(asked: Sequence[float | str]) -> FloatArray:
@@ -182,137 +191,86 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
     return found
 
 
-class _Tuner:
-    """Tunes rows of a table.
+def _tuned(blank: Work, rates: FloatArray, brake: bool, steps: Callable[[], None]) -> Work:
+    """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
 
     Parameters
     ----------
     blank : Work
         What is asked, without rows.
+    rates : array
+        Of the rows, Hz.
     brake : bool
         Whether brake pulses may be used.
     steps : callable
         Called after each step of the work.
     """
+    own: Any = blank.pulse
+    shape = rates.size, entries_of(blank.gaps, blank.reach)
+    blanks: dict[str, Any] = {name: np.zeros(shape) for name in VALUES}
+    work = replace(blank, rates=rates, **blanks)
+    work.width[:] = own.width
+    _begin(work)
+    steps()
+    polish_level(work, level_of(work, 1), steps)
+    look_at(work, level_of(work, 1))
+    if brake:
+        _with_brakes(work, steps)
+    found = np.isfinite(work.deviation.max(axis=1))
+    good = subset(work, np.flatnonzero(found))
+    if found.any():
+        polish(good, steps)
+    for name in VALUES:
+        getattr(work, name)[found] = getattr(good, name)
+    return work
 
-    def __init__(self, blank: Work, brake: bool, steps: Callable[[], None]) -> None:
-        self._blank, self._may_brake, self._steps = blank, brake, steps
-        self._brakes: list[Brake | None] = []
 
-    def rows(self, rates: FloatArray) -> Work:
-        """Return tuned rows; the deviation of an entry for which no dot is found is infinite."""
-        blank = self._blank
-        own: Any = blank.pulse
-        shape = rates.size, entries_of(blank.gaps, blank.reach)
-        blanks: dict[str, Any] = {name: np.zeros(shape) for name in VALUES}
-        work = replace(blank, rates=rates, **blanks)
-        work.width[:] = own.width
-        self._begin(work, None)
-        wrong = np.flatnonzero(~(work.deviation.max(axis=1) <= _FREE))
-        if wrong.size and (brake := self._brake()) is not None:
-            self._with_brakes(work, wrong, brake)
-        found = np.isfinite(work.deviation.max(axis=1))
-        good = subset(work, np.flatnonzero(found))
-        polish(good, self._steps)
-        for name in VALUES:
-            getattr(work, name)[found] = getattr(good, name)
-        return work
-
-    def _brake(self) -> Brake | None:
-        """Return the one brake pulse of the table, looked for when it is first needed."""
-        blank = self._blank
-        if not self._brakes:
-            options: dict[str, Any] = {"tolerance": blank.tolerance, "threads": blank.threads}
-            self._brakes.append(
-                best_brake(blank.hammers, blank.pulse, blank.widest, blank.single, **options)
-                if self._may_brake
-                else None
-            )
-        return self._brakes[0]
-
-    def _begin(self, work: Work, brake: Brake | None) -> None:
-        """Find entries that depend on the last gap only, all of them with a brake pulse or all without."""
-        periods = np.unique(np.outer(1.0 / work.rates, np.arange(1, work.reach + 1)).ravel())
-        periods = periods[periods <= work.single.settled]
-        if not periods.size:
-            return
-        planes = [plane(work, hammer, brake, periods) for hammer in work.hammers]
-        for history in histories(work.gaps, work.reach):
-            column = number_of(history, work.reach)
-            for row, rate in enumerate(work.rates.tolist()):
-                period = history[0] / rate
-                if not 0.0 < period <= work.single.settled:
-                    continue
-                cell = guess(planes, period, work.limits)
-                if cell is None:
-                    continue
+def _begin(work: Work) -> None:
+    """Look up first guesses, which depend on the last gap only, in a plane of second dots."""
+    periods = np.unique(np.outer(1.0 / work.rates, np.arange(1, work.reach + 1)).ravel())
+    periods = periods[periods <= work.single.settled]
+    if not periods.size:
+        return
+    planes = [plane(work, hammer, periods) for hammer in work.hammers]
+    for history in histories(work.gaps, work.reach):
+        column = number_of(history, work.reach)
+        for row, rate in enumerate(work.rates.tolist()):
+            period = history[0] / rate
+            if not 0.0 < period <= work.single.settled:
+                continue
+            cell = guess(planes, period, work.limits)
+            if cell is not None:
                 work.advance[row, column] = period - cell.fired
                 work.width[row, column] = cell.width
-                if cell.brake is not None:
-                    work.brake_delay[row, column] = cell.brake.delay
-                    work.brake_width[row, column] = cell.brake.width
-        polish_level(work, level_of(work, 1), self._steps)
-        look_at(work, level_of(work, 1))
 
-    def _with_brakes(self, work: Work, rows: npt.NDArray[np.int64], brake: Brake) -> None:
-        """Put brake pulses into the gaps where dots are nearer to the limits with than without."""
+
+def _with_brakes(work: Work, steps: Callable[[], None]) -> None:
+    """Put brake pulses into the gaps where dots are nearer to the limits with than without."""
+    for gap in range(1, work.reach + 1):
+        level = [(gap, *[REST] * (work.gaps - 1))]
+        first = number_of(level[0], work.reach)
+        own = [number_of(one, work.reach) for one in histories(work.gaps, work.reach) if one[0] == gap]
+        rows = np.flatnonzero(~(work.deviation[:, first] <= _FREE))
         other = subset(work, rows)
-        self._begin(other, brake)
-        for gap in range(1, work.reach + 1):
-            first = number_of((gap, *[REST] * (work.gaps - 1)), work.reach)
-            before = work.deviation[rows, first]
-            better = (before > _FREE) & (other.deviation[:, first] < before)
-            for history in histories(work.gaps, work.reach):
-                column = number_of(history, work.reach)
-                for name in VALUES if history[0] == gap else ():
-                    getattr(work, name)[rows[better], column] = getattr(other, name)[better, first]
-
-
-def _refined(tuner: _Tuner, work: Work, hammer: Hammer, largest: float) -> Work:
-    """Add rates where the table is off between two, and near the highest; leave out those above it."""
-    for _ in range(_REFINEMENTS):
-        kept = _kept(work)
-        table = _table(subset(work, np.arange(kept)), hammer, largest)
-        between = np.sqrt(table.rates[:-1] * table.rates[1:])
-        told = [table.at(rate) for rate in between.tolist()]
-        tried = subset(work, np.zeros(between.size, np.int64))
-        tried.rates = between
-        for name in COLUMNS:
-            setattr(tried, name, np.array([getattr(one, name) for one in told]))
-        for known in range(1, work.gaps + 1):
-            look_at(tried, level_of(tried, known))
-        more = between[~(tried.deviation.max(axis=1) <= _BETWEEN)].tolist()
-        if kept < work.rates.size:
-            more.append(float(np.sqrt(work.rates[kept - 1] * work.rates[kept])))
-        if not more:
-            break
-        added = tuner.rows(np.array(more))
-        work = joined(work, added)
-    return subset(work, np.arange(_kept(work)))
-
-
-def _table(work: Work, hammer: Hammer, largest: float) -> CompensationTable:
-    shared = shared_numbers(work.gaps, work.reach)
-    return CompensationTable(
-        hammer=hammer.name,
-        fingerprint=hammer.fingerprint,
-        rates=work.rates,
-        gaps=work.gaps,
-        reach=work.reach,
-        **{name: getattr(work, name)[:, shared] for name in VALUES},
-        largest_current=largest,
-    )
-
-
-def _refuse_lost(work: Work) -> None:
-    """Refuse rates at which no dot can follow another one."""
-    lost = np.flatnonzero(~np.isfinite(work.deviation.max(axis=1)))
-    if lost.size:
-        rate = float(work.rates[lost[0]])
-        raise InputError(
-            f"rate = {rate:g} Hz: no pulse prints every dot when others come {1e3 / rate:.4g} ms before,"
-            " expected a lower rate"
-        )
+        usable = np.zeros(rows.size, np.bool_)
+        for row, rate in enumerate(other.rates.tolist()):
+            found = braked(work, gap / rate)
+            if found is None or found.off > _HOPELESS:
+                # Nothing is gained above a rate at which no pulse comes near: the table ends there.
+                break
+            usable[row] = True
+            other.advance[row, own], other.width[row, own] = gap / rate - found.fired, found.width
+            other.brake_delay[row, own], other.brake_width[row, own] = found.delay, found.brake
+        steps()
+        rows, other = rows[usable], subset(other, np.flatnonzero(usable))
+        if not rows.size:
+            continue
+        polish_level(other, level, steps)
+        look_at(other, level)
+        better = other.deviation[:, first] < work.deviation[rows, first]
+        for column in own:
+            for name in VALUES:
+                getattr(work, name)[rows[better], column] = getattr(other, name)[better, first]
 
 
 def _kept(work: Work) -> int:
