@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from printhammer.chaos.strobe import strobe
     from printhammer.chaos.zero_one import zero_one
     from printhammer.control.least_work import least_work
+    from printhammer.control.table import CompensationTable
+    from printhammer.control.table_files import load_table
+    from printhammer.control.table_report import judge_table
+    from printhammer.control.table_tuning import tune
     from printhammer.drive import Burst, PulseTrain, SineForce
     from printhammer.drive_sequence import PulseSequence
     from printhammer.ensemble import Ensemble, EnsembleResult
@@ -53,6 +57,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Burst",
+    "CompensationTable",
     "Ensemble",
     "EnsembleResult",
     "Hammer",
@@ -76,8 +81,10 @@ __all__ = [
     "frequency_map",
     "holding_margin",
     "impact_train",
+    "judge_table",
     "least_work",
     "load",
+    "load_table",
     "lyapunov",
     "measure",
     "orbits",
@@ -97,11 +104,13 @@ __all__ = [
     "strobe",
     "sweep",
     "tolerance_yield",
+    "tune",
     "zero_one",
 ]
 
 _HOME = {
     "Burst": "drive",
+    "CompensationTable": "control.table",
     "Ensemble": "ensemble",
     "EnsembleResult": "ensemble",
     "Hammer": "hammer",
@@ -124,8 +133,10 @@ _HOME = {
     "frequency_map": "maps",
     "holding_margin": "equilibrium",
     "impact_train": "chaos.impact_train",
+    "judge_table": "control.table_report",
     "least_work": "control.least_work",
     "load": "hammer",
+    "load_table": "control.table_files",
     "lyapunov": "chaos.lyapunov",
     "measure": "identify.laboratory",
     "orbits": "chaos.orbit_search",
@@ -145,6 +156,7 @@ _HOME = {
     "strobe": "chaos.strobe",
     "sweep": "sweep",
     "tolerance_yield": "printing.tolerance",
+    "tune": "control.table_tuning",
     "zero_one": "chaos.zero_one",
 }
 

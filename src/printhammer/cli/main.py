@@ -32,6 +32,7 @@ from printhammer.cli import (
     strobe,
     studio,
     sweep,
+    tune,
 )
 from printhammer.cli import map as frequency_map
 from printhammer.cli.terminal import complain
@@ -68,6 +69,7 @@ app.command("lyapunov", epilog=lyapunov.EXAMPLE)(lyapunov.lyapunov)
 app.command("print", epilog=print_.EXAMPLE)(print_.print_)
 app.command("energy", epilog=energy.EXAMPLE)(energy.energy)
 app.command("quality", epilog=quality.EXAMPLE)(quality.quality)
+app.command("tune", epilog=tune.EXAMPLE)(tune.tune)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)
 app.command("studio", epilog=studio.EXAMPLE)(studio.studio)
 app.command("sweep", epilog=sweep.EXAMPLE)(sweep.sweep)

@@ -1,0 +1,236 @@
+"""The verb `tune`: a compensation table for the firmware, and what it gains and loses."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from printhammer.cli.numbers import number, whole
+from printhammer.cli.run import HAMMER, HammerArgument, UnitsOption
+from printhammer.cli.units import Units
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from printhammer.control.table import CompensationTable
+    from printhammer.control.table_report import TableReport
+
+EXAMPLE: Final = (
+    "Example: printhammer tune hendriks-1983 --rate 1.3kHz --history 2 --out table.csv --out table.h"
+)
+
+_PICTURES: Final = (".svg", ".png", ".pdf")
+_ROWS: Final = 12
+
+
+def tune(
+    hammer: HammerArgument = HAMMER,
+    rate: Annotated[
+        str | None, typer.Option(metavar="RATE", help="Slots per second, such as 1.3kHz (all rates).")
+    ] = None,
+    rates: Annotated[
+        str | None,
+        typer.Option(metavar="LOW, HIGH, N", help="Several rates, such as '1.2 kHz, 1.4 kHz, 41'."),
+    ] = None,
+    history: Annotated[str, typer.Option(metavar="N", help="Gaps that a history holds, 1 to 4.")] = "2",
+    reach: Annotated[str, typer.Option(metavar="N", help="Longest gap that counts, slots.")] = "2",
+    brake: Annotated[bool, typer.Option("--brake/--no-brake", help="Allow brake pulses.")] = True,
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Tune on hammers that differ a little as well.")
+    ] = False,
+    largest_current: Annotated[str, typer.Option(metavar="CURRENT", help="Bound on the current.")] = "2 A",
+    judge: Annotated[
+        bool,
+        typer.Option(
+            "--judge/--no-judge", help="Judge the table beside open loop on what it was not tuned on."
+        ),
+    ] = True,
+    tolerance: Annotated[str | None, typer.Option(metavar="X", help="Error allowed in one step.")] = None,
+    threads: Annotated[str | None, typer.Option(metavar="N", help="Threads (all cores).")] = None,
+    units: UnitsOption = Units.SI,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Table (.csv, .json, .h, .nc) or picture of it (.svg, .png, .pdf); may be given repeatedly.",
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Picture of gain and loss (.svg, .png, .pdf) or numbers (.nc)."),
+    ] = None,
+) -> None:
+    """Tune pulse width and advance as a function of the last gaps, so that every dot is like one from rest.
+
+    Ends with status 1 where the table does not keep to the limits on the hammer it is made for.
+    """
+    from rich.markup import escape
+
+    from printhammer.cli.basins import _computed
+    from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
+    from printhammer.control.table_files import SUFFIXES
+    from printhammer.control.table_report import judge_table
+    from printhammer.control.table_tuning import tune as tuned
+    from printhammer.errors import InputError
+    from printhammer.outputs import check_outputs, write_file
+
+    wanted = out or []
+    for path in wanted:
+        if path.suffix.lower() not in (*SUFFIXES, *_PICTURES):
+            known = ", ".join((*SUFFIXES, *_PICTURES))
+            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    if report is not None and report.suffix.lower() not in (".nc", *_PICTURES):
+        raise InputError(f"--report {report}: expected a name that ends in .nc, .svg, .png or .pdf")
+    if report is not None and not judge:
+        raise InputError(f"--report {report} is given, expected none beside --no-judge")
+    check_outputs([*wanted, *([] if report is None else [report])], [Path(hammer)])
+    if rate is not None and rates is not None:
+        raise InputError("--rate and --rates are given, expected one of them")
+    loaded = load_checked(hammer)
+    given: dict[str, Any] = {
+        "tolerance": number(tolerance, "tolerance"),
+        "threads": whole(threads, "threads"),
+    }
+    options = {key: value for key, value in given.items() if value is not None}
+    announce_compiling()
+    screen, begin = console(), perf_counter()
+    table: CompensationTable = _computed(
+        "tuning",
+        lambda tell: tuned(
+            loaded,
+            rate=rate,
+            rates=None if rates is None else _several(rates),
+            history=whole(history, "history") or 0,
+            reach=whole(reach, "reach") or 0,
+            brake=brake,
+            robust=robust,
+            largest_current=largest_current,
+            progress=tell,
+            **options,
+        ),
+    )
+    screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
+    screen.print(f"[dim]tuned in {perf_counter() - begin:.2g} s[/dim]\n")
+    screen.print(told(table, units))
+    found: TableReport | None = None
+    if judge:
+        found = _computed("judging", lambda tell: judge_table(loaded, table, progress=tell, **options))
+        screen.print()
+        screen.print(judged(found))
+    for path in wanted:
+        if path.suffix.lower() in _PICTURES:
+            write_file(path, _picture(table, path))
+        else:
+            table.save(path)
+        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    if report is not None and found is not None:
+        if report.suffix.lower() == ".nc":
+            data = found.to_dataset().to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
+            write_file(report, bytes(data))
+        else:
+            write_file(report, _picture(found, report))
+        screen.print(f"[dim]wrote[/dim] {report}", soft_wrap=True)
+    if found is not None and not found.passed[1, 0].all():
+        off = ", ".join(f"{one:g} Hz" for one in found.rates[~found.passed[1, 0]].tolist())
+        complain(f"with the table not all dots are within the limits at {off}")
+        raise typer.Exit(1)
+
+
+def _several(text: str) -> list[float]:
+    """Read two rates and how many between them, such as '1.2 kHz, 1.4 kHz, 41'."""
+    import numpy as np
+
+    from printhammer.drive_input import read_count, read_positive
+    from printhammer.errors import InputError
+
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 3:
+        raise InputError(f"--rates {text!r}: expected two rates and a number, such as '1.2 kHz, 1.4 kHz, 41'")
+    low, high = (read_positive(part, "Hz", "--rates") for part in parts[:2])
+    count = read_count(whole(parts[2], "--rates") or 0, "--rates")
+    if high <= low or count < 2:
+        raise InputError(
+            f"--rates {text!r}: expected a higher rate after a lower one, and two of them at least"
+        )
+    return [float(one) for one in np.linspace(low, high, count)]
+
+
+def _picture(found: CompensationTable | TableReport, path: Path) -> bytes:
+    buffer = BytesIO()
+    found.plot().savefig(buffer, format=path.suffix[1:].lower(), dpi=200.0)
+    return buffer.getvalue()
+
+
+def told(table: CompensationTable, units: Units) -> Table:
+    """Return the entries at the highest rate, a row each."""
+    from printhammer.cli.terminal import plain_table
+    from printhammer.cli.units import shown, unit
+    from printhammer.control.histories import gap_text, histories, number_of
+
+    time = unit("time", units)
+    count = table.rates.size
+    span = f"{table.rates[0]:g} Hz to {table.rates[-1]:g} Hz, {count} rates; at" if count > 1 else "at"
+    found = plain_table(
+        ("gaps before", "left"),
+        (f"advance [{time}]", "right"),
+        (f"width [{time}]", "right"),
+        (f"brake after [{time}]", "right"),
+        (f"brake [{time}]", "right"),
+        ("worst, of the limits", "right"),
+        title=f"Table for {span} {table.rates[-1]:g} Hz",
+    )
+    every = histories(table.gaps, table.reach)
+    for history in every[:_ROWS]:
+        column = number_of(history, table.reach)
+        values = {
+            name: float(getattr(table, name)[-1, column])
+            for name in ("advance", "width", "brake_delay", "brake_width", "deviation")
+        }
+        braked = values["brake_width"] > 0.0
+        found.add_row(
+            "-".join(map(gap_text, history)),
+            shown(values["advance"], "time", units),
+            shown(values["width"], "time", units),
+            shown(values["brake_delay"] if braked else None, "time", units),
+            shown(values["brake_width"] if braked else None, "time", units),
+            f"{100.0 * values['deviation']:.1f} %",
+        )
+    if len(every) > _ROWS:
+        found.add_row(f"and {len(every) - _ROWS} more", "", "", "", "", "")
+    return found
+
+
+def judged(report: TableReport) -> Table:
+    """Return what the table gains and loses, a row a hammer."""
+    from printhammer.cli.terminal import plain_table
+    from printhammer.cli.units import shown
+
+    rates = report.rates
+    span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
+    found = plain_table(
+        ("hammer driven", "left"),
+        ("open loop: good dots", "right"),
+        ("lost", "right"),
+        ("table: good dots", "right"),
+        ("lost", "right"),
+        ("worst force", "right"),
+        ("worst arrival [µs]", "right"),
+        title=f"On patterns it was not tuned on, {span}",
+    )
+    share = 100.0 * report.good.mean(axis=(2, 3))
+    lost = report.lost.sum(axis=(2, 3))
+    for row, name in enumerate(report.hammers):
+        found.add_row(
+            name,
+            f"{share[0, row]:.2f} %",
+            f"{lost[0, row]:.0f}",
+            f"[bold]{share[1, row]:.2f} %[/bold]",
+            f"{lost[1, row]:.0f}",
+            f"{100.0 * report.force[1, row].max():.1f} %",
+            shown(float(report.arrival[1, row].max()), "time", Units.SI),
+        )
+    return found
