@@ -203,7 +203,7 @@ def test_a_changed_pattern_file_is_read_or_refused_in_a_sentence(place: int, mar
     ("name", "content", "said"),
     [
         ("a.toml", b"\xff\xfe", "UTF-8"),
-        ("a.txt", b"", "ends in .toml"),
+        ("a.txt", b"", "ends in one of .toml"),
         ("a.png", b"no picture", "bitmap"),
         ("a.pbm", b"P4\n10", "bitmap"),
         ("missing.png", None, "No such file"),

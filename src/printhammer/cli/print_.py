@@ -120,7 +120,7 @@ def print_(
     if not wanted and not views and save is None:
         *pages, last = (Path(name) for name in _USUAL)
         wanted, views = pages, [(last, "zoom")]
-    _check_names(wanted, [path for path, _view in views])
+    _check_names(wanted, [path for path, _view in views], save)
     read = [path for path in (pattern, font, Path(hammer)) if path is not None]
     check_outputs([*wanted, *(path for path, _view in views), *([save] if save else [])], read)
     asked = _pattern(text, pattern, font, whole(wires, "--wires"), whole(columns, "--columns"))
@@ -158,10 +158,13 @@ def print_(
         raise typer.Exit(1)
 
 
-def _check_names(pages: list[Path], pictures: list[Path]) -> None:
+def _check_names(pages: list[Path], pictures: list[Path], save: Path | None) -> None:
     from printhammer.errors import InputError
+    from printhammer.printing.pattern_file import SUFFIXES
 
-    for paths, known in ((pages, (*_PICTURES, *_TABLES)), (pictures, _PICTURES)):
+    patterns = [save] if save else []
+    kinds = ((pages, (*_PICTURES, *_TABLES)), (pictures, _PICTURES), (patterns, SUFFIXES))
+    for paths, known in kinds:
         for path in paths:
             if path.suffix not in known:
                 raise InputError(f"{path}: expected a name that ends in one of {', '.join(known)}")

@@ -51,6 +51,7 @@ _LARGEST: Final = 0.1
 _FOOT: Final = 0.62
 _INCH: Final = 25.4e-3
 _FINENESS: Final = 10
+_ACROSS: Final = 2000
 _ZOOM_FINENESS: Final = 50
 _SHEET_FINENESS: Final = 16
 _MICRONS: Final = Scale("Placement error", "m", "um")
@@ -100,7 +101,7 @@ def plot(page: Page, view: View = "page") -> Figure:
         axes.append(_panel(figure, sheet, top, strip, name))
         top -= strip + _GAP
     across, down = page.places
-    fine = page.head.pitch / _FINENESS
+    fine = max(page.head.pitch / _FINENESS, sheet.width / _ACROSS)
     _paper(axes[0], sheet, *_dots(page), page.head.wire_diameter, fine)
     full = np.full(page.line.shape, page.head.density)
     _paper(axes[1], sheet, *page.intended, full, page.head.wire_diameter, fine)
@@ -224,7 +225,9 @@ def _discs(
 
 def _in_points(ax: Axes, length: float) -> float:
     """Return how long a length on the paper, m, is drawn, points."""
-    width, _height = ax.get_figure(root=True).get_size_inches()
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    width, _height = figure.get_size_inches()
     left, right = ax.get_xlim()
     return float(72.0 * width * ax.get_position().width * length / (right - left))
 
@@ -272,7 +275,8 @@ def _differences(figure: Figure, ax: Axes, page: Page, across: FloatArray, down:
 
 def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
     head = page.head
-    _paper(ax, sheet, *_dots(page), head.wire_diameter, head.pitch / _ZOOM_FINENESS)
+    fine = max(head.pitch / _ZOOM_FINENESS, sheet.width / _ACROSS)
+    _paper(ax, sheet, *_dots(page), head.wire_diameter, fine)
     across, down = page.intended
     reach = head.pitch
     near = (across > sheet.left - reach) & (across < sheet.right + reach)

@@ -42,6 +42,8 @@ FORMAT: Final = 1
 """Version of the pattern file format."""
 
 BITMAPS: Final = {".png": "PNG", ".pbm": "PPM", ".bmp": "BMP"}
+SUFFIXES: Final = (".toml", *BITMAPS)
+"""Ends of names of bitmaps, and of all files that hold patterns."""
 
 _KEYS: Final = ("format", "name", "wires", "rows")
 _DOT, _EMPTY = "#", "."
@@ -75,7 +77,7 @@ def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, npt.N
     if suffix in BITMAPS:
         return source.stem, _bitmap(source, matrix_font.WIRES if wires is None else wires)
     if suffix != ".toml":
-        raise InputError(f"{source}: expected a name that ends in .toml, {', '.join(BITMAPS)}")
+        raise InputError(f"{source}: expected a name that ends in one of {', '.join(SUFFIXES)}")
     try:
         text = source.read_text("utf-8")
     except UnicodeDecodeError:
@@ -186,5 +188,5 @@ def write_pattern(pattern: Pattern, path: str | Path) -> None:
         Image.fromarray(white).save(buffer, format=BITMAPS[suffix])
         content = buffer.getvalue()
     else:
-        raise InputError(f"{target}: expected a name that ends in .toml, {', '.join(BITMAPS)}")
+        raise InputError(f"{target}: expected a name that ends in one of {', '.join(SUFFIXES)}")
     write_file(target, content)
