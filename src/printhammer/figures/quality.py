@@ -69,7 +69,7 @@ def plot(found: Quality) -> Figure:
     if found.lost.any():
         plane.plot([], [], "x", ms=5.0, color=INK, label=f"{int(found.lost.sum())} lost")
     plane.set_xlabel("Arrives late by  [µs]")
-    plane.set_ylabel("Force over that of the single pulse, less 1  [%]")
+    plane.set_ylabel("Force against the single pulse  [%]")
     plane.legend(loc="upper right", fontsize=TINY, frameon=False, handletextpad=0.2)
     begin = _window(found)
     shown = (found.slot >= begin) & (found.slot < begin + _MOST_SLOTS)
@@ -174,8 +174,12 @@ def _window(found: Quality) -> int:
     """Return the first slot shown, so that the worst dot is in the middle."""
     if len(found.wanted) <= _MOST_SLOTS:
         return 0
-    bad = np.flatnonzero(found.fault >= 0)
-    severity = np.nan_to_num(np.abs(found.arrival_deviation), nan=np.inf)
-    worst = bad[np.argmin(found.fault[bad])] if bad.size else int(np.argmax(severity))
+    bounds = np.maximum([found.limits.force, found.limits.arrival], 1e-300)
+    off = np.maximum(
+        np.abs(found.force / found.nominal.force - 1.0) / bounds[0],
+        np.abs(found.arrival_deviation) / bounds[1],
+    )
+    # Lost dots, whose deviations are NaN, and extra contacts are worse than any deviation.
+    worst = int(np.argmax(np.where(np.isnan(off) | (found.extra_contacts > 0), np.inf, off)))
     middle = int(found.slot[worst]) - _MOST_SLOTS // 2
     return max(found.judged_from, min(middle, len(found.wanted) - _MOST_SLOTS))

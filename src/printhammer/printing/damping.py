@@ -103,7 +103,7 @@ class DampingStudy:
     grid : array
         Rates that were tried, Hz.
     tolerance : float
-        Of the integration.
+        Of the integration, settling excepted.
     """
 
     hammer: Hammer
@@ -174,7 +174,8 @@ def damping_study(
     first, last, step : float or str, optional
         The grid of rates, Hz.
     tolerance : float, optional
-        As for `printhammer.simulate`; by default that for pictures.
+        As for `printhammer.simulate`, of print forces and safe rates; by default that for pictures. Settling
+        is always computed with the default one of `printhammer.simulate`.
     threads : int, optional
         By default as many as there are cores; the result does not depend on it.
     progress : callable, optional
@@ -214,7 +215,8 @@ def damping_study(
     driven = [_driven(made[k], values["amplitude"][k]) for k in left]
     dots = single_pulses(driven, tolerance=tolerance, threads=threads)
     for k, one, dot in zip(left.tolist(), driven, dots, strict=True):
-        settling = settle(one, tolerance=tolerance)
+        # At the default tolerance: energies of single runs are not worth a risk.
+        settling = settle(one)
         wear = settling.wear
         if settling.status != "ok" or dot is None:
             status[k] = settling.status if settling.status != "ok" else "force not reached"
@@ -302,7 +304,11 @@ def tuned(
     for last in [False] * _ROUNDS + [True]:
         if not alive.size:
             break
-        trials = [(hammers[k], scale) for k, row in zip(alive.tolist(), scales, strict=True) for scale in row.tolist()]
+        trials = [
+            (hammers[k], scale)
+            for k, row in zip(alive.tolist(), scales, strict=True)
+            for scale in row.tolist()
+        ]
         dots = single_pulses(
             [hammer for hammer, _ in trials],
             [pulse_of(hammer).scaled(scale) for hammer, scale in trials],

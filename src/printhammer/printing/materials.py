@@ -67,8 +67,8 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
     """List the materials that are studied unless others are given.
 
     Hard backstops have other constants of equations (6) and (7); elastomers are after Kuwabara and Kono;
-    packs are softer and harder ones of equation (5), and springs with a dashpot that are as stiff as the pack
-    is at the peak of the single-pulse dot.
+    packs are softer and harder ones of equation (5), and springs with a dashpot, the spring such that the
+    loading work of the single-pulse dot presses it with the force of that dot.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
         found += [
             Material("pack", f"stiffness x {f:g}", {"pack.stiffness": f * pack.stiffness}) for f in PACKS
         ]
-        stiff = single.force / single.indentation
+        stiff = 0.5 * single.force**2 / single.loading_work
         critical = 2.0 * math.sqrt(stiff * hammer.mass)
         found += [
             Material(

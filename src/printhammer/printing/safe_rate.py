@@ -243,7 +243,7 @@ def safe_rate(
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     rows: list[_Row] = []
     failure: Failure | None = None
-    safe, peak = math.nan, math.nan
+    safe, best = math.nan, None
     for begin in range(0, len(grid), _TOGETHER):
         cases = [Case(hammer, single, rate) for rate in grid[begin : begin + _TOGETHER].tolist()]
         trial = attempt(cases, patterns, strategy, **options)
@@ -259,7 +259,7 @@ def safe_rate(
             row = _row(trial, k, run, place)
             rows.append(row)
             if failure is None and row.passed:
-                safe, peak = case.rate, _peak(trial, k, run, place)
+                safe, best = case.rate, (trial, k, run, place)
             elif failure is None:
                 failure = _failure(trial, k) if run is None else _failure(run, place, in_cycle=True)
                 if stop:
@@ -284,7 +284,8 @@ def safe_rate(
         lost=np.array([row.lost for row in rows]),
         extra_contacts=np.array([row.extra_contacts for row in rows]),
         cycle_run=np.array([row.cycle_run for row in rows]),
-        peak_drive=peak,
+        # Dear where pulses overlap, so only of the rate that is found.
+        peak_drive=math.nan if best is None else _peak(*best),
         step=read_positive(step, "Hz", "step"),
         tolerance=tolerance,
     )
