@@ -42,7 +42,7 @@ export function layout(studio, makers) {
   const chooser = make("div", { class: "chooser", role: "group", "aria-label": "views" });
   const bar = make("header", { class: "bar" },
     make("h1", {}, "printhammer studio"), hammers, honesty, presets, button("undo", "Undo (Ctrl+Z)", () => studio.store.undo(), { class: "undo" }), button("redo", "Redo (Ctrl+Shift+Z)", () => studio.store.redo(), { class: "redo" }),
-    button("pin", "Pin this run as a ghost (P)", studio.pin, { class: "pin" }), button("unpin", "Take all pins away (U)", studio.unpin),
+    button("pin", "Pin this run as a ghost (P)", studio.pin, { class: "pin" }), button("unpin", "unpin: take all pins away (U)", studio.unpin),
     out, button("open", "Open a hammer file or a measured CSV", () => file.click()), make("span", { class: "space" }), chooser, units,
     button("◐", "Light or dark (T)", () => studio.toggleTheme(), { class: "theme" }), button("?", "Keys (?)", () => studio.help(), { class: "help" }), file);
   const page = make("div", { class: "studio" }, bar, make("aside", { class: "side", "aria-label": "controls" }, controls, hint), grid, status, dialog);
@@ -68,7 +68,7 @@ export function layout(studio, makers) {
     panels[name] = panel;
     studio.views[name] = makers[name](body, studio);
     leave.addEventListener("change", () => { leaveView(name, leave.value, body); leave.value = ""; });
-    chooser.append(make("button", { type: "button", "aria-pressed": "false", title: TITLES[name], "aria-label": TITLES[name], "data-view": name, onclick: () => toggle(name) }, String(VIEWS.indexOf(name) + 1)));
+    chooser.append(make("button", { type: "button", "aria-pressed": "false", title: TITLES[name], "aria-label": `${VIEWS.indexOf(name) + 1} ${TITLES[name]}`, "data-view": name, onclick: () => toggle(name) }, String(VIEWS.indexOf(name) + 1)));
   }
 
   async function leaveView(name, kind, body) {

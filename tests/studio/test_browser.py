@@ -1,0 +1,201 @@
+"""The studio end to end, in a headless Chromium."""
+
+import json
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from tests.hammers import CRUDE
+from tests.studio.browser import Page
+from tests.studio.server import Studio
+
+import printhammer as ph
+
+CTRL, SHIFT = 2, 8
+AXE = Path(__file__).parent / "vendor" / "axe.min.js"
+STATE = "window.studio.studio.store.state"
+HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
+FRAMES = {"line": "line", "strobe": "strobe", "map": "map"}
+VIEWS = ("motion", "sketch", "map", "forces", "phase", "strobe", "loops", "energy", "line")
+
+
+def state(page: Page) -> dict[str, Any]:
+    return page.run(STATE)
+
+
+def settled(page: Page, condition: str) -> None:
+    """Wait until a state is set and its curves are drawn."""
+    page.wait(f"(() => {{ const state = {STATE}; return {condition}; }})()")
+    page.wait("!window.studio.studio.busy && !window.studio.studio.stale")
+
+
+def inked(page: Page, view: str) -> int:
+    """Count the colours of a view's canvases, of which an empty one has one."""
+    return page.run(f"helpers.inked({view!r})")
+
+
+def drop(page: Page, name: str, text: str) -> None:
+    page.run(f"helpers.drop({name!r}, {json.dumps(text)})")
+
+
+def saved(page: Page, selector: str, value: str) -> str:
+    """Choose an export and return the text that would be saved."""
+    page.run(f"helpers.save({selector!r}, {value!r})")
+    return page.wait("window.kept")
+
+
+@pytest.mark.slow
+def test_a_visit(page: Page, running: Studio) -> None:
+    """Open, look, drag, click the map, pin, undo, reload, drop, export; no complaint, no foreign request."""
+    page.run(HELPERS)
+    for view in VIEWS:
+        page.wait(f"window.studio.studio.frames[{FRAMES.get(view, 'dots')!r}]")
+        assert inked(page, view) > 3, view
+
+    # Drag a slider.
+    box = page.box("[data-key='forms thickness']")
+    middle = box["y"] + box["height"] / 2
+    page.drag(*((box["x"] + part * box["width"], middle) for part in (0.5, 0.55, 0.62, 0.7)))
+    settled(page, "state.constants['pack.thickness'] > 0")
+    constants = state(page)["constants"]
+    hammer = ph.load(CRUDE)
+    assert constants["pack.thickness"] > hammer.pack.thickness
+    assert constants["pack.thickness"] + constants["pack.front"] == pytest.approx(hammer.platen)
+    places = page.run("window.studio.studio.frames.motion.places")
+    assert places["front"] == pytest.approx(constants["pack.front"])
+
+    # Click the map: every view follows.
+    before = state(page)["rate"]
+    box = page.box(".view-map canvas")
+    page.drag((box["x"] + 0.5 * box["width"], box["y"] + 0.25 * box["height"]))
+    settled(page, f"state.rate !== {before}")
+    rate = state(page)["rate"]
+    assert 1400.0 < rate < 2000.0
+    fired = page.run("window.studio.studio.frames.motion.fired")
+    assert fired[1] - fired[0] == pytest.approx(1.0 / rate)
+    page.wait(f"window.studio.studio.frames.strobe?.rate === {rate}")
+
+    # Pin, then undo and redo.
+    page.run("document.querySelector('.pin').click()")
+    assert page.run("window.studio.studio.ghosts.length") == 1
+    page.run("document.querySelector('.grid').focus(); document.body.focus()")
+    page.run("document.querySelector('.undo').click()")
+    settled(page, f"state.rate === {before}")
+    page.run("document.querySelector('.undo').click()")
+    settled(page, "Object.keys(state.constants).length === 0")
+    page.run("document.querySelector('.redo').click()")
+    page.run("document.querySelector('.redo').click()")
+    settled(page, f"state.rate === {rate}")
+    kept = state(page)
+
+    # Reload from the address.
+    page.wait(f"location.hash.includes('rate={rate:g}')")
+    page.call("Page.reload")
+    page.wait("window.studio?.studio?.frames.map?.detail === 'full'")
+    assert state(page) == kept
+    page.run(HELPERS)
+
+    # Drop a hammer, a measured curve, and something else.
+    drop(page, "other.toml", hammer.replace("mass", 1.1 * hammer.mass).to_toml())
+    settled(page, "state.text.length > 100")
+    drop(page, "measured.csv", "time [us],displacement [um]\n0,50\n200,180\n400,60\n")
+    page.wait("window.studio.studio.overlay?.name === 'measured.csv'")
+    drop(page, "letter.txt", "Dear Sir")
+    page.wait("document.querySelector('.status').classList.contains('bad')")
+    page.run("document.querySelector('.undo').click()")
+    settled(page, "state.text === ''")
+
+    # Everything leaves.
+    assert ph.Hammer.from_toml(saved(page, "select.out", "hammer, TOML")).pack.thickness == pytest.approx(
+        kept["constants"]["pack.thickness"]
+    )
+    assert "[train]" in saved(page, "select.out", "drive, TOML")
+    for view in VIEWS:
+        page.wait(f"window.studio.studio.views['{view}'].table()")
+        leave = f".view-{view} .leave"
+        assert saved(page, leave, "CSV").count("\n") >= 9, view
+        picture = saved(page, leave, "SVG")
+        assert picture.startswith("<svg"), view
+        assert picture.count("<path") > 3, view
+        assert "NaN" not in picture, view
+        assert "PNG" in saved(page, leave, "PNG")[:8], view
+
+    assert page.complaints == []
+    assert {
+        urlsplit(address).netloc for address in page.requests if not address.startswith(("data:", "blob:"))
+    } == {running.host}
+
+
+@pytest.mark.slow
+def test_the_keyboard_reaches_everything(page: Page) -> None:
+    page.run("document.querySelector('[data-key=\"rate\"]').focus()")
+    page.press("ArrowRight")
+    settled(page, "state.rate > 1200")
+    page.press("z", "KeyZ", CTRL)
+    settled(page, "state.rate === 1200")
+    page.run("document.querySelector('.view-map canvas').focus()")
+    page.press("ArrowUp")
+    settled(page, "state.rate === 1207.5")
+    page.press("p", "KeyP")
+    page.wait("window.studio.studio.ghosts.length === 1")
+    page.press("u", "KeyU")
+    page.wait("window.studio.studio.ghosts.length === 0")
+    page.press(" ", "Space")
+    page.wait("window.studio.studio.cursor > 0")
+    page.press(" ", "Space")
+    page.press("9", "Digit9")
+    settled(page, "!state.views.includes('line')")
+    page.press("!", "Digit1", SHIFT)
+    page.wait("document.querySelector('.view-motion').classList.contains('large')")
+    page.press("Escape")
+    page.wait("!document.querySelector('.grid').classList.contains('one')")
+    page.press("t", "KeyT")
+    page.wait("getComputedStyle(document.querySelector('.studio')).getPropertyValue('--dark').trim() === '1'")
+    page.press("?", "Slash", SHIFT)
+    page.wait("document.querySelector('dialog').open")
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dark", [False, True])
+def test_no_serious_finding_about_accessibility(page: Page, dark: bool) -> None:
+    page.size(1280, 720, dark=dark)
+    page.run("for (const part of document.querySelectorAll('details')) part.open = true")
+    page.run(AXE.read_text("utf-8") + "; 1")
+    found = page.run("axe.run(document, { resultTypes: ['violations'] })")
+    serious = {
+        finding["id"]: [node["target"] for node in finding["nodes"]][:5]
+        for finding in found["violations"]
+        if finding["impact"] in ("serious", "critical")
+    }
+    assert serious == {}
+
+
+@pytest.mark.slow
+def test_two_tabs_are_independent(page: Page, running: Studio, opened_browser: Any) -> None:
+    other = opened_browser()
+    other.open(running.address + "#rate=700&pulses=2")
+    other.wait("window.studio?.studio?.frames.dots")
+    assert (state(page)["rate"], state(other)["rate"]) == (1200, 700)
+    assert len(page.run("window.studio.studio.frames.motion.fired")) == 9
+    assert len(other.run("window.studio.studio.frames.motion.fired")) == 2
+    other.call("Page.close")
+    page.run("document.querySelector('[data-key=\"rate\"]').focus()")
+    page.press("ArrowRight")
+    settled(page, "state.rate > 1200")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "height"), [(1280, 720), (1920, 1080), (2560, 1080)])
+def test_everything_fits_on_the_screen(page: Page, width: int, height: int) -> None:
+    page.size(width, height)
+    page.wait(f"innerWidth === {width}")
+    overflow = page.run("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert overflow == [width, height]
+    for view in VIEWS:
+        box = page.box(f".view-{view}")
+        assert box["width"] > 250, view
+        assert box["height"] > 180, view
+        assert box["x"] + box["width"] <= width
+        assert box["y"] + box["height"] <= height
