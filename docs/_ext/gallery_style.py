@@ -10,6 +10,7 @@ ORDER = (
     "two_pulses",
     "fast_train",
     "frequency_map",
+    "printed_line",
     "strobe",
     "exponents",
     "orbits",
