@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from printhammer.motion import Motion
     from printhammer.printing.damping import damping_study
     from printhammer.printing.limits import Limits
+    from printhammer.printing.materials import Material
     from printhammer.printing.page import print_page
     from printhammer.printing.pattern import Pattern
     from printhammer.printing.perturbation import Perturbation, perturbed
@@ -63,6 +64,7 @@ __all__ = [
     "Hammer",
     "InputError",
     "Limits",
+    "Material",
     "Motion",
     "Pattern",
     "Perturbation",
@@ -116,6 +118,7 @@ _HOME = {
     "Hammer": "hammer",
     "InputError": "errors",
     "Limits": "printing.limits",
+    "Material": "printing.materials",
     "Motion": "motion",
     "Pattern": "printing.pattern",
     "Perturbation": "printing.perturbation",
