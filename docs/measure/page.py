@@ -1,0 +1,58 @@
+"""Measure how long a page of 60 characters takes, simulated and drawn, and print it as a table.
+
+Run it with ``.venv/bin/python docs/measure/page.py``; it takes a few seconds. Imports and compilation are not
+counted. Medians of several pages, wall-clock time and processor time of all threads.
+"""
+
+import io
+import statistics
+import time
+from collections.abc import Callable
+
+import printhammer as ph
+from printhammer.printing.page import Page
+
+HAMMER = ph.load("hendriks-1983")
+TEXT = "The quick brown fox jumps over the lazy dog, 0123456789 time"
+RATE = 1500.0
+REPEATS = 9
+
+
+def timed(call: Callable[[], object]) -> tuple[float, float]:
+    """Return medians of wall-clock and processor time of a call, s."""
+    call()
+    wall, busy = [], []
+    for _ in range(REPEATS):
+        begin = time.perf_counter(), time.process_time()
+        call()
+        wall.append(time.perf_counter() - begin[0])
+        busy.append(time.process_time() - begin[1])
+    return statistics.median(wall), statistics.median(busy)
+
+
+def whole() -> None:
+    """Simulate a page and write its picture."""
+    drawn(ph.print_page(HAMMER, TEXT, RATE))
+
+
+def drawn(page: Page) -> None:
+    """Write the picture of a page."""
+    page.plot().savefig(io.BytesIO(), format="png", dpi=200)
+
+
+def main() -> None:
+    """Print the table."""
+    page = ph.print_page(HAMMER, TEXT, RATE)
+    print(f"{len(TEXT)} characters, {page.line.size} dots, {page.status.size} runs\n")
+    print("| | wall-clock time, s | processor time, s |\n|---|---|---|")
+    for name, call in (
+        ("simulated", lambda: ph.print_page(HAMMER, TEXT, RATE)),
+        ("drawn, PNG of 200 dots per inch", lambda: drawn(page)),
+        ("both", whole),
+    ):
+        wall, busy = timed(call)
+        print(f"| {name} | {wall:.2f} | {busy:.2f} |")
+
+
+if __name__ == "__main__":
+    main()
