@@ -173,7 +173,7 @@ def told(table: CompensationTable, units: Units) -> Table:
 
     time = unit("time", units)
     count = table.rates.size
-    span = f"{table.rates[0]:g} Hz to {table.rates[-1]:g} Hz, {count} rates; at" if count > 1 else "at"
+    span = f"{table.rates[0]:g} Hz to {table.rates[-1]:g} Hz, {count} rates, at" if count > 1 else ""
     found = plain_table(
         ("gaps before", "left"),
         (f"advance [{time}]", "right"),
@@ -181,7 +181,7 @@ def told(table: CompensationTable, units: Units) -> Table:
         (f"brake after [{time}]", "right"),
         (f"brake [{time}]", "right"),
         ("worst, of the limits", "right"),
-        title=f"Table for {span} {table.rates[-1]:g} Hz",
+        title=" ".join(f"Table for {span} {table.rates[-1]:g} Hz".split()),
     )
     every = histories(table.gaps, table.reach)
     for history in every[:_ROWS]:

@@ -15,6 +15,7 @@ import numpy as np
 from printhammer.control.table_drive import fading, of_width, with_brake
 from printhammer.drive_sequence import PulseSequence
 from printhammer.ensemble import Ensemble
+from printhammer.waveform_chain import TAIL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -82,9 +83,12 @@ def braked(work: Work, period: float) -> Braked | None:
     """
     own: Any = work.pulse
     single, fade = work.single, fading(work.pulse)
+    # A chain asks that the print pulse is over; twice as well, since it may be a little wider.
+    over = own.width * (1.0 + HARD) + LATE + fading(own, 0.5 * TAIL)
+    earliest = max(single.left, over)
     cells = [
         (delay, brake, fired, width)
-        for delay in np.linspace(single.left, single.returned, _DELAYS).tolist()
+        for delay in np.linspace(earliest, max(earliest, single.returned), _DELAYS).tolist()
         for brake in np.linspace(0.0, work.widest, _BRAKES + 1)[1:].tolist()
         for fired in np.linspace(period - _ROOM, period + _ROOM, _FIRED).tolist()
         for width in np.linspace(_LEAST * own.width, work.widest, _WIDTHS).tolist()

@@ -72,11 +72,11 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
     return pulse, low
 
 
-def fading(pulse: Waveform) -> float:
-    """Return the time, s, after its width in which a pulse has faded to `FADED` of its peak for good."""
+def fading(pulse: Waveform, share: float = FADED) -> float:
+    """Return the time, s, after its width in which a pulse has faded to a share of its peak for good."""
     own: Any = pulse
     times = np.linspace(own.width, max(pulse.support, own.width), _SAMPLES)
-    loud = np.flatnonzero(np.abs(pulse.value(times)) > FADED * pulse.peak)
+    loud = np.flatnonzero(np.abs(pulse.value(times)) > share * pulse.peak)
     return float(times[min(loud[-1] + 1, _SAMPLES - 1)] - own.width) if loud.size else 0.0
 
 

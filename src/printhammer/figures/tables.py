@@ -159,6 +159,7 @@ def plot_report(report: TableReport) -> Figure:
     for text in bars.get_xticklabels():
         text.set_ha("right")
     bars.set_ylabel("Dots within limits  [%]")
+    bars.set_xlim(-0.6, places.size - 0.4)
     bars.set_ylim(0.0, 119.0)
     bars.set_yticks([0, 25, 50, 75, 100])
     bars.legend(frameon=False, fontsize=SMALL, ncols=2, loc="upper right")
