@@ -40,7 +40,7 @@ def energy(
         typer.Option(metavar="A/S", help="Largest slope of the current, A/s (the hammer's own waveform's)."),
     ] = None,
     spacing: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Time between nodes of the current ('62.5 us').")
+        str | None, typer.Option(metavar="TIME", help="Time between nodes of the current, such as '50 us'.")
     ] = None,
     heat: Annotated[
         bool, typer.Option("--heat", help="Make the squared current least instead of the positive work.")

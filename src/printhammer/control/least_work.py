@@ -53,8 +53,9 @@ if TYPE_CHECKING:
 FORCE: Final = 0.9
 """Least force of an adequate dot, in parts of that of the single pulse."""
 
-SPACING: Final = 62.5e-6
-"""Time between the nodes of the current, s, unless told otherwise; a period holds a whole number of them."""
+SPACING: Final = 0.6
+"""Time between the nodes of the current unless told otherwise, in parts of the time in which a single pulse
+indents the pack; a period holds a whole number of them."""
 
 MOST_DOTS: Final = 1000
 
@@ -69,7 +70,7 @@ _PAST_PEAK: Final = 1.2
 _SPARE: Final = 5e-4
 _LEAD: Final = 2.0
 _LANDING: Final = 5.0
-_FEWEST, _MOST = 8, 64
+_FEWEST, _MOST = 8, 96
 _OVERLAP: Final = 0.01
 _SETTLED: Final = 1e-2
 
@@ -174,23 +175,27 @@ class LeastWork:
 
     @property
     def net_ratio(self) -> float:
-        """Net work of the coil over the energy that the pack absorbs; 1 is the limit of the paper."""
-        return self.work.net / self.ledger.pack_loss
+        """Net work of the coil over the energy that the pack absorbs, 1 in the limit; NaN without a dot."""
+        return self._over(self.work.net)
 
     @property
     def positive_ratio(self) -> float:
         """Positive work of the coil over the energy that the pack absorbs."""
-        return self.work.positive / self.ledger.pack_loss
+        return self._over(self.work.positive)
 
     @property
     def bound_ratio(self) -> float:
         """Least positive work whatever the current, over the energy that the pack absorbs."""
-        return self.bound.burst(self.count) / self.ledger.pack_loss
+        return self._over(self.bound.burst(self.count))
 
     @property
     def single_ratio(self) -> float:
         """Net work for one single pulse, rest to rest, over the energy that the pack absorbs of it."""
         return self.single_work.net / self.single.pack_loss
+
+    def _over(self, work: float) -> float:
+        absorbed = self.ledger.pack_loss
+        return work / absorbed if absorbed > 0.0 else math.nan
 
     @cached_property
     def rest_time(self) -> float:
@@ -229,7 +234,7 @@ def least_work(
     largest: float | str = 2.0,
     slew: float | None = None,
     least: Least = "positive work",
-    spacing: float | str = SPACING,
+    spacing: float | str | None = None,
     tolerance: float = 1e-9,
     progress: Callable[[int, int], None] | None = None,
 ) -> LeastWork:
@@ -253,8 +258,8 @@ def least_work(
     least : str, optional
         "positive work" of the coil, or its "heat".
     spacing : float or str, optional
-        Time between nodes of the current, s, or text with a unit; rounded so that a period holds a whole
-        number of them.
+        Time between nodes of the current, s, or text with a unit, rounded so that a period holds a whole
+        number of them; by default `SPACING` of the time in which a single pulse indents the pack.
     tolerance : float, optional
         As for `printhammer.simulate`, in the search; what it found is run at the tolerance of the ledger.
     progress : callable, optional
@@ -281,7 +286,7 @@ def least_work(
         raise InputError(f"force = {share!r}, expected at most 2 times that of the single pulse")
     if least not in LEASTS:
         raise InputError(f"least = {least!r}, expected one of {', '.join(LEASTS)}")
-    apart = read_positive(spacing, "s", "spacing")
+    apart = None if spacing is None else read_positive(spacing, "s", "spacing")
     for part in ("magnet", "spring", "backstop", "pack"):
         if getattr(hammer, part) is None:
             raise InputError(f"{hammer.path}: the hammer has no {part}, expected one with all parts")
@@ -304,8 +309,9 @@ def least_work(
     task = Task(
         hammer, CoilForce(hammer, top), top, steepest, wanted, limits.loading, least == "heat", tolerance
     )
-    past = _PAST_PEAK * _loading_time(alone)
-    plan = _Plan(task, period, past, apart, single.flight_time)
+    indenting = _loading_time(alone)
+    apart = SPACING * indenting if apart is None else apart
+    plan = _Plan(task, period, _PAST_PEAK * indenting, apart, single.flight_time)
     for slot in range(count):
         if not plan.add_dot():
             raise NoBurstError(

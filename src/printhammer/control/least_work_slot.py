@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Final, Self
 import numpy as np
 
 from printhammer.drive_base import Drive
-from printhammer.ensemble import Ensemble
+from printhammer.ensemble import MODE_NAMES, Ensemble
 from printhammer.segments import POLYNOMIAL, table
 from printhammer.waveforms import Waveform
 
@@ -25,6 +25,13 @@ if TYPE_CHECKING:
     from printhammer.segments import FloatArray
 
 _SAMPLES: Final = 301
+_IN_PACK: Final = {
+    "loading": 1,
+    "unloading": 2,
+    "reloading": 3,
+    "held on the loading branch": 1,
+    "held on the unloading branch": 2,
+}
 _MANY: Final = 64
 _LEAST_SPEED: Final = 0.03
 _CLEAR: Final = 2e-6
@@ -39,7 +46,7 @@ class SlotState:
     x, v : float
         Displacement, m, and velocity, m/s.
     branch : int
-        Code of the mode, as in `Strobes`; -1 where the armature is free or at the backstop at rest.
+        Code of the mode, as in `Strobes`, or -1 for none.
     memory : float
         As in `Strobes`, m.
     current : float
@@ -54,8 +61,9 @@ class SlotState:
 
     @property
     def row(self) -> list[float]:
-        """The state as `Ensemble` takes it."""
-        return [self.x, self.v] if self.branch < 0 else [self.x, self.v, float(self.branch), self.memory]
+        """The state as `Ensemble` takes it: outside the pack place and speed are all."""
+        branch = _IN_PACK.get(MODE_NAMES[self.branch] if self.branch >= 0 else "", 0)
+        return [self.x, self.v, float(branch), self.memory] if branch else [self.x, self.v]
 
 
 class NodeCurrent(Waveform):

@@ -114,6 +114,10 @@ def _motion(ax: Axes, found: LeastWork) -> None:
 
 def _ledger(ax: Axes, found: LeastWork) -> None:
     absorbed = found.ledger.pack_loss
+    if not absorbed > 0.0:
+        ax.text(0.5, 0.5, "The pack absorbed nothing.", ha="center", va="center", transform=ax.transAxes)
+        ax.set_axis_off()
+        return
     bars = [
         ("absorbed by the pack", 1.0, YELLOW),
         ("net work W", found.net_ratio, BLUE),

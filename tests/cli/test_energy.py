@@ -1,0 +1,57 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.control.test_least_work import let_go, thrown
+from tests.hammers import CRUDE
+
+from printhammer.control import least_work as module
+
+
+@pytest.fixture
+def unsearched(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "printing_current", thrown)
+    monkeypatch.setattr(module, "landing_current", let_go)
+
+
+def test_a_burst_and_its_files(cli: Callable, tmp_path: Path, unsearched: None) -> None:
+    paths = {kind: tmp_path / f"burst.{kind}" for kind in ("csv", "nc", "png", "svg")}
+    out = [word for path in paths.values() for word in ("--out", path)]
+    words = ("--rate", "400 Hz", "--dots", "2", "--force", "0.3", "--supply", *out)
+    done = cli("energy", CRUDE, *words)
+    assert done.status == 0
+    assert "2 of 2 adequate at 400 Hz" in done.out
+    assert "positive work W+" in done.out
+    assert "+3.0 %" in done.out
+    assert paths["csv"].read_text("utf-8").startswith("time [us],current [A]\n")
+    assert paths["png"].read_bytes().startswith(b"\x89PNG")
+    assert b"<svg" in paths["svg"].read_bytes()
+
+
+def test_inadequate_dots_end_with_status_1(cli: Callable, unsearched: None) -> None:
+    words = ("--rate", "400 Hz", "--dots", "2", "--force", "2", "--largest", "1.2 A", "--units", "inch")
+    done = cli("energy", CRUDE, *words)
+    assert done.status == 1
+    assert "0 of 2 dots are adequate" in done.err
+    assert "in·lbf" in done.out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--rate", "0 Hz"), "rate"),
+        (("--rate", "fast"), "rate"),
+        (("--dots", "two"), "dots = 'two'"),
+        (("--dots", "0"), "dots = 0"),
+        (("--force", "much"), "force = 'much'"),
+        (("--largest", "3 m"), "largest"),
+        (("--slew", "0"), "slew"),
+        (("--out", "burst.txt"), "--out burst.txt"),
+    ],
+)
+def test_bad_input_is_one_sentence(cli: Callable, words: tuple[str, ...], said: str) -> None:
+    done = cli("energy", CRUDE, *words)
+    assert done.status == 2
+    assert said in done.err
+    assert "Traceback" not in done.err
+    assert len(done.err.strip().splitlines()) == 1
