@@ -1,0 +1,209 @@
+"""The closed loop: hammers, a sensor, and a controller that decides before each touch how to go on.
+
+All runs are carried from decision to decision together. At each, the controller sees what its sensor has
+shown so far, and nothing else of the hammer that is driven. What comes out is an ordinary drive.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.control.sensor import run_key
+from printhammer.control.switched import Switched
+from printhammer.drive_sequence import PulseSequence
+from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.equilibrium import rest_state
+from printhammer.kernel.modes import LOADING, RELOADING, UNLOADING
+from printhammer.printing.slots import slot_times
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.control.controller import Controller
+    from printhammer.control.sensor import Sensor
+    from printhammer.hammer import Hammer
+    from printhammer.segments import FloatArray
+
+REMEMBERED: Final = 4
+"""Number of the latest pulses of which anything can be left."""
+
+_APART: Final = 1e-9
+_BRANCHES: Final = (LOADING, UNLOADING, RELOADING)
+
+
+@dataclass
+class Pulse:
+    """One firing and the switchings of its current, as far as they are decided.
+
+    Attributes
+    ----------
+    fired : float
+        Time of the firing, s.
+    at : list of float
+        Times of the switchings, s.
+    levels : list of float
+        Current to which each leads, A.
+    """
+
+    fired: float
+    at: list[float]
+    levels: list[float]
+
+    def switch(self, time: float, level: float) -> None:
+        """Add a switching, after those before."""
+        self.at.append(max(time, self.at[-1] + _APART) if self.at else time)
+        self.levels.append(level)
+
+    def waveform(self, edge: float) -> Switched:
+        """Return the waveform."""
+        return Switched(at=tuple(t - self.fired for t in self.at), levels=tuple(self.levels), edge=edge)
+
+
+@dataclass
+class Loop:
+    """One run of the closed loop.
+
+    Attributes
+    ----------
+    slots : tuple of int
+        Numbers of the slots at which dots are wanted.
+    due : array, shape (dots,)
+        Times at which touches are wanted, s.
+    key : int
+        What tells the noise of this run from that of others.
+    pulses : list of Pulse
+        All firings so far.
+    touch, speed, kind
+        The coming touch as it is expected: time, s, speed, m/s, and kind.
+    since : float
+        Time from which on the armature flies, s.
+    time : float
+        How far the run is carried, s.
+    state : array, shape (4,)
+        Displacement, m, velocity, m/s, mode, memory.
+    alive : bool
+        Whether the run goes on.
+    seen : list
+        What the sensor showed at each decision: times, s, and displacements, m.
+    touches : list of tuple
+        Time, s, and speed, m/s, of each touch as it was estimated.
+    """
+
+    slots: tuple[int, ...]
+    due: FloatArray
+    key: int
+    pulses: list[Pulse]
+    touch: float
+    speed: float
+    kind: int
+    since: float
+    state: FloatArray
+    time: float = 0.0
+    alive: bool = True
+    seen: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+    touches: list[tuple[float, float]] = field(default_factory=list)
+
+    def drive(self, edge: float, last: int | None = None) -> PulseSequence:
+        """Return the drive so far, or that of the last pulses."""
+        pulses = self.pulses if last is None else self.pulses[-last:]
+        return PulseSequence([pulse.waveform(edge) for pulse in pulses], at=[p.fired for p in pulses])
+
+
+def closed_loops(
+    hammer: Hammer,
+    controller: Controller,
+    sensor: Sensor,
+    patterns: Sequence[tuple[int, ...]],
+    rate: float,
+    *,
+    tolerance: float = DISPLAY_TOLERANCE,
+    threads: int | None = None,
+) -> list[Loop]:
+    """Run the closed loop for some patterns, from rest.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        What is driven; the controller does not know it.
+    controller : Controller
+        Who drives it.
+    sensor : Sensor
+        What the controller sees of it.
+    patterns : sequence of tuple of int
+        Numbers of the slots at which dots are wanted.
+    rate : float
+        Slots per second, Hz.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+    threads : int, optional
+        By default as many as there are cores; the result does not depend on it.
+    """
+    rest = np.array([rest_state(hammer), 0.0, -1.0, 0.0])
+    loops = []
+    for slots in patterns:
+        due = slot_times(slots, rate) + controller.single.flight_time
+        loop = Loop(slots, due, run_key(slots, rate), [], 0.0, 0.0, 0, 0.0, rest.copy())
+        controller.launch(loop, 0)
+        loops.append(loop)
+    policy = controller.policy(1.0 / rate)
+    # In the order of the slots, so that runs beside each other are as long as each other.
+    for slot in range(max(slots[-1] for slots in patterns) + 1):
+        now = [(loop, loop.slots.index(slot)) for loop in loops if slot in set(loop.slots)]
+        if not now:
+            continue
+        moving = [loop for loop, _dot in now if loop.alive]
+        if moving:
+            _carry(hammer, controller, sensor, moving, tolerance, threads)
+        controller.decide(now, policy)
+    return loops
+
+
+def _carry(
+    hammer: Hammer,
+    controller: Controller,
+    sensor: Sensor,
+    loops: list[Loop],
+    tolerance: float,
+    threads: int | None,
+) -> None:
+    """Carry some runs to their next decision, and estimate the coming touches from what the sensor shows."""
+    ends = np.array([loop.touch for loop in loops]) - controller.lead
+    starts = np.array([loop.time for loop in loops])
+    since = np.maximum([loop.since for loop in loops], starts)
+    numbers = sensor.numbers(since, ends, controller.samples(sensor))
+    used = numbers >= 0
+    times = numbers * sensor.interval
+    used &= times > starts[:, np.newaxis]
+    x = np.zeros(numbers.shape)
+    inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
+    for group in (np.flatnonzero(inside), np.flatnonzero(~inside)):
+        if not group.size:
+            continue
+        own = [loops[k] for k in group]
+        strobes = [np.append(times[k][used[k]], ends[k]) for k in group]
+        width = 4 if inside[group[0]] else 2
+        result = Ensemble(
+            hammer,
+            [loop.drive(controller.driver.edge, REMEMBERED) for loop in own],
+            ends[group],
+            states=np.array([loop.state[:width] for loop in own]),
+            starts=starts[group],
+            tolerance=tolerance,
+        ).run(strobes=strobes, threads=threads)
+        found = result.strobes
+        assert found is not None
+        for row, (k, loop) in enumerate(zip(group.tolist(), own, strict=True)):
+            count = len(strobes[row])
+            loop.alive = bool(result.ok[row])
+            x[k, used[k]] = found.x[row, : count - 1]
+            last = count - 1
+            loop.time = float(ends[k])
+            loop.state = np.array(
+                [found.x[row, last], found.v[row, last], found.branch[row, last], found.memory[row, last]]
+            )
+    runs = np.array([loop.key for loop in loops], dtype=np.uint64)
+    shown = np.where(used, sensor.read(np.nan_to_num(x), numbers, runs, controller.stroke), np.nan)
+    controller.estimate(loops, times, shown, used, sensor)

@@ -1,0 +1,236 @@
+"""The controller: it knows the nominal hammer, sees the real one through its sensor, and switches the coil.
+
+It fires on energy and phase, releases the armature before a first impact and measures out the rest of its
+energy with a push into the pack, catches it on the way back and throws it again where the next dot is due
+soon, and brakes it before the backstop where there is time to come to rest.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.control.closed_loop import REMEMBERED, Pulse
+from printhammer.control.flight import Expected, FreeForce, touch_from_samples
+from printhammer.control.landing import Landing, landing
+from printhammer.control.launch import Launch, launch
+from printhammer.control.policy import Policy, between
+from printhammer.control.swing_table import ALWAYS, FREE, SwingTable, swing_table
+from printhammer.errors import InputError
+from printhammer.printing.limits import Limits
+from printhammer.printing.nominal import nominal
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.control.closed_loop import Loop
+    from printhammer.control.driver import Driver
+    from printhammer.control.sensor import Sensor
+    from printhammer.hammer import Hammer
+    from printhammer.segments import FloatArray
+
+LEAD: Final = 30e-6
+"""Time before a touch at which the controller decides, s."""
+
+WINDOW: Final = 120e-6
+"""Time over which samples are looked at, s."""
+
+_SPEED_ERROR: Final = 0.05
+_PLACE_ERROR: Final = 0.03
+_LEAST_ERROR: Final = 1e-4
+_CLEAR: Final = 0.35
+_POLICIES: Final = 8
+
+
+class Controller:
+    """A controller made for one hammer.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The nominal hammer, with a pack and a backstop.
+    driver : Driver
+        Of its coil.
+    limits : Limits, optional
+        How far a dot may be off.
+    threads : int, optional
+        By default as many as there are cores.
+
+    Raises
+    ------
+    InputError
+        The hammer has no pack, no backstop, no waveform or no rest state, or the driver is too weak for it.
+    """
+
+    def __init__(
+        self, hammer: Hammer, driver: Driver, limits: Limits | None = None, *, threads: int | None = None
+    ) -> None:
+        if hammer.front is None or hammer.backstop is None:
+            missing = "pack" if hammer.front is None else "backstop"
+            raise InputError(f"{hammer.path}: the hammer has no {missing}, expected one")
+        self.hammer = hammer
+        self.driver = driver
+        self.limits = Limits() if limits is None else limits
+        self.single = nominal(hammer)
+        self.front: float = hammer.front
+        self.stroke: float = hammer.front - hammer.origin
+        self.lead = LEAD
+        self.table: SwingTable = swing_table(hammer, driver, self.single, threads=threads)
+        self.landing: Landing = landing(hammer, driver, self.single, self.table.force_map, threads=threads)
+        self.start: Launch = launch(hammer, driver, self.single, self.table.force_map, threads=threads)
+        self._policies: dict[float, Policy] = {}
+
+    @cached_property
+    def force(self) -> FreeForce:
+        """Force on the flying armature."""
+        return FreeForce(self.hammer, self.hammer.origin, self.front, self.driver.current)
+
+    def policy(self, period: float) -> Policy:
+        """Return the policy for a period, s."""
+        if period not in self._policies:
+            if len(self._policies) >= _POLICIES:
+                self._policies.clear()
+            self._policies[period] = Policy(self.table, period, self.limits, self.landing)
+        return self._policies[period]
+
+    def samples(self, sensor: Sensor) -> int:
+        """Return how many samples are looked at."""
+        return max(1, round(WINDOW / sensor.interval))
+
+    def launch(self, loop: Loop, dot: int) -> None:
+        """Fire from rest, so that a dot comes when it is due."""
+        start = self.start
+        earliest = loop.pulses[-1].at[-1] if loop.pulses else 0.0
+        fired = max(float(loop.due[dot]) - start.flight, earliest)
+        pulse = Pulse(fired, [], [])
+        pulse.switch(fired, self.driver.current)
+        pulse.switch(fired + start.width, 0.0)
+        loop.pulses.append(pulse)
+        loop.touch, loop.speed, loop.kind = fired + start.flight, start.speed, FREE
+        loop.since = fired + _CLEAR * start.flight
+
+    def estimate(
+        self, loops: Sequence[Loop], times: FloatArray, shown: FloatArray, used: Any, sensor: Sensor
+    ) -> None:
+        """Estimate the coming touches from what the sensor shows, arrays (M, N)."""
+        expected = Expected(
+            np.array([loop.touch for loop in loops]),
+            np.array([loop.speed for loop in loops]),
+            _PLACE_ERROR * self.stroke,
+            _SPEED_ERROR,
+        )
+        error = max(float(np.hypot(sensor.noise, sensor.step / np.sqrt(12.0))), _LEAST_ERROR) * self.stroke
+        steps = _steps(loops)
+
+        def accelerations(x: FloatArray, t: FloatArray) -> FloatArray:
+            current = _current(*steps, self.driver.edge, t)
+            return self.force(x, current) / self.hammer.mass
+
+        touch, speed = touch_from_samples(
+            times, np.nan_to_num(shown), used.astype(np.float64), error, expected, self.front, accelerations
+        )
+        for k, loop in enumerate(loops):
+            if not loop.alive:
+                continue
+            loop.touch, loop.speed = float(touch[k]), float(speed[k])
+            loop.touches.append((loop.touch, loop.speed))
+            loop.seen.append((times[k][used[k]], shown[k][used[k]]))
+
+    def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
+        """Decide how some runs go on after a touch that is about to come; each with the number of its dot."""
+        kind = np.array([loop.kind for loop, _dot in now])
+        speed = np.array([loop.speed for loop, _dot in now])
+        touch = np.array([loop.touch for loop, _dot in now])
+        late = touch - np.array([loop.due[dot] for loop, dot in now])
+        wait = np.array(
+            [loop.due[dot + 1] - loop.due[dot] if dot + 1 < len(loop.due) else np.inf for loop, dot in now]
+        )
+        rests = wait >= self.landing.settled + self.start.flight
+        after = np.array([self._before_rest(loop, dot + 1) for loop, dot in now])
+        way, cost, choice = policy.best(kind, late, speed, np.where(rests, policy.period, wait), after)
+        table = self.table
+        release = choice.at(table.release, way)
+        following = choice.at(table.next_touch, way)
+        following_speed = choice.at(table.next_speed, way)
+        leaves = choice.at(table.leaves, way)
+        landed = self._landings(kind, speed)
+        for k, (loop, dot) in enumerate(now):
+            pulse = loop.pulses[-1]
+            if loop.kind != FREE:
+                # The push has no end yet.
+                del pulse.at[1:], pulse.levels[1:]
+            if rests[k] or not np.isfinite(cost[k]):
+                self._land(loop, pulse, *(float(values[k]) for values in landed))
+                if dot + 1 < len(loop.due):
+                    self.launch(loop, dot + 1)
+                continue
+            self._push(loop, pulse, float(release[k]), float(table.back[way[k]]))
+            fired = loop.touch + float(table.fire[way[k]])
+            pulse.switch(fired, 0.0)
+            width = float(table.width[way[k]])
+            after = Pulse(pulse.at[-1], [], [])
+            after.switch(after.fired, self.driver.current)
+            after.switch(after.fired + width, 0.0)
+            loop.pulses.append(after)
+            clear = max(float(leaves[k]), float(table.fire[way[k]])) if width != ALWAYS else float(leaves[k])
+            loop.since = loop.touch + clear
+            loop.kind = int(table.next_kind[way[k]])
+            loop.touch, loop.speed = loop.touch + float(following[k]), float(following_speed[k])
+
+    def _push(self, loop: Loop, pulse: Pulse, release: float, back: float) -> None:
+        """Push into the pack from the touch to the release, if at all, then pull back."""
+        if loop.kind == FREE and release > 0.0:
+            pulse.switch(max(loop.touch, loop.time), self.driver.current)
+        pulse.switch(max(loop.touch + release, loop.time), back)
+
+    def _land(self, loop: Loop, pulse: Pulse, release: float, brake: float, width: float) -> None:
+        """Print, and brake on the way back."""
+        self._push(loop, pulse, 0.0 if np.isnan(release) else release, 0.0)
+        if not np.isnan(brake):
+            pulse.switch(loop.touch + brake, self.driver.current)
+            pulse.switch(loop.touch + brake + width, 0.0)
+
+    def _landings(self, kind: Any, speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return release, begin and width of the brake pulse for some touches."""
+        below, share = between(self.table, kind, speed)
+        rows = self.landing
+        found = []
+        for values in (rows.release, rows.brake, rows.width):
+            low, high = values[below], values[below + 1]
+            low, high = np.where(np.isnan(low), high, low), np.where(np.isnan(high), low, high)
+            found.append((1.0 - share) * low + share * high)
+        return found[0], found[1], found[2]
+
+    def _before_rest(self, loop: Loop, dot: int) -> int:
+        """Return how many dots come between a dot and a rest."""
+        enough = self.landing.settled + self.start.flight
+        rests = np.flatnonzero(np.diff(loop.due[dot:]) >= enough)
+        return int(rests[0]) if rests.size else max(len(loop.due) - dot - 1, 0)
+
+
+def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
+    """Return times, s, and heights, A, of all changes of the command to the coil, (M, S), filled with 0."""
+    rows = []
+    for loop in loops:
+        steps = [
+            (at, level - before)
+            for pulse in loop.pulses[-REMEMBERED:]
+            for at, level, before in zip(pulse.at, pulse.levels, [0.0, *pulse.levels], strict=False)
+        ]
+        rows.append(steps)
+    most = max(len(row) for row in rows)
+    whole = np.zeros((len(rows), most, 2))
+    for k, row in enumerate(rows):
+        whole[k, : len(row)] = row
+    return whole[..., 0], whole[..., 1]
+
+
+def _current(at: FloatArray, height: FloatArray, edge: float, t: FloatArray) -> FloatArray:
+    """Return the current, A, at times t, (M, K), after steps of the command, (M, S)."""
+    total = np.zeros_like(t)
+    for k in range(at.shape[1]):
+        since = np.maximum(t - at[:, k, np.newaxis], 0.0)
+        total -= height[:, k, np.newaxis] * np.expm1(-since / edge)
+    return total

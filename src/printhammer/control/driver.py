@@ -1,0 +1,67 @@
+"""The driver of the coil that feedback needs: one that switches it between currents of either sign."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from printhammer.drive_input import read_positive
+from printhammer.errors import InputError
+from printhammer.printing.nominal import pulse_of
+
+if TYPE_CHECKING:
+    from printhammer.hammer import Hammer
+
+LARGEST_CURRENT: Final = 2.0
+"""Largest current unless told otherwise, A."""
+
+FASTEST: Final = 1e-6
+"""Least time constant of a driver, s; a shorter one of a hammer counts as this."""
+
+STANDARD: Final = 20e-6
+"""Time constant where the waveform of a hammer has no decay, s."""
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A driver that switches the coil between currents.
+
+    Attributes
+    ----------
+    current : float
+        Largest current to either side, A.
+    edge : float
+        Time constant with which the current goes to its new value, s.
+    """
+
+    current: float
+    edge: float
+
+    def __post_init__(self) -> None:
+        read_positive(self.current, "A", "current of the driver")
+        read_positive(self.edge, "s", "edge of the driver")
+
+
+def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | None = None) -> Driver:
+    """Return a driver for a hammer.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        A hammer that is driven by a current.
+    current : float, optional
+        Largest current, A.
+    edge : float, optional
+        Time constant, s; by default that with which the current of the hammer's own waveform decays. Its own
+        rise is slower: that takes a supply of a higher voltage.
+
+    Raises
+    ------
+    InputError
+        A number is not positive, or the waveform of the hammer is a force.
+    """
+    pulse = pulse_of(hammer)
+    if pulse.quantity != "current":
+        raise InputError(f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current")
+    own = max(float(getattr(pulse, "decay", STANDARD)), FASTEST)
+    return Driver(current, own if edge is None else edge)

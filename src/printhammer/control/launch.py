@@ -1,0 +1,82 @@
+"""From rest to the first touch: a push, and its release before impact, so that the armature flies freely."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.control.swing_table import FREE
+from printhammer.control.switched import Switched
+from printhammer.drive_sequence import PulseSequence
+from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from printhammer.control.driver import Driver
+    from printhammer.control.swing_table import ForceMap
+    from printhammer.hammer import Hammer
+    from printhammer.printing.nominal import Nominal
+
+_WIDTHS: Final = np.linspace(0.2, 1.0, 81)
+_ALMOST: Final = 0.9
+
+
+@dataclass(frozen=True)
+class Launch:
+    """A start from rest.
+
+    Attributes
+    ----------
+    width : float
+        Of the push, s.
+    flight : float
+        From firing to touch, s.
+    speed : float
+        At the touch, m/s.
+    """
+
+    width: float
+    flight: float
+    speed: float
+
+
+def launch(
+    hammer: Hammer, driver: Driver, single: Nominal, forces: ForceMap, *, threads: int | None = None
+) -> Launch:
+    """Find the push from rest after which the touch alone prints almost the single-pulse force.
+
+    The rest of the force comes from a short push into the pack, which can be measured out when the speed is
+    known. Parameters as for `printhammer.control.landing.landing`.
+
+    Raises
+    ------
+    InputError
+        No push does, with the current that there is.
+    """
+    widths = _WIDTHS * single.flight_time
+    drives = [
+        PulseSequence([Switched(at=(0.0, width), levels=(driver.current, 0.0), edge=driver.edge)], at=[0.0])
+        for width in widths.tolist()
+    ]
+    result = Ensemble(hammer, drives, 4.0 * single.flight_time, tolerance=DISPLAY_TOLERANCE).run(
+        dots=True, threads=threads
+    )
+    dots = result.dots
+    assert dots is not None
+    free = forces.kind == FREE
+    off = int(np.argmin(np.abs(forces.back)))
+    wanted = float(np.interp(_ALMOST, forces.force[free, off, 0], forces.speed[free]))
+    speed, flight = dots.impact_speed[:, 0], dots.flight_time[:, 0]
+    struck = result.ok & dots.struck[:, 0]
+    if not struck.any() or not speed[struck].min() <= wanted <= speed[struck].max():
+        raise InputError(
+            f"{hammer.path}: no push of {driver.current:g} A from rest touches the pack with {wanted:.3g} m/s,"
+            " expected a stronger driver"
+        )
+    order = np.argsort(speed[struck])
+    found = (
+        float(np.interp(wanted, speed[struck][order], values[struck][order])) for values in (widths, flight)
+    )
+    return Launch(*found, wanted)

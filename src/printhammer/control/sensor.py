@@ -1,0 +1,137 @@
+"""A sensor that sees the hammer: position with noise, quantised, and late.
+
+Samples are taken at whole multiples of the interval. The noise of a sample depends on the seed, on the run
+and on the number of the sample only, so that a closed loop is the same to the bit whatever is run beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.segments import FloatArray
+
+    Words = npt.NDArray[np.uint64]
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A position sensor.
+
+    Attributes
+    ----------
+    noise : float
+        Standard deviation of a sample, in parts of the way from backstop to pack; normal, white.
+    delay : float
+        From the instant of a sample until it can be used, s.
+    interval : float
+        Between samples, s.
+    step : float
+        Quantisation, in parts of the way from backstop to pack; 0 for none.
+    seed : int
+        Of the noise.
+
+    Raises
+    ------
+    InputError
+        A number is negative or not finite, an interval not positive, or the seed is not a whole number.
+    """
+
+    noise: float = 0.01
+    delay: float = 20e-6
+    interval: float = 2e-6
+    step: float = 2.0**-10
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, unit in (("noise", ""), ("delay", " s"), ("interval", " s"), ("step", "")):
+            value = getattr(self, name)
+            least = "above" if name == "interval" else "not below"
+            if not (math.isfinite(value) and value >= 0.0 and (value > 0.0 or name != "interval")):
+                raise InputError(f"sensor: {name} = {value!r}{unit} is expected to be a number {least} 0")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
+            raise InputError(f"sensor: seed = {self.seed!r} is expected to be a whole number not below 0")
+
+    def numbers(self, since: FloatArray, until: FloatArray, most: int) -> npt.NDArray[np.int64]:
+        """Return the numbers of the latest samples in some spans of time.
+
+        Parameters
+        ----------
+        since, until : array, shape (M,)
+            First instant, and the one at which the samples are needed, s: what is in by then was taken the
+            delay before.
+        most : int
+            Number of samples at most.
+
+        Returns
+        -------
+        int array, shape (M, most)
+            Ascending; -1 in front where there are fewer.
+        """
+        # A sample on the boundary must not come and go with the last bit of a sum.
+        slack = 1e-6
+        last = np.floor((until - self.delay) / self.interval + slack).astype(np.int64)
+        first = np.ceil(since / self.interval - slack).astype(np.int64)
+        found = last[:, np.newaxis] - np.arange(most - 1, -1, -1)
+        return np.where(found >= np.maximum(first, 0)[:, np.newaxis], found, -1)
+
+    def read(self, x: FloatArray, numbers: npt.NDArray[np.int64], runs: Words, stroke: float) -> FloatArray:
+        """Return what the sensor shows.
+
+        Parameters
+        ----------
+        x : array, shape (M, N)
+            True displacements, m.
+        numbers : int array, shape (M, N)
+            Numbers of the samples.
+        runs : uint64 array, shape (M,)
+            What tells the noise of one run from that of another.
+        stroke : float
+            Way from backstop to pack, m.
+        """
+        seen = x + self.noise * stroke * normal(self.seed, runs[:, np.newaxis], numbers)
+        if self.step > 0.0:
+            quantum = self.step * stroke
+            seen = quantum * np.round(seen / quantum)
+        return seen
+
+
+def normal(seed: int, runs: Words, numbers: npt.NDArray[np.int64]) -> FloatArray:
+    """Return normally distributed numbers that depend on seed, run and number only.
+
+    The bits are those of the generator splitmix64 (G. L. Steele, D. Lea, C. H. Flood, OOPSLA 2014), whose
+    state is made of the three; the distribution comes from its inverse.
+    """
+    from scipy.special import ndtri
+
+    state = _mixed(np.uint64(seed % 2**64) + np.zeros(1, np.uint64))
+    state = _mixed(state ^ runs)
+    state = _mixed(state ^ numbers.astype(np.uint64))
+    # The middle of one of 2**53 equal intervals, so that neither 0 nor 1 occurs.
+    share = ((state >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
+    values: FloatArray = ndtri(share)
+    return values
+
+
+def run_key(slots: tuple[int, ...], rate: float) -> int:
+    """Return what tells the noise of a pattern at a rate from that of others."""
+    import hashlib
+
+    text = f"{rate!r} {slots!r}".encode()
+    return int.from_bytes(hashlib.sha256(text).digest()[:8], "little")
+
+
+def _mixed(state: Words) -> Words:
+    with np.errstate(over="ignore"):
+        state = state + np.uint64(0x9E3779B97F4A7C15)
+        state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        return state ^ (state >> np.uint64(31))
