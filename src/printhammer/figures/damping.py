@@ -1,4 +1,4 @@
-"""The damping study as a chart: settle-out, wear and safe rate against how little the backstop gives back."""
+"""The damping study as a chart: for every material its safe rate, settle-out time and wear, in rows."""
 
 from __future__ import annotations
 
@@ -28,13 +28,11 @@ if TYPE_CHECKING:
     from printhammer.printing.damping import DampingStudy
     from printhammer.segments import FloatArray
 
-LOOKS: Final = {
-    "as it is": ("*", INK, 11.0),
-    "hard": ("o", BLUE, 5.0),
-    "elastomer": ("s", GREEN, 5.0),
-    "pack": ("^", ORANGE, 5.5),
-}
-"""Marker, colour and size of each kind of material."""
+COLOURS: Final = {"as it is": INK, "hard": BLUE, "elastomer": GREEN, "pack": ORANGE}
+"""Colour of each kind of material."""
+
+_ROW: Final = 0.2
+_BAR: Final = 0.66
 
 
 @styled
@@ -49,81 +47,86 @@ def plot(found: DampingStudy) -> Figure:
     Returns
     -------
     Figure
-        A marker a material: settle-out time, energy that the backstop takes, and safe rate, each against the
-        restitution of the first touch of the backstop. Hollow: the print force takes more current than is
-        allowed. Dashed: the hammer as it is. A cross on the lower edge: no rate of the grid passes.
+        A row a material. Bars: safe rate, settle-out time, change of momentum at the backstop, all at the
+        same print force. Hollow: that takes more current than is allowed. Dashed: the hammer as it is. What
+        is not known is said instead of a bar.
     """
-    figure = new_figure(6.6)
-    axes = figure.subplots(3, 1, sharex=True)
+    count = len(found.materials)
+    figure = new_figure(1.3 + _ROW * count, 7.6)
+    axes = figure.subplots(1, 3, sharey=True, width_ratios=(1.25, 1.0, 1.0))
+    prints = [status in ("ok", "current limit") for status in found.status.tolist()]
+    none = f"not even {found.grid[0]:g} Hz"
     panels = (
-        ("Settle-out  [ms]", 1e3 * found.settle_out),
-        ("Backstop takes  [mJ a dot]", 1e3 * found.loss),
-        ("Safe rate  [Hz]", found.safe_rate),
+        ("Safe rate  [Hz]", found.safe_rate, none),
+        ("Settle-out  [ms]", 1e3 * found.settle_out, "not in 20 ms"),
+        ("Wear: impulse  [mN s a dot]", 1e3 * found.impulse, ""),
     )
-    for ax, (name, values) in zip(axes, panels, strict=True):
-        _panel(ax, found, values)
-        ax.set_ylabel(name)
-    none = np.isnan(found.safe_rate) & np.isfinite(found.restitution)
-    axes[2].plot(
-        found.restitution[none],
-        np.full(int(none.sum()), 0.02),
-        "x",
-        ms=5.0,
-        color=MUTED,
-        transform=axes[2].get_xaxis_transform(),
-        gid="no safe rate",
-    )
-    axes[2].set_xlabel("Restitution of the first touch of the backstop")
-    axes[2].set_xlim(-0.03, max(1.0, float(np.nanmax(found.restitution, initial=0.0))) + 0.03)
-    axes[0].legend(loc="best", fontsize=TINY, frameon=False, ncols=2, handletextpad=0.2)
-    best = found.best
-    if best is not None:
-        axes[2].annotate(
-            found.materials[best].label.replace(" us", " µs"),
-            (found.restitution[best], found.safe_rate[best]),
-            xytext=(7.0, 0.0),
+    for ax, (name, values, missing) in zip(axes, panels, strict=True):
+        status = found.status.tolist() if ax is axes[0] else [""] * count
+        told = [missing if well else str(text) for well, text in zip(prints, status, strict=True)]
+        _panel(ax, found, values, told)
+        ax.set_xlabel(name)
+    labels = [one.label.replace(" us", " µs") for one in found.materials]
+    axes[0].set_yticks(range(count), labels, fontsize=TINY)
+    axes[0].set_ylim(count - 0.4, -0.6)
+    for tick, one in zip(axes[0].get_yticklabels(), found.materials, strict=True):
+        tick.set_color(COLOURS[one.kind])
+    kinds = [kind for kind in COLOURS if any(one.kind == kind for one in found.materials)]
+    for place, kind in enumerate(kinds):
+        axes[0].annotate(
+            kind,
+            (place / len(kinds), 1.0),
+            xycoords="axes fraction",
+            xytext=(0.0, 4.0),
             textcoords="offset points",
-            va="center",
             fontsize=TINY,
-            color=INK,
+            color=COLOURS[kind],
         )
-    axes[0].set_title(
-        f"The same print force, {found.nominal.force:.1f} N, at {found.current_limit:g} A or less",
-        loc="left",
-        fontsize=SMALL,
-    )
-    odd = [status for status in found.status.tolist() if status not in ("ok", "current limit")]
-    told = (
-        f"{len(odd)} of {len(found.materials)} materials not drawn: {', '.join(sorted(set(odd)))}."
-        if odd
-        else ""
-    )
-    sign(figure, found.hammer, told)
+    over = int((found.status == "current limit").sum())
+    limit = f"; hollow: over {found.current_limit:g} A" if over else f", {found.current_limit:g} A at most"
+    axes[2].set_title(f"All print with {found.nominal.force:.1f} N{limit}", loc="right", fontsize=SMALL)
+    sign(figure, found.hammer)
     return figure
 
 
-def _panel(ax: Axes, found: DampingStudy, values: FloatArray) -> None:
-    kinds = np.array([one.kind for one in found.materials])
-    for kind, (marker, colour, size) in LOOKS.items():
-        for over in (False, True):
-            which = (kinds == kind) & ((found.status == "current limit") == over) & np.isfinite(values)
-            if not which.any():
-                continue
-            ax.plot(
-                found.restitution[which],
-                values[which],
-                marker,
-                ms=size,
-                mew=0.9,
-                color=colour,
-                mfc="white" if over else colour,
-                label=f"{kind}, over the current limit" if over else kind,
-                gid=kind,
+def _panel(ax: Axes, found: DampingStudy, values: FloatArray, otherwise: list[str]) -> None:
+    best = found.best
+    for row, one in enumerate(found.materials):
+        colour = COLOURS[one.kind]
+        if not np.isfinite(values[row]):
+            ax.annotate(
+                otherwise[row],
+                (0.0, row),
+                xycoords=("axes fraction", "data"),
+                xytext=(3.0, 0.0),
+                textcoords="offset points",
+                va="center",
+                fontsize=TINY,
+                color=MUTED,
             )
-    as_it_is = values[kinds == "as it is"]
-    if as_it_is.size and np.isfinite(as_it_is[0]):
-        ax.axhline(as_it_is[0], color=MUTED, lw=THIN, ls=(0, (4, 3)), zorder=0)
-    ax.grid(axis="y", color=FAINT, lw=0.5)
+            continue
+        hollow = found.status[row] == "current limit"
+        ax.barh(
+            row,
+            values[row],
+            height=_BAR,
+            facecolor="white" if hollow else colour,
+            edgecolor=colour,
+            alpha=1.0 if row == best else 0.75,
+            gid=f"bar-{row}",
+        )
+        ax.annotate(
+            f"{values[row]:.4g}" if values[row] >= 100.0 else f"{values[row]:.2f}",
+            (values[row], row),
+            xytext=(2.0, 0.0),
+            textcoords="offset points",
+            va="center",
+            fontsize=TINY,
+            fontweight="bold" if row == best else "normal",
+        )
+        if one.kind == "as it is":
+            ax.axvline(values[row], color=MUTED, lw=THIN, ls=(0, (4, 3)), zorder=0.5)
+    ax.set_xlim(0.0, 1.24 * float(np.nanmax(values, initial=1e-12)))
+    ax.grid(axis="x", color=FAINT, lw=0.5)
     ax.set_axisbelow(True)
-    low, high = ax.get_ylim()
-    ax.set_ylim(min(low, 0.0) if low < 0.2 * high else low, high)
+    ax.tick_params(axis="y", length=0.0)

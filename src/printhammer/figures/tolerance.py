@@ -66,11 +66,10 @@ def plot(found: ToleranceYield, *, bars: int = 8) -> Figure:
 
 
 def _rates(ax: Axes, found: ToleranceYield) -> None:
-    edges = [float(found.grid[0]), *found.grid.tolist()]
-    shares = [100.0 * found.share_at(rate) for rate in found.grid.tolist()]
-    last = int(np.flatnonzero(np.array(shares) > 0.0).max(initial=0)) + 2
-    ax.step(edges[:last], [shares[0], *shares][:last], where="post", color=BLUE)
-    ax.fill_between(edges[:last], [shares[0], *shares][:last], step="post", color=BLUE, alpha=0.15, lw=0.0)
+    shares = np.array([100.0 * found.share_at(rate) for rate in found.grid.tolist()])
+    last = int(np.flatnonzero(shares > 0.0).max(initial=0)) + 2
+    ax.step(found.grid[:last], shares[:last], where="post", color=BLUE)
+    ax.fill_between(found.grid[:last], shares[:last], step="post", color=BLUE, alpha=0.15, lw=0.0)
     ax.set_ylim(0.0, 104.0)
     ax.set_xlabel("Slots per second  [Hz]")
     ax.set_ylabel("Hammers that print well up to here  [%]")
