@@ -62,15 +62,15 @@ class Studio:
 
 
 @contextmanager
-def studio() -> Iterator[Studio]:
-    """Run a studio with the crude hammer."""
+def studio(hammer: str = str(CRUDE)) -> Iterator[Studio]:
+    """Run a studio with a hammer, by default the crude one."""
     from printhammer.hammer import load
 
-    command = (sys.executable, "-c", SCRIPT, str(CRUDE))
+    command = (sys.executable, "-c", SCRIPT, hammer)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     try:
-        yield Studio(process.stdout.readline().strip(), load(CRUDE).name, process)
+        yield Studio(process.stdout.readline().strip(), load(hammer).name, process)
     finally:
         process.terminate()
         process.wait(20)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from printhammer.drive_base import Overlap
     from printhammer.motion import Motion
+    from printhammer.segments import FloatArray
     from printhammer.studio.state import State
     from printhammer.waveforms import Waveform
 
@@ -36,7 +37,7 @@ FULL: Final = (512, 512)
 """Rates and times of the map in full detail."""
 
 POINTS: Final = 1600
-"""Points of a curve, beside the ends of the integrator's steps."""
+"""Points of a curve, at least."""
 
 SECTION: Final = (100, 400)
 """Strobe points, at first and in the end."""
@@ -64,8 +65,7 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
     """
     hammer, drive = state.changed, state.drive
     motion = simulate(hammer, drive, tolerance=DISPLAY_TOLERANCE, points=2)
-    # Every switch of a force is the end of a step.
-    times = np.union1d(np.linspace(motion.start, motion.end, POINTS), motion.step_times)
+    times = points_of(motion.step_times)
     places, speeds = motion.at(times)
     force, values = motion.forces_at(times), drive.value(times)
     fired, x, v = motion.strobe
@@ -95,6 +95,19 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
         "pulse": pulse_of(state),
     }
     return frame("motion", serial, arrays, **told), motion
+
+
+def points_of(ends: FloatArray) -> FloatArray:
+    """Return the times of a curve's points, s: close where the integrator's steps are short, as in contacts.
+
+    Every switch of a force is the end of a step, and is among them.
+    """
+    steps = np.diff(ends)
+    least = 3 if len(steps) < POINTS else 1
+    counts = np.maximum(np.ceil(steps * POINTS / (ends[-1] - ends[0])).astype(int), least)
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    part = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
+    return np.append(np.repeat(ends[:-1], counts) + part * np.repeat(steps, counts), ends[-1])
 
 
 def pulse_of(state: State) -> dict[str, list[float]]:

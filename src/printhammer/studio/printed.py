@@ -49,7 +49,7 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
         "extra x": np.float32(page.extra_places[0]),
         "extra y": np.float32(page.extra_places[1]),
     }
-    force, error = page.force_ratio[page.printed], page.placement_error[page.printed]
+    force, off = page.force_ratio[page.printed], page.placement_error[page.printed]
     told = {
         "wanted": int(page.lost.size),
         "good": int(page.good.sum()),
@@ -58,7 +58,7 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
         "wire": page.head.wire_diameter,
         "pitch": page.head.pitch,
         "force": [float(force.min()), float(force.max())] if force.size else None,
-        "placement": [float(error.min()), float(error.max())] if error.size else None,
+        "placement": [float(off.min()), float(off.max())] if off.size else None,
         "failed": int((page.status != "ok").sum()),
     }
     return frame("line", serial, arrays, reason="", **told)

@@ -20,8 +20,6 @@ from printhammer.studio.state import ProtocolError, State, names, offered, read_
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.motion import Motion
-
 REST: Final = 0.15
 """Seconds without a newer state after which the verdict on a train is worked out."""
 
@@ -40,7 +38,7 @@ class Session:
         self._change = threading.Condition()
         self._latest: tuple[int, State] | None = None
         self._answered = 0
-        self._detail: tuple[int, State, Motion] | None = None
+        self._detail: tuple[int, State] | None = None
         self._questions: list[tuple[str, int, Any]] = []
         self._closed = False
         self._sent: dict[str, Any] = {}
@@ -120,13 +118,13 @@ class Session:
                 # and has another core for that.
                 self._tell(engine.map_frame(state, serial, engine.PREVIEW, lambda: False, threads=1))
                 self._sent["preview"] = engine.map_key(state)
-            self._tell(engine.dots_frame(serial, motion))
         except InputError as error:
             self._tell(frame("refusal", serial, reason=str(error)))
             return
         with self._change:
-            self._detail = (serial, state, motion)
+            self._detail = (serial, state)
             self._change.notify_all()
+        self._tell(engine.dots_frame(serial, motion))
 
     def _details(self) -> None:
         with self._change:
@@ -134,13 +132,12 @@ class Session:
             taken, self._detail = self._detail, None
         if self._closed or taken is None:
             return
-        serial, state, _motion = taken
         try:
-            self._second(serial, state)
+            self._second(*taken)
         except engine.GivenUp:
             return
         except InputError as error:
-            self._tell(frame("refusal", serial, reason=str(error)))
+            self._tell(frame("refusal", taken[0], reason=str(error)))
 
     def _second(self, serial: int, state: State) -> None:
         def newer() -> bool:

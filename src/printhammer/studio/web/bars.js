@@ -117,9 +117,9 @@ function printed(pen, width, height, frame) {
   const { data } = frame;
   const [left, right] = extent(data["wanted x"]);
   const [top, bottom] = extent(data["wanted y"]);
-  const scale = Math.min((width - 40) / (right - left + 2 * frame.wire), (height - 64) / (bottom - top + 2 * frame.wire));
+  const scale = Math.min((width - 40) / (right - left + 2 * frame.wire), (height - 76) / (bottom - top + 2 * frame.wire));
   const X = (x) => width / 2 + (x - 0.5 * (left + right)) * scale;
-  const Y = (y) => 0.5 * (height - 44) + (y - 0.5 * (top + bottom)) * scale;
+  const Y = (y) => 0.5 * (height - 52) + (y - 0.5 * (top + bottom)) * scale;
   const radius = Math.max(0.5 * frame.wire * scale, 1);
   const dot = (x, y) => { pen.beginPath(); pen.arc(X(x), Y(y), radius, 0, 2 * Math.PI); };
   for (let k = 0; k < data.x.length; k += 1) {
@@ -141,8 +141,11 @@ function printed(pen, width, height, frame) {
   pen.globalAlpha = 1;
   pen.fillStyle = c.ink;
   const faults = Object.entries(frame.faults).map(([name, count]) => `${count} ${name}`).join(", ");
-  pen.fillText(`${frame.good} of ${frame.wanted} dots within limits${faults ? `: ${faults}` : ""}`, width / 2, height - 26);
-  if (frame.force) pen.fillText(`force ${digits(100 * frame.force[0], 3)} to ${digits(100 * frame.force[1], 3)} % of the single pulse, off by ${shown(frame.placement[0], "m", 3)} to ${shown(frame.placement[1], "m", 3)}`, width / 2, height - 10);
+  pen.fillText(`${frame.good} of ${frame.wanted} dots within limits${faults ? `: ${faults}` : ""}`, width / 2, height - 38);
+  if (frame.force) {
+    pen.fillText(`force ${digits(100 * frame.force[0], 3)} to ${digits(100 * frame.force[1], 3)} % of the single pulse's`, width / 2, height - 24);
+    pen.fillText(`off by ${shown(frame.placement[0], "m", 3)} to ${shown(frame.placement[1], "m", 3)} along the line`, width / 2, height - 10);
+  }
   pen.restore();
 }
 

@@ -16,8 +16,10 @@ export function motionView(body, studio) {
       { name: quantity(studio), si: studio.frames.motion?.quantity === "force" ? "N" : "A", scale: "drive", colour: colours().drive, values: (f) => f.data.drive, dash: [5, 3] },
     ],
     scales: (frame) => ({ x: placesRange(frame), drive: driveRange(frame) }),
-    under: (pen, plane, box) => places(pen, plane, box, studio.frames.motion),
-    over: (pen, plane) => ghosts(pen, plane, studio),
+    under: (pen, plane, box) => {
+      places(pen, plane, box, studio.frames.motion);
+      ghosts(pen, plane, studio);
+    },
   });
 }
 
@@ -28,7 +30,6 @@ export function forcesView(body, studio) {
     series: () => FORCES.map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
     scales: (frame) => ({ x: widened(...FORCES.slice(1).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
     under: () => {},
-    over: () => {},
   });
 }
 
@@ -136,7 +137,7 @@ function curveView(body, studio, kind) {
       series: [{ scale: "t" }, ...series.map((entry) => ({ scale: entry.scale, stroke: entry.colour, width: entry.name === "total" ? 0.8 : 1.3, dash: entry.dash, points: { show: false } }))],
       hooks: {
         drawAxes: [(u) => { if (studio.frames.motion) scaled(u, kind.under); }],
-        draw: [(u) => { if (studio.frames.motion) scaled(u, (pen, plane, box) => { kind.over(pen, plane, box); if (!right) key(pen, box, series); }); }],
+        draw: [(u) => { if (studio.frames.motion) scaled(u, (pen, plane, box) => { if (!right) key(pen, box, series); }); }],
         setCursor: [(u) => { if (u.cursor.event && u.cursor.left >= 0) studio.setCursor(u.posToVal(u.cursor.left, "t"), holder); }],
         setSelect: [(u) => { if (u.select.width > 4) studio.zoom([u.posToVal(u.select.left, "t"), u.posToVal(u.select.left + u.select.width, "t")]); }],
       },
@@ -192,7 +193,6 @@ function curveView(body, studio, kind) {
       pen.setLineDash(entry.dash ?? []);
       curve(pen, own, t, entry.values(frame));
     }
-    kind.over(pen, plane, plane.box);
     key(pen, plane.box, series);
     pen.restore();
     pen.setLineDash([]);

@@ -1,0 +1,74 @@
+"""How long the studio takes from a key press on a slider to what is seen, in a headless Chromium.
+
+    python benchmarks/studio.py [HAMMER] [--times N]
+
+The keys are pressed four times a second. Times are taken in the browser, from the time stamp of the key to
+the first task after the picture was handed over.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import time
+from pathlib import Path
+
+GROUPS = {
+    "motion, forces and phase plane": ("motion-forces-phase", [("motion", None)]),
+    "map": ("map", [("map", "preview"), ("map", "full")]),
+    "all nine views": ("", [("motion", None), ("map", "preview"), ("map", "full")]),
+}
+CONTROLS = ("waveform.width", "forms thickness")
+LISTEN = """
+window.seen = [];
+document.getElementById("studio").addEventListener("painted", ({ detail }) => { window.seen.push(detail); });
+"""
+
+
+def main() -> None:
+    """Measure and print a table."""
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    from tests.studio.browser import browser
+    from tests.studio.server import studio
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("hammer", nargs="?", default="hendriks-1983")
+    parser.add_argument("--times", type=int, default=40)
+    given = parser.parse_args()
+    with browser() as tab:
+        page = tab()
+        page.size(1280, 720)
+        begun = time.perf_counter()
+        with studio(given.hammer) as running:
+            page.open(running.address)
+            page.wait("window.studio?.studio?.frames.motion")
+            print(f"start of the program to the first picture: {time.perf_counter() - begun:.2f} s")
+            for name, (views, kinds) in GROUPS.items():
+                for control in CONTROLS:
+                    page.open("about:blank")
+                    page.open(running.address + (f"#views={views}" if views else ""))
+                    page.wait("window.studio?.studio?.frames.motion")
+                    time.sleep(2.5)
+                    page.run(LISTEN)
+                    page.run(f"document.querySelector('[data-key=\"{control}\"]').focus()")
+                    for k in range(given.times + 10):
+                        if k == 10:
+                            page.run("window.seen.length = 0")
+                        page.press("ArrowRight" if k % 20 < 10 else "ArrowLeft")
+                        time.sleep(0.25)
+                    seen = page.run("window.seen")
+                    for kind, detail in kinds:
+                        same = [each for each in seen if (each["kind"], each.get("detail")) == (kind, detail)]
+                        took = sorted(each["took"] for each in same if each["took"] is not None)
+                        show(f"{name}, {control}: {detail or 'curves'}", took)
+
+
+def show(told: str, took: list[float]) -> None:
+    """Print one row."""
+    median, late = statistics.median(took), took[int(0.9 * len(took))]
+    print(f"{told:60s} median {median:6.1f} ms, 90 % within {late:6.1f} ms, {len(took)} pictures")
+
+
+if __name__ == "__main__":
+    main()
