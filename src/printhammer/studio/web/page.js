@@ -27,4 +27,6 @@ function connect() {
   socket.onmessage = (event) => studio.receive(event.data);
   socket.onclose = (event) => studio.lost(event.reason, connect);
 }
+// So that the keys work from the start.
+studio.studio.parts.grid.focus();
 connect();

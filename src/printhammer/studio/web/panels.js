@@ -38,7 +38,7 @@ export function layout(studio, makers) {
   const controls = make("div", { class: "controls" });
   const hint = make("div", { class: "hint", "aria-live": "polite" });
   const status = make("div", { class: "status", role: "status" });
-  const grid = make("main", { class: "grid" });
+  const grid = make("main", { class: "grid", tabindex: -1 });
   const chooser = make("div", { class: "chooser", role: "group", "aria-label": "views" });
   const bar = make("header", { class: "bar" },
     make("h1", {}, "printhammer studio"), hammers, honesty, presets, button("undo", "Undo (Ctrl+Z)", () => studio.store.undo(), { class: "undo" }), button("redo", "Redo (Ctrl+Shift+Z)", () => studio.store.redo(), { class: "redo" }),
@@ -88,8 +88,14 @@ export function layout(studio, makers) {
   function enlarge(name) {
     grid.classList.toggle("one", !panels[name].classList.contains("large"));
     for (const [other, panel] of Object.entries(panels)) panel.classList.toggle("large", other === name && grid.classList.contains("one"));
+    keepFocus();
   }
   studio.enlarge = enlarge;
+  /** Keys go to what has the focus, which must not be lost with a view that is hidden. */
+  function keepFocus() {
+    const { activeElement } = document;
+    if (grid.contains(activeElement) && activeElement.getClientRects().length === 0) grid.focus({ preventScroll: true });
+  }
 
   for (const kind of ["dragover", "drop"]) {
     page.addEventListener(kind, (event) => {
@@ -104,6 +110,7 @@ export function layout(studio, makers) {
     for (const [name, panel] of Object.entries(panels)) panel.hidden = !views.includes(name);
     for (const each of chooser.children) each.setAttribute("aria-pressed", String(views.includes(each.dataset.view)));
     grid.dataset.count = String(views.length);
+    keepFocus();
   };
   return { page, bar, controls, hint, status, grid, dialog, hammers, honesty, layout: { show, enlarge } };
 }
