@@ -37,9 +37,11 @@ LEAD: Final = 30e-6
 WINDOW: Final = 120e-6
 """Time over which samples are looked at, s."""
 
-_SPEED_ERROR: Final = 0.05
+_SPEED_ERROR: Final = 0.03
 _PLACE_ERROR: Final = 0.03
 _LEAST_ERROR: Final = 1e-4
+_CLAMP: Final = 0.5
+_CLAMPED: Final = 0.5
 _CLEAR: Final = 0.35
 _POLICIES: Final = 8
 
@@ -190,7 +192,9 @@ class Controller:
         self._push(loop, pulse, 0.0 if np.isnan(release) else release, 0.0)
         if not np.isnan(brake):
             pulse.switch(loop.touch + brake, self.driver.current)
-            pulse.switch(loop.touch + brake + width, 0.0)
+            # Whatever is left of the motion is pressed out of it against the backstop.
+            pulse.switch(loop.touch + brake + width, -_CLAMP * self.driver.current)
+            pulse.switch(loop.touch + brake + width + _CLAMPED * self.single.flight_time, 0.0)
 
     def _landings(self, kind: Any, speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return release, begin and width of the brake pulse for some touches."""
