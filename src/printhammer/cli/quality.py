@@ -148,7 +148,7 @@ def quality(
         from printhammer.printing.quality import quality as report
 
         slots = pattern if pulses is None else whole(pulses, "pulses")
-        placed = {} if pitch is None else {"pitch": pitch}
+        placed: dict[str, Any] = {} if pitch is None else {"pitch": pitch}
         found = report(loaded, rate or 0.0, slots, **common, **placed)
         lines = quality_screen.report(found, units)
         bad = "" if found.ok else f"the run ended early: {found.status}"

@@ -44,7 +44,7 @@ def plot(found: ToleranceYield, *, bars: int = 8) -> Figure:
     Figure
         Left: the part of the hammers that print every pattern well up to a rate, or, of one rate, the
         single-pulse dots of those that pass and of those that do not. Right: the rank correlation of each
-        constant with the safe rate, or with passing.
+        constant with the safe rate, or with passing; grey: what chance does.
     """
     figure = new_figure(3.6, 7.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
@@ -105,6 +105,8 @@ def _correlations(ax: Axes, found: ToleranceYield, outcome: np.ndarray, bars: in
     order = np.argsort(-np.abs(values), kind="stable")[:bars]
     for height, k in enumerate(order.tolist()):
         ax.barh(height, values[k], height=0.62, color=BLUE if values[k] > 0.0 else ORANGE)
+    chance = 2.0 / math.sqrt(len(outcome))
+    ax.axvspan(-chance, chance, color=FAINT, alpha=0.6, lw=0.0, zorder=0)
     ax.axvline(0.0, color=INK, lw=THIN)
     ax.set_yticks(range(len(order)), [list(found.spreads)[k] for k in order], fontsize=TINY)
     ax.set_ylim(max(len(order), 3) - 0.4, -0.6)

@@ -260,6 +260,7 @@ def spreads_of(hammer: Hammer, given: float | Mapping[str, float]) -> dict[str, 
         A spread is not from 0 to below 1, a constant is not known or zero, or none varies.
     """
     constants = hammer.constants
+    wanted: dict[str, Any]
     if isinstance(given, Mapping):
         wanted = dict(given)
     else:
