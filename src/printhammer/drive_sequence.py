@@ -138,8 +138,8 @@ class PulseSequence(Drive):
     def to_toml(self) -> str:
         """Return the text of a drive file; reading it back gives an equal drive."""
         names = [f"pulse-{number + 1}" for number in range(len(self._tables))]
-        first = {k: int(np.flatnonzero(self._which == k)[0]) for k in range(len(self._tables))}
-        shapes = {names[k]: waveform_text(self._waveforms[first[k]]) for k in first}
+        first = np.unique(self._which, return_index=True)[1]
+        shapes = {names[k]: waveform_text(self._waveforms[i]) for k, i in enumerate(first.tolist())}
         table = {"at": column_text(self._times, "s"), "waveforms": [names[k] for k in self._which]}
         tables = {"sequence": table, **{f"waveforms.{name}": shape for name, shape in shapes.items()}}
         return document({"format": FORMAT, "overlap": self._overlap}, tables)
@@ -184,11 +184,14 @@ class PulseSequence(Drive):
         return int((after - np.arange(len(self._times))).max())
 
     def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:
-        moments, numbers = np.atleast_1d(time), np.atleast_1d(pulse)
+        moments, numbers = np.ravel(time), np.ravel(pulse)
         result = np.zeros(moments.shape)
-        for k, table in enumerate(self._tables):
-            own = self._which[numbers] == k
-            result[own] = evaluate(table, moments[own], self._times[numbers[own]])
+        # Pulses of the same waveform side by side: each table is evaluated once.
+        order = np.argsort(self._which[numbers], kind="stable")
+        bounds = np.searchsorted(self._which[numbers[order]], np.arange(len(self._tables) + 1))
+        for k in np.flatnonzero(np.diff(bounds)):
+            own = order[bounds[k] : bounds[k + 1]]
+            result[own] = evaluate(self._tables[k], moments[own], self._times[numbers[own]])
         return result.reshape(np.shape(time))
 
     def __repr__(self) -> str:
