@@ -24,8 +24,8 @@ print(f"safe up to {found.rate:g} Hz. {found.failure.text}")
 
 # %%
 # Beyond the safe rate there are good and bad rates. Of the worst of them the quality
-# report tells which dots are off, and what tolerances the flight times would keep: the paper
-# tells of 200 µs from peak to peak for dot matrix printing, and of a few tens of
+# report tells which dots are off, and what tolerances the flight times would keep: the
+# paper tells of 200 µs from peak to peak for dot matrix printing, and of a few tens of
 # microseconds for engraved characters.
 
 worst = found.rates[(found.force_high - found.force_low).argmax()]
