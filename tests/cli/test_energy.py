@@ -2,6 +2,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from tests.control.test_least_work import let_go, thrown
 from tests.hammers import CRUDE
 
@@ -54,4 +55,31 @@ def test_bad_input_is_one_sentence(cli: Callable, words: tuple[str, ...], said: 
     assert done.status == 2
     assert said in done.err
     assert "Traceback" not in done.err
+    assert len(done.err.strip().splitlines()) == 1
+
+
+def test_several_rates(cli: Callable, tmp_path: Path, unsearched: None) -> None:
+    out, picture = tmp_path / "rates.nc", tmp_path / "rates.png"
+    words = ("--rates", "300 Hz, 400 Hz, 2", "--dots", "2", "--force", "0.3")
+    done = cli("energy", CRUDE, *words, "--out", out, "--out", picture)
+    assert done.status == 0
+    assert done.out.count("2 of 2") == 2
+    with xr.open_dataset(out, engine="scipy") as kept:
+        assert kept["rate"].values.tolist() == [300.0, 400.0]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--rates", "300 Hz"), "two rates and a number"),
+        (("--rates", "400 Hz, 300 Hz, 2"), "the lower rate first"),
+        (("--rates", "300 Hz, 400 Hz, 1"), "from 2 to 200"),
+        (("--rates", "300 Hz, 400 Hz, 2", "--supply"), "neither --supply nor a current"),
+    ],
+)
+def test_bad_rates_are_told(cli: Callable, words: tuple[str, ...], said: str) -> None:
+    done = cli("energy", CRUDE, *words)
+    assert done.status == 2
+    assert said in done.err
     assert len(done.err.strip().splitlines()) == 1

@@ -18,6 +18,7 @@ from printhammer.control import least_work as module
 from printhammer.control import least_work_search as search
 from printhammer.control.least_work import LeastWork, NoBurstError, steepest_rise
 from printhammer.control.least_work_bound import bound
+from printhammer.control.least_work_rates import least_work_rates
 from printhammer.control.least_work_slot import NodeCurrent, SlotState, node_times, outcomes
 from printhammer.control.least_work_tables import save_least_work
 from printhammer.printing.nominal import nominal
@@ -220,3 +221,27 @@ def test_harder_dots_cost_less_for_what_they_give() -> None:
         assert found.burst(3) == pytest.approx(found.first + 2.0 * found.later)
     ratios = [found.first / found.loading for found in shares]
     assert ratios == sorted(ratios, reverse=True)
+
+
+def test_works_against_the_rate(monkeypatch: pytest.MonkeyPatch, unsearched: None, tmp_path: Path) -> None:
+    def not_above(task: Any, begin: SlotState, duration: float, *rest: Any) -> Any:
+        return thrown(task, begin, duration, *rest) if duration > 1.5e-3 else None
+
+    monkeypatch.setattr(module, "printing_current", not_above)
+    told: list[tuple[int, int]] = []
+    found = least_work_rates(
+        hammers.crude(), ["400 Hz", 1000.0], dots=2, progress=lambda *at: told.append(at), force=0.3
+    )
+    assert told == [(1, 2), (2, 2)]
+    assert found.status.tolist() == ["ok", "no current found"]
+    assert found.adequate.tolist() == [2, 0]
+    alone = ph.least_work(hammers.crude(), rate=400.0, dots=2, force=0.3)
+    assert found.positive_ratio[0] == alone.positive_ratio
+    assert np.isnan(found.net_ratio[1])
+    table = found.to_dataset()
+    assert table["rate"].values.tolist() == [400.0, 1000.0]
+    figure = found.plot()
+    assert np.asarray(figure.axes[0].lines[0].get_ydata())[0] == alone.positive_ratio
+    for wrong in ([], "400 Hz"):
+        with pytest.raises(ph.InputError, match="at least one rate"):
+            least_work_rates(hammers.crude(), wrong)

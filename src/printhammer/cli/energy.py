@@ -13,20 +13,31 @@ from printhammer.cli.run import HAMMER, HammerArgument, UnitsOption
 from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.table import Table
 
     from printhammer.control.least_work import LeastWork
+    from printhammer.control.least_work_rates import LeastWorkRates
     from printhammer.control.least_work_supply import SupplyCheck
+    from printhammer.hammer import Hammer
 
 EXAMPLE: Final = "Example: printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png"
 
 _PICTURES: Final = (".svg", ".png", ".pdf")
 _SUFFIXES: Final = (".nc", ".csv")
+_MOST_RATES: Final = 200
 
 
 def energy(
     hammer: HammerArgument = HAMMER,
     rate: Annotated[str, typer.Option(metavar="RATE", help="Dots per second, such as '1.2 kHz'.")] = "1 kHz",
+    rates: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LOW, HIGH, N", help="Bursts at several rates instead, such as '600 Hz, 1.8 kHz, 7'."
+        ),
+    ] = None,
     dots: Annotated[str, typer.Option(metavar="N", help="Number of dots.")] = "8",
     force: Annotated[
         str | None,
@@ -90,18 +101,17 @@ def energy(
     options = {key: value for key, value in given.items() if value is not None}
     count = whole(dots, "dots")
     assert count is not None
+    options |= {"dots": count, "largest": largest, "least": "heat" if heat else "positive work"}
+    many = None if rates is None else _rates(rates)
+    if many is not None and (supply or any(path.suffix.lower() == ".csv" for path in wanted)):
+        raise InputError("--rates is given, expected neither --supply nor a current (.csv) beside it")
     loaded = load_checked(hammer)
     announce_compiling()
-    found = _planned(
-        loaded,
-        rate=rate,
-        dots=count,
-        largest=largest,
-        least="heat" if heat else "positive work",
-        function=least_work,
-        **options,
-    )
     screen = console()
+    if many is not None:
+        _at_rates(loaded, many, options, wanted)
+        return
+    found = _planned("dots planned", lambda tell: least_work(loaded, rate, progress=tell, **options))
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}\n")
     screen.print(told(found, units))
     if supply:
@@ -180,26 +190,67 @@ def supplied(found: SupplyCheck, count: int, units: Units) -> Table:
     return table
 
 
-def _planned(hammer: Any, *, function: Any, **options: Any) -> LeastWork:
-    """Plan the burst, and show how far it is."""
+def _rates(text: str) -> list[float]:
+    """Read two rates with their units and a number of values."""
+    import numpy as np
+
+    from printhammer.errors import InputError
+    from printhammer.printing.nominal import rate_of
+
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 3:
+        raise InputError(f"--rates {text!r}: expected two rates and a number, such as '600 Hz, 1.8 kHz, 7'")
+    low, high, count = rate_of(parts[0], "--rates"), rate_of(parts[1], "--rates"), whole(parts[2], "--rates")
+    if not low < high or count is None or not 2 <= count <= _MOST_RATES:
+        raise InputError(
+            f"--rates {text!r}: expected the lower rate first, and a number from 2 to {_MOST_RATES}"
+        )
+    return [float(rate) for rate in np.linspace(low, high, count)]
+
+
+def _at_rates(hammer: Hammer, rates: list[float], options: dict[str, Any], wanted: list[Path]) -> None:
+    from rich.markup import escape
+
+    from printhammer.chaos.bifurcation_tables import save_dataset
+    from printhammer.cli.terminal import complain, console, honesty, plain_table
+    from printhammer.control.least_work_rates import FOUND, least_work_rates
+
+    found = _planned("rates", lambda tell: least_work_rates(hammer, rates, progress=tell, **options))
+    screen = console()
+    screen.print(f"[bold]{escape(hammer.name)}[/bold]  {honesty(hammer)}\n")
+    headings = ("rate [Hz]", "adequate dots", "W", "W+", "least W+", "")
+    table = plain_table(*((heading, "right") for heading in headings))
+    for row, status in enumerate(found.status.tolist()):
+        ratios = (found.net_ratio[row], found.positive_ratio[row], found.bound_ratio[row])
+        known = [f"{ratio:.4f}" if status == FOUND else "–" for ratio in ratios]
+        said = "" if status == FOUND else status
+        table.add_row(f"{found.rates[row]:.6g}", f"{found.adequate[row]} of {found.count}", *known, said)
+    screen.print(table)
+    for path in wanted:
+        if path.suffix.lower() in _PICTURES:
+            _draw(found, path)
+        else:
+            save_dataset(found.to_dataset(), path)
+        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    missing = int((found.status != FOUND).sum())
+    if missing:
+        complain(f"no current was found at {missing} of {found.status.size} rates")
+        raise typer.Exit(1)
+
+
+def _planned(name: str, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:
+    """Compute, and show how far it is."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     with Progress(
-        TextColumn("dots planned"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        console=Console(stderr=True),
-        transient=True,
+        TextColumn(name), BarColumn(), MofNCompleteColumn(), console=Console(stderr=True), transient=True
     ) as shown:
-        task = shown.add_task("dots planned", total=None)
-        found: LeastWork = function(
-            hammer, progress=lambda done, total: shown.update(task, completed=done, total=total), **options
-        )
-        return found
+        task = shown.add_task(name, total=None)
+        return compute(lambda done, total: shown.update(task, completed=done, total=total))
 
 
-def _draw(found: LeastWork, path: Path) -> None:
+def _draw(found: LeastWork | LeastWorkRates, path: Path) -> None:
     from printhammer.outputs import write_file
 
     buffer = BytesIO()
