@@ -11,6 +11,7 @@ STATE = "#rate=1250&pulses=9"
 
 def main() -> None:
     sys.path.insert(0, str(ROOT))
+    from PIL import Image
     from tests.studio.browser import browser
     from tests.studio.server import studio
 
@@ -40,6 +41,8 @@ def main() -> None:
         page.run("new Promise((done) => setTimeout(done, 800))")
         for view in VIEWS:
             page.picture(IMAGES / f"{view}.png", f".view-{view}")
+    for path in IMAGES.glob("*.png"):
+        Image.open(path).convert("RGB").quantize(256).save(path, optimize=True)
 
 
 if __name__ == "__main__":

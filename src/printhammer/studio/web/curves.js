@@ -130,7 +130,7 @@ function curveView(body, studio, kind) {
     const main = series[0];
     plot?.destroy();
     plot = new uPlot({
-      width: size[0], height: size[1], pxAlign: 0, legend: { show: false }, padding: [4, right ? 0 : 8, 0, 0],
+      width: size[0], height: size[1], pxAlign: 0, legend: { show: false }, padding: [8, right ? 0 : 8, 0, 0],
       cursor: { sync: { key: "time", setSeries: false, scales: ["t", null] }, drag: { x: true, y: false, setScale: true }, points: { show: false }, bind: { dblclick: () => () => { studio.zoom(null); return null; } } },
       scales: { t: { time: false, auto: false }, x: { auto: false }, drive: { auto: false } },
       axes: [axis("t", "s", (u) => `time, ${shownIn(u, "s").name}`, 2), axis("x", main.si, `${kind.series().length > 2 ? "force" : main.name}, ${unitOf(main.si).name}`, 3), ...(right ? [axis("drive", right.si, `${right.name}, ${unitOf(right.si).name}`, 1)] : [])],
