@@ -43,10 +43,12 @@ _WIDTH: Final = 7.6
 _SIDE: Final = 0.2
 _LABEL: Final = 0.24
 _GAP: Final = 0.1
+_BESIDE: Final = 0.15
+_UPRIGHT: Final = 0.5
 _BAR: Final = 1.5
 _LEAST_MARK: Final = 1.8
 _NEUTRAL: Final = "#c6ccd1"
-_TALLEST: Final = 3.2
+_TALLEST: Final = 4.5
 _LARGEST: Final = 0.1
 _FOOT: Final = 0.62
 _INCH: Final = 25.4e-3
@@ -86,26 +88,36 @@ def plot(page: Page, view: View = "page") -> Figure:
         return _zoom_alone(page)
     if view != "page":
         raise InputError(f"view = {view!r}, expected one of {', '.join(VIEWS)}")
-    sheet = whole_sheet(page)
+    sheet, place = whole_sheet(page), zoomed_sheet(page)
+    # Side by side where the paper is upright, else one below the other.
+    beside = sheet.height > _UPRIGHT * sheet.width
     wide = _WIDTH - 2.0 * _SIDE
-    scale = min(wide / sheet.width, _TALLEST / sheet.height, _LARGEST / page.head.pitch)
+    each = (wide - 2.0 * _BESIDE) / 3.0 if beside else wide
+    scale = min(each / sheet.width, _TALLEST / sheet.height, _LARGEST / page.head.pitch)
     strip = scale * sheet.height
-    sheet = replace(sheet, right=sheet.left + wide / scale)
-    place = zoomed_sheet(page)
+    sheet = replace(sheet, right=sheet.left + each / scale)
     zoom = wide * place.height / place.width
-    height = 3 * (_LABEL + strip + _GAP) + 1.5 * _LABEL + zoom + _FOOT + 0.1
+    rows = 1 if beside else 3
+    height = rows * (_LABEL + strip + _GAP) + (1.5 + beside) * _LABEL + zoom + _FOOT + 0.1
     figure, top = _figure(height), height - 0.1
-    axes = []
-    for name in (_printed_title(page), "Wanted", "Difference"):
+    if beside:
         top -= _LABEL
-        axes.append(_panel(figure, sheet, top, strip, name))
-        top -= strip + _GAP
+        style: dict[str, Any] = {"fontsize": SMALL, "color": MUTED, "va": "center"}
+        figure.text(_SIDE / _WIDTH, (top + 0.1) / height, _printed_title(page), **style)
+    axes = []
+    for number, name in enumerate(("Printed" if beside else _printed_title(page), "Wanted", "Difference")):
+        if number == 0 or not beside:
+            top -= _LABEL
+        left = _SIDE + (number * (each + _BESIDE) if beside else 0.0)
+        axes.append(_panel(figure, sheet, top, strip, name, left))
+        if number == 2 or not beside:
+            top -= strip + _GAP
     across, down = page.places
     fine = max(page.head.pitch / _FINENESS, sheet.width / _ACROSS)
     _paper(axes[0], sheet, *_dots(page), page.head.wire_diameter, fine)
     full = np.full(page.line.shape, page.head.density)
     _paper(axes[1], sheet, *page.intended, full, page.head.wire_diameter, fine)
-    _differences(figure, axes[2], page, across, down)
+    _differences(figure, axes[2], page, across, down, beside * _LABEL)
     top -= 1.5 * _LABEL
     _zoom(_panel(figure, place, top, zoom, _zoom_title(page)), place, page)
     _tell(figure, page)
@@ -147,11 +159,10 @@ def _figure(height: float, width: float = _WIDTH) -> Figure:
     return Figure(figsize=(width, height))
 
 
-def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str) -> Axes:
-    """Return axes for a sheet: their height and their top above the bottom of the figure, in."""
+def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, left: float = _SIDE) -> Axes:
+    """Return axes for a sheet: their height, their top above the bottom of the figure, their left, in."""
     width, whole = figure.get_size_inches()
     wide = height * sheet.width / sheet.height
-    left = _SIDE
     ax = figure.add_axes((left / width, (top - height) / whole, wide / width, height / whole))
     ax.set_xlim(sheet.left, sheet.right)
     ax.set_ylim(sheet.bottom, sheet.top)
@@ -232,7 +243,10 @@ def _in_points(ax: Axes, length: float) -> float:
     return float(72.0 * width * ax.get_position().width * length / (right - left))
 
 
-def _differences(figure: Figure, ax: Axes, page: Page, across: FloatArray, down: FloatArray) -> None:
+def _differences(
+    figure: Figure, ax: Axes, page: Page, across: FloatArray, down: FloatArray, above: float
+) -> None:
+    """Draw where dots are off, and a scale above the panel, by some inches more than need be."""
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
     on, head = page.printed, page.head
@@ -260,7 +274,7 @@ def _differences(figure: Figure, ax: Axes, page: Page, across: FloatArray, down:
     width, whole = figure.get_size_inches()
     box = ax.get_position()
     bar_axes = figure.add_axes(
-        ((_WIDTH - _SIDE - _BAR - 0.75) / width, box.y1 + 0.06 / whole, _BAR / width, 0.09 / whole)
+        ((_WIDTH - _SIDE - _BAR - 0.75) / width, box.y1 + (0.06 + above) / whole, _BAR / width, 0.09 / whole)
     )
     bar = figure.colorbar(discs, cax=bar_axes, orientation="horizontal", ticks=[])
     bar.outline.set_visible(False)
