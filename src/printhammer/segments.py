@@ -178,12 +178,13 @@ def largest_sum(edges: FloatArray, value: Callable[[FloatArray], FloatArray]) ->
         grid = starts[part, np.newaxis] + (ends - starts)[part, np.newaxis] * fractions
         sampled[part] = np.abs(value(np.minimum(grid, ends[part, np.newaxis]))).max(axis=1)
     best = float(sampled.max())
-    for k in np.argsort(sampled)[-_REFINED:]:
-        grid = np.minimum(starts[k] + (ends[k] - starts[k]) * fractions, ends[k])
-        for _ in range(_ROUNDS):
-            heights = np.abs(value(grid))
-            top = int(heights.argmax())
-            best = max(best, float(heights[top]))
-            low, high = grid[max(top - 1, 0)], grid[min(top + 1, len(grid) - 1)]
-            grid = np.minimum(np.linspace(low, high, 33), ends[k])
+    highest = np.argsort(sampled)[-_REFINED:]
+    every, first, last = np.arange(len(highest)), starts[highest], ends[highest, np.newaxis]
+    grid = np.minimum(first[:, np.newaxis] + (ends[highest] - first)[:, np.newaxis] * fractions, last)
+    for _ in range(_ROUNDS):
+        heights = np.abs(value(grid))
+        best = max(best, float(heights.max()))
+        top = heights.argmax(axis=1)
+        low, high = grid[every, np.maximum(top - 1, 0)], grid[every, np.minimum(top + 1, grid.shape[1] - 1)]
+        grid = np.minimum(np.linspace(low, high, 33, axis=1), last)
     return best
