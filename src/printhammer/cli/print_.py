@@ -140,7 +140,7 @@ def print_(
     seconds = perf_counter() - begin
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     screen.print(
-        f"[dim]{page.status.size} wires and lines, {page.line.size} dots, computed in {seconds:.2g} s[/dim]\n"
+        f"[dim]{page.status.size} runs, {page.line.size} dots, computed in {seconds:.2g} s[/dim]\n"
     )
     screen.print(told(page, units))
     for path in wanted:
