@@ -139,9 +139,7 @@ def print_(
     )
     seconds = perf_counter() - begin
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
-    screen.print(
-        f"[dim]{page.status.size} runs, {page.line.size} dots, computed in {seconds:.2g} s[/dim]\n"
-    )
+    screen.print(f"[dim]{page.status.size} runs, {page.line.size} dots, computed in {seconds:.2g} s[/dim]\n")
     screen.print(told(page, units))
     for path in wanted:
         _write(page, path)
