@@ -24,18 +24,22 @@ if TYPE_CHECKING:
     from printhammer.segments import FloatArray
     from printhammer.waveforms import Waveform
 
-ROUNDS: Final = 5
+ROUNDS: Final = 7
 """Steps of Newton's method for each length of history."""
 
-GOOD: Final = 3e-4
+GOOD: Final = 1e-4
 """Deviation, in parts of the limits, from which on an entry is left as it is."""
 
 LEAST_WIDTH: Final = 0.3
 """Least width, in parts of the largest one."""
 
+ROUGH: Final = 0.2
+"""Deviation, in parts of the limits, above which an entry is made less wrong in all patterns."""
+
 _DENSE: Final = 5
 _STEP: Final = 0.5e-6
 _LONGEST_STEP: Final = 25e-6
+_DAMPING: Final = 0.02
 _TAIL: Final = 1e-3
 _PIECE: Final = 4096
 
@@ -75,12 +79,24 @@ def subset(work: Work, rows: npt.NDArray[np.int64]) -> Work:
     return replace(work, rates=work.rates[rows], **values)
 
 
-def befores(history: History, reach: int) -> list[tuple[int, ...]]:
-    """Return gaps before a history, of patterns with which it is tuned: from rest, and after other dots."""
+def befores(history: History, reach: int, *, dense: bool = True) -> list[tuple[int, ...]]:
+    """Return gaps before a history: of the pattern that begins with it, and of others that it comes late in.
+
+    Parameters
+    ----------
+    history : tuple of int
+        The history.
+    reach : int
+        Longest gap that counts, slots.
+    dense : bool, optional
+        Whether to return more than the first.
+    """
+    if not dense:
+        return [()]
     late = (reach + 1,)
     if REST in history:
         return [(), late]
-    return [(), late, (1,) * _DENSE]
+    return [(), late, (1,) * _DENSE, (reach, 1, reach, 1)]
 
 
 def polish(work: Work, told: Callable[[], None]) -> None:
@@ -124,8 +140,41 @@ def look_at(work: Work, level: Sequence[History]) -> None:
 
 
 def polish_level(work: Work, level: Sequence[History], told: Callable[[], None]) -> None:
-    """Improve the entries of some histories at all rates."""
-    cells = [(row, history) for row in range(work.rates.size) for history in level]
+    """Improve the entries of some histories at all rates; what is printed from rest stays as it is.
+
+    At first each entry is made right in the pattern that begins with it: where all dots before are right, it
+    is right in all others as well. Where that cannot be, it is made less wrong in all.
+
+    Parameters
+    ----------
+    work : Work
+        The table; changed in place.
+    level : sequence of tuple
+        The histories.
+    told : callable
+        Called after each round.
+    """
+    cells = [
+        (row, history)
+        for row, rate in enumerate(work.rates.tolist())
+        for history in level
+        if history[0] / rate <= work.single.settled
+    ]
+    _newton(work, cells, told, dense=False)
+    look_at(work, level)
+    rough = [
+        (row, history)
+        for row, history in cells
+        if work.deviation[row, number_of(history, work.reach)] > ROUGH
+    ]
+    _newton(work, rough, told, dense=True)
+
+
+def _newton(
+    work: Work, cells: Sequence[tuple[int, History]], told: Callable[[], None], *, dense: bool
+) -> None:
+    if not cells:
+        return
     columns = np.array([number_of(history, work.reach) for _row, history in cells])
     rows = np.array([row for row, _history in cells])
     now = np.column_stack([work.advance[rows, columns], work.width[rows, columns]])
@@ -142,7 +191,7 @@ def polish_level(work: Work, level: Sequence[History], told: Callable[[], None])
         # Dots before the last one may have the same history.
         work.advance[rows, columns], work.width[rows, columns] = now.T
         shifts = [(0.0, 0.0)] if turn == ROUNDS else [(0.0, 0.0), (_STEP, 0.0), (0.0, -_STEP)]
-        off = last_dots(work, [cells[k] for k in active], now[active], shifts)
+        off = last_dots(work, [cells[k] for k in active], now[active], shifts, dense=dense)
         told()
         here = off[:, 0]
         size = np.abs(here).max(axis=(1, 2))
@@ -185,7 +234,9 @@ def _step(slopes: FloatArray, off: FloatArray, least: float, most: float) -> Flo
     least, most : float
         Bounds on the change of the width, s.
     """
-    change = -np.linalg.lstsq(slopes, off, rcond=None)[0]
+    # A little of what Levenberg and Marquardt do: a direction in which nothing changes is left alone.
+    damped = np.vstack([slopes, _DAMPING / _LONGEST_STEP * np.eye(2)])
+    change = -np.linalg.lstsq(damped, np.concatenate([off, np.zeros(2)]), rcond=None)[0]
     wider = min(max(float(change[1]), least), most)
     if wider != change[1]:
         rest = off + slopes[:, 1] * wider
@@ -198,6 +249,8 @@ def last_dots(
     cells: Sequence[tuple[int, History]],
     values: FloatArray,
     shifts: Sequence[tuple[float, float]],
+    *,
+    dense: bool = True,
 ) -> FloatArray:
     """Return deviations of last dots of patterns, in parts of the limits.
 
@@ -211,6 +264,8 @@ def last_dots(
         Advance and width of the last dot, s.
     shifts : sequence of tuple
         Changes of these to be tried, s.
+    dense : bool, optional
+        As for `befores`.
 
     Returns
     -------
@@ -218,13 +273,13 @@ def last_dots(
         Of force and arrival; NaN for a lost dot or one with extra contacts. Where an entry has fewer patterns
         than others, its first one is repeated.
     """
-    most = max(len(befores(history, work.reach)) for _row, history in cells)
+    most = max(len(befores(history, work.reach, dense=dense)) for _row, history in cells)
     drives: list[Drive] = []
     due: list[float] = []
     known: dict[tuple[float, float, float], Waveform] = {}
     for (row, history), value in zip(cells, values, strict=True):
         settings, rate = work.settings(row), float(work.rates[row])
-        given = befores(history, work.reach)
+        given = befores(history, work.reach, dense=dense)
         for shift in shifts:
             for before in [*given, *[given[0]] * (most - len(given))]:
                 slots = pattern_of(plain(history), before)
