@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -144,7 +143,6 @@ def test_dataset() -> None:
     assert np.array_equal(chart["advance"].sel(history="1-rest"), table.advance[:, column])
 
 
-@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 def test_the_header_compiles_and_says_the_same(tmp_path: Path) -> None:
     table = by_hand()
     table.save(tmp_path / "table.h")
