@@ -334,23 +334,30 @@ def json_text(family: Sequence[Member], gauged: Sequence[Mapping[str, float]]) -
         Their constants at the common gauge, key to value, SI.
     """
     told = robustness([dict(member.conclusions) for member in family], gauged)
-    document = {
-        "format": FORMAT,
-        "hammers": [
-            {
-                "name": named(number),
-                "constants": dict(member.constants),
-                "verdicts": dict(member.verdicts),
-                "panels": member.panels,
-                "conclusions": dict(member.conclusions),
-            }
-            for number, member in enumerate(family)
-        ],
-        "conclusions": {
-            name: {key: row[key] for key in ("low", "high", "robust", "text")} for name, row in told.items()
-        },
-    }
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+    rows = [
+        {
+            "name": named(number),
+            "constants": dict(member.constants),
+            "verdicts": dict(member.verdicts),
+            "panels": member.panels,
+            "conclusions": dict(member.conclusions),
+        }
+        for number, member in enumerate(family)
+    ]
+    hammers = ",\n".join(f"  {_table(row, 3)}" for row in rows)
+    conclusions = _table(
+        {name: {key: row[key] for key in ("low", "high", "robust", "text")} for name, row in told.items()}, 2
+    )
+    return f'{{\n "format": {FORMAT},\n "hammers": [\n{hammers}\n ],\n "conclusions": {conclusions}\n}}\n'
+
+
+def _table(table: Mapping[str, Any], indent: int) -> str:
+    """Return the JSON text of a table, a line for each of its entries."""
+    lines = (
+        f"{' ' * indent}{json.dumps(key)}: {json.dumps(entry, allow_nan=False)}"
+        for key, entry in table.items()
+    )
+    return "{\n" + ",\n".join(lines) + f"\n{' ' * (indent - 1)}}}"
 
 
 def csv_text(family: Sequence[Member]) -> str:
