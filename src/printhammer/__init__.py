@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.stability_chart import stability_chart
     from printhammer.chaos.strobe import strobe
     from printhammer.chaos.zero_one import zero_one
+    from printhammer.control.feedback import feedback
     from printhammer.control.least_work import least_work
     from printhammer.control.table import CompensationTable
     from printhammer.control.table_files import load_table
@@ -79,6 +80,7 @@ __all__ = [
     "continuation",
     "damping_study",
     "equilibria",
+    "feedback",
     "fit",
     "frequency_map",
     "holding_margin",
@@ -132,6 +134,7 @@ _HOME = {
     "continuation": "chaos.continuation",
     "damping_study": "printing.damping",
     "equilibria": "equilibrium",
+    "feedback": "control.feedback",
     "fit": "identify.fitting",
     "frequency_map": "maps",
     "holding_margin": "equilibrium",

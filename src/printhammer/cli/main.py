@@ -18,6 +18,7 @@ from printhammer.cli import (
     bifurcation,
     continuation,
     energy,
+    feedback,
     figure,
     fit,
     hammer,
@@ -68,6 +69,7 @@ app.command("continue", epilog=continuation.EXAMPLE)(continuation.continue_)
 app.command("lyapunov", epilog=lyapunov.EXAMPLE)(lyapunov.lyapunov)
 app.command("print", epilog=print_.EXAMPLE)(print_.print_)
 app.command("energy", epilog=energy.EXAMPLE)(energy.energy)
+app.command("feedback", epilog=feedback.EXAMPLE)(feedback.feedback)
 app.command("quality", epilog=quality.EXAMPLE)(quality.quality)
 app.command("tune", epilog=tune.EXAMPLE)(tune.tune)
 app.command("bench", epilog=bench.EXAMPLE)(bench.bench)

@@ -1,4 +1,4 @@
-"""Back to rest after a dot: the push that prints it, and the brake pulse with which the armature lands softly.
+"""Back to rest after a dot: the push that prints it, and the brake pulse by which the armature lands softly.
 
 On its way back the armature is slowed down by the bucking current, as in the quenched response of Fig. 6 of
 F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), so that it meets the backstop with

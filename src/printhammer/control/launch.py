@@ -72,7 +72,7 @@ def launch(
     struck = result.ok & dots.struck[:, 0]
     if not struck.any() or not speed[struck].min() <= wanted <= speed[struck].max():
         raise InputError(
-            f"{hammer.path}: no push of {driver.current:g} A from rest touches the pack with {wanted:.3g} m/s,"
+            f"{hammer.path}: no push of {driver.current:g} A from rest touches the pack at {wanted:.3g} m/s,"
             " expected a stronger driver"
         )
     order = np.argsort(speed[struck])

@@ -56,7 +56,9 @@ class Policy:
         self._late = _LATENESS * limits.arrival
         self._rows = [np.flatnonzero(table.kind == kind) for kind in range(int(table.kind.max()) + 1)]
         self._doubt = self._doubts()
-        self.costs = self._iterated()
+        self._known = [np.flatnonzero(np.isfinite(row)) for row in table.next_touch]
+        self._efforts = self.effort(table.release) + self._doubt
+        self._costs = [self._resting()]
 
     def dot_cost(self, force: FloatArray, late: FloatArray) -> FloatArray:
         """Return the cost of a dot: force in parts of the single-pulse force, lateness in s."""
@@ -116,7 +118,7 @@ class Policy:
                 self.table.next_kind[np.newaxis, :],
                 later[own],
                 choice.next_speed[own],
-                self.costs[min(number, len(self.costs) - 1)],
+                self.costs(number),
             )
         cost = np.where(np.isnan(cost), np.inf, cost)
         way = np.argmin(cost, axis=1)
@@ -132,28 +134,32 @@ class Policy:
             found[rows] = np.square(np.nan_to_num(slope, nan=_STEEPEST) * _SPEED_DOUBT / self.limits.arrival)
         return found
 
-    def _iterated(self) -> list[FloatArray]:
-        table = self.table
-        late = self._late[:, np.newaxis]
+    def costs(self, number: int) -> FloatArray:
+        """Return the cost of a touch and all that follows, (T, lateness), some dots before a rest."""
+        while len(self._costs) <= min(number, _ROUNDS):
+            self._costs.append(self._one_more(self._costs[-1]))
+        return self._costs[min(number, _ROUNDS)]
+
+    def _resting(self) -> FloatArray:
         left = np.where(np.isnan(self.landing.left), _FAST, self.landing.left)
         force = np.where(np.isnan(self.landing.force), 0.0, self.landing.force)
         rest = self.dot_cost(force[:, np.newaxis], self._late[np.newaxis, :])
-        costs = [np.minimum(rest + np.square(left / _FAST)[:, np.newaxis], NEVER)]
-        known = [np.flatnonzero(np.isfinite(row)) for row in table.next_touch]
-        effort = self.effort(table.release) + self._doubt
-        for _ in range(_ROUNDS):
-            new = np.full_like(costs[-1], NEVER)
-            for row, ways in enumerate(known):
-                if not ways.size:
-                    continue
-                later = late + table.next_touch[row, ways] - self.period
-                cost = self.dot_cost(table.force[row, ways], late) + effort[row, ways]
-                cost = cost + _DISCOUNT * self.ahead(
-                    table.next_kind[ways], later, table.next_speed[row, ways], costs[-1]
-                )
-                new[row] = np.minimum(cost.min(axis=1), NEVER)
-            costs.append(new)
-        return costs
+        return np.minimum(rest + np.square(left / _FAST)[:, np.newaxis], NEVER)
+
+    def _one_more(self, costs: FloatArray) -> FloatArray:
+        table = self.table
+        late = self._late[:, np.newaxis]
+        new = np.full_like(costs, NEVER)
+        for row, ways in enumerate(self._known):
+            if not ways.size:
+                continue
+            later = late + table.next_touch[row, ways] - self.period
+            cost = self.dot_cost(table.force[row, ways], late) + self._efforts[row, ways]
+            cost = cost + _DISCOUNT * self.ahead(
+                table.next_kind[ways], later, table.next_speed[row, ways], costs
+            )
+            new[row] = np.minimum(cost.min(axis=1), NEVER)
+        return new
 
 
 class Choice:
