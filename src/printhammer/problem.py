@@ -174,6 +174,9 @@ class Problem:
         Error allowed in one step, in units of the stroke and of a typical speed.
     """
 
+    max_steps: int = MAX_STEPS
+    """Number of steps after which a run is given up."""
+
     def __init__(
         self, hammer: Hammer, drive: Drive, state: tuple[float, float], start: float, tolerance: float
     ) -> None:
@@ -230,7 +233,7 @@ class Problem:
                 float(end),
                 self.control,
                 self.bounds,
-                MAX_STEPS,
+                self.max_steps,
                 under_way,
                 live,
                 nodes,
@@ -277,7 +280,7 @@ def message_of(record: Record, hammer: Hammer) -> str:
     what = {
         "range left": "left the range in which its force law holds",
         "runaway": "ran away",
-        "step limit": f"needed more than {MAX_STEPS} steps",
+        "step limit": f"needed more than {record.steps - 1} steps",
         "step underflow": "needed steps shorter than the arithmetic resolves",
     }[STATUS_NAMES[record.status]]
     advice = "; a longer run can be split" if record.status == STEP_LIMIT else ""

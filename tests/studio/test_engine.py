@@ -10,7 +10,7 @@ from tests.studio.server import STATE
 import printhammer as ph
 from printhammer.ensemble import DISPLAY_TOLERANCE
 from printhammer.maps import TAIL
-from printhammer.studio import engine
+from printhammer.studio import bounds, engine
 from printhammer.studio.frames import unframe
 from printhammer.studio.state import State, read_state
 
@@ -89,9 +89,19 @@ def test_the_verdict_is_that_of_the_library() -> None:
 def test_a_run_of_too_many_steps_is_no_map() -> None:
     state = of(pulses=2)
     _, motion = engine.motion_frame(state, 1)
-    assert engine.too_long(state, motion) == ""
+    assert engine.too_long(motion) == ""
 
     class Long:
         steps = 10**9
 
-    assert "expected at most" in engine.too_long(state, Long())  # type: ignore[arg-type]
+    assert "expected at most" in engine.too_long(Long())  # type: ignore[arg-type]
+
+
+def test_a_hammer_that_never_ends_is_given_up_soon() -> None:
+    stiff = ph.load(CRUDE).replace("backstop.stiffness", 1e20)
+    data, motion = engine.motion_frame(of(text=stiff.to_toml(), pulses=64, rate=10.0), 1)
+    heading, _ = unframe(data)
+    assert heading["status"] == "step limit"
+    assert f"more than {bounds.MOST_STEPS} steps" in heading["message"]
+    assert len(data) < 10_000_000
+    assert engine.too_long(motion)

@@ -25,8 +25,11 @@ LARGEST_CURRENT: Final = 100.0
 SPAN: Final = 10.0
 """Factor by which a constant may differ from the one of the hammer that is loaded."""
 
-MOST_STEPS: Final = 100_000
-"""Steps of a single run above which no map and no strobe is computed."""
+MOST_STEPS: Final = 200_000
+"""Steps after which a run is given up."""
+
+MOST_MAP_STEPS: Final = 20_000
+"""Steps of a single run above which no map, no strobe section and no line is computed."""
 
 MOST_SAMPLES: Final = 2000
 """Samples of a waveform, and of a measured curve."""

@@ -16,7 +16,10 @@ from printhammer.drive import PulseTrain
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.errors import InputError
 from printhammer.maps import TAIL
-from printhammer.simulate import end_of_run, simulate
+from printhammer.motion import Motion
+from printhammer.problem import Problem
+from printhammer.simulate import end_of_run
+from printhammer.start import initial_state
 from printhammer.studio import bounds
 from printhammer.studio.frames import frame
 from printhammer.threads import in_threads, thread_count
@@ -25,7 +28,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.drive_base import Overlap
-    from printhammer.motion import Motion
     from printhammer.segments import FloatArray
     from printhammer.studio.state import State
     from printhammer.waveforms import Waveform
@@ -38,6 +40,9 @@ FULL: Final = (512, 512)
 
 POINTS: Final = 1600
 """Points of a curve, at least."""
+
+MOST_ENDS: Final = 20_000
+"""Ends of steps among the points of a curve, at most."""
 
 SECTION: Final = (100, 400)
 """Strobe points, at first and in the end."""
@@ -64,7 +69,7 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
         The state describes no hammer or drive that could be run.
     """
     hammer, drive = state.changed, state.drive
-    motion = simulate(hammer, drive, tolerance=DISPLAY_TOLERANCE, points=2)
+    motion = run_of(state)
     times = points_of(motion.step_times)
     places, speeds = motion.at(times)
     force, values = motion.forces_at(times), drive.value(times)
@@ -97,11 +102,29 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
     return frame("motion", serial, arrays, **told), motion
 
 
+def run_of(state: State) -> Motion:
+    """Return the run of a state, given up after `bounds.MOST_STEPS` steps.
+
+    Raises
+    ------
+    InputError
+        As `motion_frame`.
+    """
+    hammer, drive = state.changed, state.drive
+    problem = Problem(hammer, drive, initial_state(hammer, None), 0.0, DISPLAY_TOLERANCE)
+    problem.max_steps = bounds.MOST_STEPS
+    end = end_of_run(drive, None)
+    record = problem.run(end)
+    return Motion(problem, record, end, record.nodes[:, 0].copy(), "default")
+
+
 def points_of(ends: FloatArray) -> FloatArray:
     """Return the times of a curve's points, s: close where the integrator's steps are short, as in contacts.
 
-    Every switch of a force is the end of a step, and is among them.
+    Every switch of a force is the end of a step, and is among them, where the steps are at most `MOST_ENDS`.
     """
+    # What is longer than any picture is wide is thinned out.
+    ends = ends[np.unique(np.linspace(0, len(ends) - 1, min(len(ends), MOST_ENDS)).astype(int))]
     steps = np.diff(ends)
     least = 3 if len(steps) < POINTS else 1
     counts = np.maximum(np.ceil(steps * POINTS / (ends[-1] - ends[0])).astype(int), least)
@@ -282,11 +305,9 @@ def strobe_frame(state: State, serial: int, points: int, judged: bool) -> bytes:
     return frame("strobe", serial, arrays, **told)
 
 
-def too_long(state: State, motion: Motion) -> str:
+def too_long(motion: Motion) -> str:
     """Return why a run is too much work to be repeated for a map and a strobe, or nothing."""
-    if motion.steps <= bounds.MOST_STEPS:
+    if motion.steps <= bounds.MOST_MAP_STEPS:
         return ""
-    return (
-        f"the run took {motion.steps} steps, expected at most {bounds.MOST_STEPS} for a map and a strobe;"
-        f" {len(state.drive.times)} firings over {end_of_run(state.drive, None):.3g} s"
-    )
+    most = bounds.MOST_MAP_STEPS
+    return f"the run took {motion.steps} steps, expected at most {most} for a map, a strobe and a line"

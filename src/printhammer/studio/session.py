@@ -111,7 +111,7 @@ class Session:
         try:
             data, motion = engine.motion_frame(state, serial)
             self._tell(data)
-            if reason := engine.too_long(state, motion):
+            if reason := engine.too_long(motion):
                 raise InputError(reason)
             if "map" in state.views and self._sent.get("preview") != engine.map_key(state):
                 # Never given up: a coarse map is to arrive while a slider moves. The browser draws meanwhile,
