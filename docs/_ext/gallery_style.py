@@ -20,6 +20,7 @@ ORDER = (
     "backstops",
     "damping_materials",
     "energy_ledger",
+    "compensation_table",
     "least_work",
     "sensitivities",
     "inch_pound_file",

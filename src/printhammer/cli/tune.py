@@ -14,6 +14,8 @@ from printhammer.cli.run import HAMMER, HammerArgument, UnitsOption
 from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.table import Table
 
     from printhammer.control.table import CompensationTable
@@ -70,7 +72,6 @@ def tune(
     """
     from rich.markup import escape
 
-    from printhammer.cli.basins import _computed
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.control.table_files import SUFFIXES
     from printhammer.control.table_report import judge_table
@@ -138,6 +139,18 @@ def tune(
         off = ", ".join(f"{one:g} Hz" for one in found.rates[~found.passed[1, 0]].tolist())
         complain(f"with the table not all dots are within the limits at {off}")
         raise typer.Exit(1)
+
+
+def _computed(name: str, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:
+    """Compute, and show how far it is, where somebody looks."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn(name), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(name, total=None)
+        return compute(lambda done, total: bar.update(task, completed=done, total=total))
 
 
 def _several(text: str) -> list[float]:

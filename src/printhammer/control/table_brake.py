@@ -104,7 +104,9 @@ def braked(work: Work, period: float) -> Braked | None:
     chosen = [cells[k] for k in best]
     worst = _off(work, period, chosen, _FIRST)
     place = int(np.argmin(worst))
-    return Braked(*chosen[place], off=float(worst[place])) if np.isfinite(worst[place]) else None
+    delay, brake, fired, width = chosen[place]
+    found = Braked(delay, brake, fired, width, float(worst[place]))
+    return found if np.isfinite(found.off) else None
 
 
 def _off(

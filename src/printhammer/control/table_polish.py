@@ -191,7 +191,7 @@ def _newton(
         # Dots before the last one may have the same history.
         work.advance[rows, columns], work.width[rows, columns] = now.T
         shifts = [(0.0, 0.0)] if turn == ROUNDS else [(0.0, 0.0), (_STEP, 0.0), (0.0, -_STEP)]
-        off = last_dots(work, [cells[k] for k in active], now[active], shifts, dense=dense)
+        off = last_dots(work, [cells[k] for k in active.tolist()], now[active], shifts, dense=dense)
         told()
         here = off[:, 0]
         size = np.abs(here).max(axis=(1, 2))
@@ -241,7 +241,7 @@ def _step(slopes: FloatArray, off: FloatArray, least: float, most: float) -> Flo
     if wider != change[1]:
         rest = off + slopes[:, 1] * wider
         change = np.array([-float(slopes[:, 0] @ rest) / float(slopes[:, 0] @ slopes[:, 0]), wider])
-    return np.clip(change, -_LONGEST_STEP, _LONGEST_STEP)
+    return np.asarray(np.clip(change, -_LONGEST_STEP, _LONGEST_STEP))
 
 
 def last_dots(

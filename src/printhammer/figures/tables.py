@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from printhammer.control.table import CompensationTable
     from printhammer.control.table_report import TableReport
+    from printhammer.segments import FloatArray
 
 _FEW: Final = 4
 _LINES: Final = (BLUE, ORANGE, GREEN, YELLOW)
@@ -157,7 +158,7 @@ def plot_report(report: TableReport) -> Figure:
         bars.bar(places + 0.4 * number - 0.2, share[number], 0.38, color=colour, label=name)
     bars.set_xticks(places, [name.replace(" %", "%") for name in report.hammers], fontsize=TINY, rotation=30)
     for text in bars.get_xticklabels():
-        text.set_ha("right")
+        text.set_horizontalalignment("right")
     bars.set_ylabel("Dots within limits  [%]")
     bars.set_xlim(-0.6, places.size - 0.4)
     bars.set_ylim(0.0, 119.0)
@@ -182,13 +183,13 @@ def plot_report(report: TableReport) -> Figure:
     return figure
 
 
-def _histogram(ax: Axes, values: np.ndarray, limit: float, name: str) -> None:  # type: ignore[type-arg]
+def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
     """Draw how far dots are off, what is beyond three limits in the outermost bins."""
     edges = np.linspace(-3.0 * limit, 3.0 * limit, _BINS + 1)
     ax.axvspan(-limit, limit, color=FAINT, lw=0.0, zorder=0)
     for row, colour, style in zip(values, (ORANGE, BLUE), ("--", "-"), strict=True):
         known = np.clip(row[~np.isnan(row)], edges[0], edges[-1])
-        ax.hist(known, bins=edges, histtype="step", color=colour, ls=style, lw=THIN)
+        ax.hist(known, bins=edges.tolist(), histtype="step", color=colour, ls=style, lw=THIN)
     ax.set_yscale("log")
     ax.set_xlabel(name)
     ax.set_ylabel("Dots of the cycle")
