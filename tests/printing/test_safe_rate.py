@@ -195,3 +195,21 @@ def test_bad_grids_are_refused(hammer: "ph.Hammer", options: dict[str, object], 
 def test_perturbations_that_make_no_sense_are_refused(by: Perturbation, said: str) -> None:
     with pytest.raises(ph.InputError, match=said):
         perturbed(made_of(spring=preload(-1.0)), by)
+
+
+def test_drives_may_fire_waveforms_of_their_own(hammer: "ph.Hammer") -> None:
+    """The same pulses as a sequence, which runs through another kernel path, are judged alike."""
+
+    def sequence(driven: "ph.Hammer", patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
+        drives = open_loop(driven, patterns, rate)
+        return [ph.PulseSequence([driven.waveform] * len(drive.times), at=drive.times) for drive in drives]
+
+    few = {"first": 800.0, "last": 800.0, "tolerance": 1e-8}
+    ours, theirs = safe_rate(hammer, sequence, **few), safe_rate(hammer, **few)
+    assert ours.cycle_run.tolist() == theirs.cycle_run.tolist()
+    np.testing.assert_allclose(ours.force_high, theirs.force_high, atol=1e-4)
+    np.testing.assert_allclose(ours.arrival_low, theirs.arrival_low, atol=1e-8)
+    assert ours.failure == theirs.failure or (ours.failure.slot, ours.failure.fault) == (
+        theirs.failure.slot,
+        theirs.failure.fault,
+    )

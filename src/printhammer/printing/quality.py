@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.coil_work import squared_current
 from printhammer.drive_input import read_positive
 from printhammer.ensemble import DotTable
 from printhammer.errors import InputError
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.coil_work import CoilWork
     from printhammer.contacts import Dot
     from printhammer.drive import Drive
     from printhammer.hammer import Hammer
@@ -114,8 +114,8 @@ class Quality:
         What the backstop bears in the whole run, lead-in and settle-out included.
     energy : Ledger
         Of the whole run.
-    coil_work : CoilWork
-        Of the whole run.
+    heat : float or None
+        Of the coil in the whole run, J; None for a hammer without `coil.resistance`.
     fired : int
         Number of firings in the whole run.
     pitch : float
@@ -144,7 +144,7 @@ class Quality:
     fault: npt.NDArray[np.int64] = field(repr=False)
     wear: Wear
     energy: Ledger
-    coil_work: CoilWork
+    heat: float | None
     fired: int
     pitch: float
     status: str
@@ -217,19 +217,18 @@ class Quality:
 
     @property
     def work(self) -> float:
-        """Net work of the coil for each firing, J."""
-        return self.coil_work.net / self.fired
+        """Net work of the drive for each firing, J."""
+        return (self.energy.coil_work + self.energy.drive_work) / self.fired
 
     @property
     def mean_power(self) -> float:
-        """Net work of the coil over the duration of all slots, W."""
-        return self.coil_work.net * self.rate / len(self.wanted)
+        """Net work of the drive over the duration of all slots, W."""
+        return self.work * self.fired * self.rate / len(self.wanted)
 
     @property
     def mean_heat(self) -> float | None:
         """Heat of the coil over the duration of all slots, W; None without `coil.resistance`."""
-        heat = self.coil_work.heat
-        return None if heat is None else heat * self.rate / len(self.wanted)
+        return None if self.heat is None else self.heat * self.rate / len(self.wanted)
 
     def to_dataset(self) -> xr.Dataset:
         """Return the dots as a Dataset over `dot`, with units, provenance and all figures as attributes."""
@@ -322,7 +321,7 @@ def quality(
         fault=found.faults[0, judged],
         wear=wear_of(motion.contacts, hammer.mass),
         energy=motion.energy,
-        coil_work=motion.coil_work,
+        heat=_heat(hammer, drive, motion.end),
         fired=len(motion.dots),
         pitch=apart,
         status=motion.status,
@@ -363,6 +362,14 @@ def pattern_of(given: str | int | npt.ArrayLike) -> npt.NDArray[np.bool_]:
     if not found.any() or len(found) > MOST_SLOTS:
         raise InputError(f"pattern: expected at least one dot and at most {MOST_SLOTS} slots")
     return found
+
+
+def _heat(hammer: Hammer, drive: Drive, end: float) -> float | None:
+    """Return the heat of the coil up to the end of a run, J."""
+    if hammer.coil_resistance is None:
+        return None
+    squared = squared_current(drive, 0.0, end) if drive.quantity == "current" else 0.0
+    return hammer.coil_resistance * squared
 
 
 def spread_of(values: FloatArray) -> Spread:

@@ -169,7 +169,7 @@ def figures_of(found: Quality) -> dict[str, Any]:
         "backstop_loss_per_dot_J": found.backstop_loss,
         "backstop_largest_speed_m_per_s": found.wear.largest_speed,
         "backstop_largest_force_N": found.wear.largest_force,
-        "coil_work_per_dot_J": found.work,
+        "work_per_dot_J": found.work,
         "mean_power_W": found.mean_power,
         "mean_heat_W": found.mean_heat,
     }
