@@ -1,5 +1,6 @@
 """The studio end to end, in a headless Chromium."""
 
+import base64
 import json
 import re
 from pathlib import Path
@@ -12,6 +13,9 @@ from tests.studio.browser import Page
 from tests.studio.server import Studio
 
 import printhammer as ph
+from printhammer.studio.bundle import module
+from printhammer.studio.engine import motion_frame
+from printhammer.studio.session import answer, read_message
 
 CTRL, SHIFT = 2, 8
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
@@ -155,6 +159,93 @@ def test_the_keyboard_reaches_everything(page: Page) -> None:
     page.wait("getComputedStyle(document.querySelector('.studio')).getPropertyValue('--dark').trim() === '1'")
     page.press("?", "Slash", SHIFT)
     page.wait("document.querySelector('dialog').open")
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+def test_the_pulse_is_dragged_at_its_handles(page: Page) -> None:
+    before = page.run("window.studio.studio.described.waveform")
+    plane = page.box(".pulse canvas")
+    # The axes of the editor: 1.3 times the peak above, 0.12 times below, and a quarter more than the pulse.
+    pulse = page.run("window.studio.studio.frames.motion.pulse")
+    left, right, top, bottom = 42, 8, 6, 30
+    wide, high = plane["width"] - left - right, plane["height"] - top - bottom
+    span, peak = 1.25 * pulse["t"][-1], max(pulse["value"])
+
+    def place(t: float, value: float) -> tuple[float, float]:
+        down = top + high * (1.3 * peak - value) / (1.42 * peak)
+        return plane["x"] + left + wide * t / span, plane["y"] + down
+
+    start = place(before["width"], 0.0)
+    page.drag(start, (start[0] + 10, start[1]), (start[0] + 0.1 * wide, start[1]))
+    settled(page, "state.waveform !== null")
+    wider = state(page)["waveform"]
+    assert wider["width"] == pytest.approx(before["width"] + 0.1 * span, rel=0.02)
+    assert wider["amplitude"] == before["amplitude"]
+    page.run("document.querySelector('[aria-label=\"reset pulse\"]').click()")
+    settled(page, "state.waveform === null")
+    at = pulse["t"][pulse["value"].index(peak)]
+    page.drag(place(at, peak), place(at, 0.9 * peak), place(at, 0.5 * peak))
+    settled(page, "state.waveform !== null")
+    assert state(page)["waveform"]["amplitude"] == pytest.approx(0.5 * before["amplitude"], rel=0.05)
+    assert max(page.run("window.studio.studio.frames.motion.pulse.value")) == pytest.approx(
+        0.5 * peak, rel=0.05
+    )
+
+
+@pytest.mark.slow
+def test_presets_patterns_shapes_and_units(page: Page) -> None:
+    page.run(HELPERS)
+    page.run("window.studio.studio.store.set({ views: ['motion', 'energy'] }); 1")
+    page.run("helpers.choose('[aria-label=preset]', 'two pulses')")
+    settled(page, "state.pulses === 2")
+    assert len(page.run("window.studio.studio.frames.motion.fired")) == 2
+    page.run("helpers.type('#control-pattern', '1011')")
+    settled(page, "state.pattern === '1011'")
+    assert page.run("window.studio.studio.frames.motion.fired") == pytest.approx([0.0, 0.002, 0.003])
+    page.run("helpers.type('#control-pattern', '10x1')")
+    assert state(page)["pattern"] == "1011"
+    assert page.run("document.querySelector('#control-pattern').getAttribute('aria-invalid')") == "true"
+    page.run("helpers.choose('#control-shape', 'half-sine')")
+    settled(page, "state.waveform.shape === 'half-sine'")
+    page.run("helpers.choose('[aria-label=units]', '1')")
+    assert page.run("document.querySelector('[data-number=\"forms thickness\"]').value") == "7"
+    page.run("helpers.enter('[data-number=\"forms thickness\"]', '8')")
+    settled(page, "Math.abs(state.constants['pack.thickness'] - 8 * 25.4e-6) < 1e-9")
+    page.run("helpers.enter('[data-number=\"rate\"]', 'fast')")
+    assert page.run("document.querySelector('[data-number=rate]').value") == "1000"
+    assert page.complaints == []
+
+
+def answered(data: bytes) -> str:
+    """Return a script that hands a frame to the widget."""
+    return f"helpers.take('{base64.b64encode(data).decode()}')"
+
+
+@pytest.mark.slow
+def test_the_widget_is_the_same_page(opened_browser: Any) -> None:
+    """The one module of the widget, mounted on an empty page, sends and takes the messages of the page."""
+    page = opened_browser()
+    page.open("about:blank")
+    page.run(HELPERS)
+    page.run(
+        "window.sent = []; window.model = { get: (name) => ({ height: '700px', state: 'rate=900' })[name],"
+        " set() {}, save_changes() {}, on(_kind, take) { window.take = take; }, off() {},"
+        " send: (message) => window.sent.push(JSON.parse(message.text)) }; 1"
+    )
+    page.run(f"window.text = {json.dumps(module())}; 1")
+    page.run(
+        "import(URL.createObjectURL(new Blob([window.text], { type: 'text/javascript' })))"
+        ".then((made) => made.default.render({ model: window.model, el: document.body })).then(() => 1)"
+    )
+    assert page.run("document.querySelectorAll('.panel').length") == len(VIEWS)
+    kind, serial, content = read_message(json.dumps(page.run("window.sent[0]")))
+    page.run(answered(answer(kind, serial, content)))
+    kind, serial, found = read_message(json.dumps(page.wait("window.sent[1]")))
+    assert (kind, found.rate) == ("state", 900.0)
+    data, _ = motion_frame(found, serial)
+    page.run(answered(data))
+    page.wait("document.querySelector('.status').textContent.includes('steps')")
     assert page.complaints == []
 
 

@@ -29,6 +29,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   let follow = () => {};
   let writing = 0;
   let begun = false;
+  let patience = 0;
   const asked = new Map();
 
   const message = (kind, content) => {
@@ -48,6 +49,8 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     const now = studio.changedAt ?? performance.now();
     studio.sentAt.set(message("state", { state: studio.store.state }), now);
     studio.changedAt = null;
+    clearTimeout(patience);
+    patience = setTimeout(() => { if (studio.busy) studio.say("computing; laws that are new to this machine are compiled once, for some seconds"); }, 1200);
     for (const serial of studio.sentAt.keys()) if (serial < studio.serial - 64) studio.sentAt.delete(serial);
   };
 
