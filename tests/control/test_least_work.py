@@ -18,6 +18,7 @@ from printhammer.control import least_work as module
 from printhammer.control import least_work_search as search
 from printhammer.control.least_work import LeastWork, NoBurstError, steepest_rise
 from printhammer.control.least_work_bound import bound
+from printhammer.control.least_work_pulses import PulsePlan, widest
 from printhammer.control.least_work_rates import least_work_rates
 from printhammer.control.least_work_slot import NodeCurrent, SlotState, node_times, outcomes
 from printhammer.control.least_work_tables import save_least_work
@@ -140,6 +141,7 @@ def test_no_current_found_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"slew": -3.0}, "slew = -3.0"),
         ({"spacing": "0 us"}, "spacing"),
         ({"least": "noise"}, "least = 'noise'"),
+        ({"shape": "round"}, "shape = 'round'"),
     ],
 )
 def test_bad_input_is_one_sentence(options: dict[str, Any], said: str) -> None:
@@ -245,3 +247,33 @@ def test_works_against_the_rate(monkeypatch: pytest.MonkeyPatch, unsearched: Non
     for wrong in ([], "400 Hz"):
         with pytest.raises(ph.InputError, match="at least one rate"):
             least_work_rates(hammers.crude(), wrong)
+
+
+@pytest.mark.slow
+def test_pulses_of_the_hammer_swing_too() -> None:
+    found = ph.least_work(ph.load("hendriks-1983"), dots=1, shape="pulses", largest="2 A")
+    assert found.adequate == 1
+    assert found.drive.peak <= 2.0
+    assert {type(waveform) for waveform in found.drive.waveforms} == {type(found.hammer.waveform)}
+    assert 1.0 <= found.net_ratio < 1.1
+    assert found.positive_ratio >= found.bound_ratio
+    with pytest.raises(ph.InputError, match="no nodes"):
+        _ = found.nodes
+
+
+def test_the_widest_pulse_in_closed_form() -> None:
+    pulse = Rectangle(amplitude=3.0, width=1e-4, rise=2e-4, decay=2e-5)
+    assert widest(pulse, 2.0, 1.0) == pytest.approx(2e-4 * math.log(3.0), rel=1e-9)
+    assert widest(pulse, 3.5, 1e-3) == 1e-3
+    assert widest(HalfSine(amplitude=3.0, width=1e-4), 2.0, 1.0) == 0.0
+
+
+def test_pulses_without_a_width_are_refused() -> None:
+    record = Sampled.from_samples([0.0, 1e-4, 3e-4, 4e-4], [0.0, 2.0, 2.0, 0.0])
+    task: Any = SimpleNamespace(hammer=hammers.crude(), largest=2.0)
+    with pytest.raises(ph.InputError, match="no width to be sought"):
+        PulsePlan(task, record, 1e-3, 1e-4, 1e-3, 1e-3, 5e-5)
+    with pytest.raises(ph.InputError, match="no width keeps"):
+        ph.least_work(
+            hammers.crude().replace("waveform", HalfSine(amplitude=4.0, width=4e-4)), shape="pulses"
+        )

@@ -56,6 +56,10 @@ def energy(
     heat: Annotated[
         bool, typer.Option("--heat", help="Make the squared current least instead of the positive work.")
     ] = False,
+    pulses: Annotated[
+        bool,
+        typer.Option("--pulses", help="Only pulses of the hammer, of times and widths that are sought."),
+    ] = False,
     supply: Annotated[
         bool,
         typer.Option("--supply", help="Show as well how the burst fares with other currents, up to 3 %."),
@@ -102,6 +106,9 @@ def energy(
     count = whole(dots, "dots")
     assert count is not None
     options |= {"dots": count, "largest": largest, "least": "heat" if heat else "positive work"}
+    options["shape"] = "pulses" if pulses else "free"
+    if pulses and any(path.suffix.lower() == ".csv" for path in wanted):
+        raise InputError("--pulses is given, expected no current (.csv) beside it")
     many = None if rates is None else _rates(rates)
     if many is not None and (supply or any(path.suffix.lower() == ".csv" for path in wanted)):
         raise InputError("--rates is given, expected neither --supply nor a current (.csv) beside it")
@@ -141,9 +148,8 @@ def told(found: LeastWork, units: Units) -> Table:
         f", the weakest with {found.forces.min():.4f} of the single pulse's force" if found.contacts else ""
     )
     table.add_row("dots", f"{found.adequate} of {found.count} adequate at {found.rate:.6g} Hz{weakest}")
-    table.add_row(
-        "current", f"at most {with_unit(found.drive.peak, 'current', units)}, {found.slew:.4g} A/s allowed"
-    )
+    allowed = f"{found.slew:.4g} A/s allowed" if found.shape == "free" else "pulses of the hammer"
+    table.add_row("current", f"at most {with_unit(found.drive.peak, 'current', units)}, {allowed}")
     table.add_row("at rest", f"after {with_unit(found.rest_time, 'time', units)}")
     table.add_row("absorbed by the pack", with_unit(ledger.pack_loss, "energy", units))
     table.add_row("lost at the backstop", with_unit(ledger.backstop_loss, "energy", units))

@@ -22,6 +22,7 @@ import numpy as np
 
 from printhammer.control.coil_force import CoilForce
 from printhammer.control.least_work_bound import Bound, bound
+from printhammer.control.least_work_pulses import PulsePlan
 from printhammer.control.least_work_search import Task, landing_current, printing_current
 from printhammer.control.least_work_slot import SlotState
 from printhammer.drive import PulseTrain
@@ -66,6 +67,10 @@ LEASTS: Final = get_args(Least)
 SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
 """Relative changes of the current under which a burst is looked at unless told otherwise."""
 
+Shape = Literal["free", "pulses"]
+SHAPES: Final = get_args(Shape)
+"""What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths."""
+
 _PAST_PEAK: Final = 1.2
 _SPARE: Final = 5e-4
 _LEAD: Final = 2.0
@@ -88,7 +93,7 @@ class LeastWork:
     hammer : Hammer
         The hammer.
     drive : PulseSequence
-        The current that was found, fired slot by slot; each dot belongs to a firing.
+        The current that was found, fired slot by slot.
     motion : Motion
         The whole burst under that drive, at the tolerance of the ledger, until it has settled out.
     rate : float
@@ -101,6 +106,8 @@ class LeastWork:
         Bounds on the current, A, and on its slope, A/s, of either sign.
     least : str
         What was made least, see `LEASTS`.
+    shape : str
+        What the current was allowed to be, see `SHAPES`; of pulses `slew` is no bound.
     slots : array, shape (count,)
         Times at which the dots were to touch, s.
     single : Nominal
@@ -122,6 +129,7 @@ class LeastWork:
     largest: float
     slew: float
     least: Least
+    shape: Shape
     slots: FloatArray = field(repr=False)
     single: Nominal = field(repr=False)
     single_work: CoilWork = field(repr=False)
@@ -130,7 +138,15 @@ class LeastWork:
 
     @property
     def nodes(self) -> tuple[list[float], list[float]]:
-        """Times, s, and currents, A, of the nodes, between which the current runs in straight lines."""
+        """Times, s, and currents, A, of the nodes, between which the current runs in straight lines.
+
+        Raises
+        ------
+        InputError
+            The burst is made of pulses, which have no nodes.
+        """
+        if self.shape != "free":
+            raise InputError(f"shape = {self.shape!r}: the current has no nodes, expected a free one")
         times, values = [0.0], [0.0]
         for at, waveform in zip(self.drive.times.tolist(), self.drive.waveforms, strict=True):
             assert isinstance(waveform, Sampled)
@@ -234,6 +250,7 @@ def least_work(
     largest: float | str = 2.0,
     slew: float | None = None,
     least: Least = "positive work",
+    shape: Shape = "free",
     spacing: float | str | None = None,
     tolerance: float = 1e-9,
     progress: Callable[[int, int], None] | None = None,
@@ -257,6 +274,9 @@ def least_work(
         hammer.
     least : str, optional
         "positive work" of the coil, or its "heat".
+    shape : str, optional
+        "free": any current within the bounds; "pulses": pulses of the hammer, of which times and widths are
+        sought, see `printhammer.control.least_work_pulses`. `slew` and `spacing` do not matter then.
     spacing : float or str, optional
         Time between nodes of the current, s, or text with a unit, rounded so that a period holds a whole
         number of them; by default `SPACING` of the time in which a single pulse indents the pack.
@@ -286,6 +306,8 @@ def least_work(
         raise InputError(f"force = {share!r}, expected at most 2 times that of the single pulse")
     if least not in LEASTS:
         raise InputError(f"least = {least!r}, expected one of {', '.join(LEASTS)}")
+    if shape not in SHAPES:
+        raise InputError(f"shape = {shape!r}, expected one of {', '.join(SHAPES)}")
     apart = None if spacing is None else read_positive(spacing, "s", "spacing")
     for part in ("magnet", "spring", "backstop", "pack"):
         if getattr(hammer, part) is None:
@@ -294,11 +316,13 @@ def least_work(
     if waveform.quantity != "current":
         raise InputError(f"{hammer.path}: the waveform is a force, expected a current, which does work")
     steepest = steepest_rise(waveform) if slew is None else read_number(slew, "A/s", "slew")
-    if slew is None and not math.isfinite(steepest):
+    if shape == "pulses":
+        steepest = math.inf
+    elif slew is None and not math.isfinite(steepest):
         raise InputError(
             f"{hammer.path}: the waveform jumps, expected slew, the steepest slope of the current"
         )
-    if not (math.isfinite(steepest) and steepest > 0.0):
+    elif not (math.isfinite(steepest) and steepest > 0.0):
         raise InputError(
             f"slew = {steepest!r} A/s, expected a positive number, the steepest slope of a current"
         )
@@ -311,12 +335,20 @@ def least_work(
     )
     indenting = _loading_time(alone)
     apart = SPACING * indenting if apart is None else apart
-    plan = _Plan(task, period, _PAST_PEAK * indenting, apart, single.flight_time)
+    past, flight = _PAST_PEAK * indenting, single.flight_time
+    plan: _Plan | PulsePlan
+    if shape == "free":
+        plan = _Plan(task, period, past, apart, flight)
+    else:
+        lead = max(period, _LEAD * flight + past)
+        plan = PulsePlan(task, waveform, period, past, lead, _LANDING * flight, rest_state(hammer))
+    what = f"current of at most {top:g} A and {steepest:.4g} A/s was found that prints"
+    if shape == "pulses":
+        what = f"pulses of at most {top:g} A were found that print"
     for slot in range(count):
         if not plan.add_dot():
             raise NoBurstError(
-                f"no current of at most {top:g} A and {steepest:.4g} A/s was found that prints dot"
-                f" {slot + 1} of {count} with {share:g} of the force of the single pulse at"
+                f"no {what} dot {slot + 1} of {count} with {share:g} of the force of the single pulse at"
                 f" {1.0 / period:.6g} Hz"
             )
         if progress is not None:
@@ -336,6 +368,7 @@ def least_work(
         largest=top,
         slew=steepest,
         least=least,
+        shape=shape,
         slots=np.array(plan.touches),
         single=single,
         single_work=alone.coil_work,

@@ -64,13 +64,19 @@ def supply_check(found: LeastWork, changes: npt.ArrayLike) -> SupplyCheck:
     result = Ensemble(found.hammer, drives, found.motion.end).run(dots=True, engine="plain")
     dots = result.dots
     assert dots is not None
-    force = np.nan_to_num(dots.peak_force / found.single.force)
-    good = dots.struck & (dots.extra_contacts == 0) & (force >= found.force)
-    late = np.abs(dots.fired_at + dots.flight_time - found.slots)
+    touched = np.where(dots.struck, dots.fired_at + dots.flight_time, np.inf)
+    away = np.abs(touched[:, :, np.newaxis] - found.slots)
+    # The dot of a slot is the touch nearest to it, wherever its pulse was fired.
+    which = away.argmin(axis=1)
+    late = away.min(axis=1)
+    rows = np.arange(len(drives))[:, np.newaxis]
+    made = late < 0.5 / found.rate
+    force = np.where(made, np.nan_to_num(dots.peak_force[rows, which]) / found.single.force, 0.0)
+    good = made & (dots.extra_contacts[rows, which] == 0) & (force >= found.force)
     return SupplyCheck(
         changes=factors - 1.0,
         adequate=good.sum(axis=1),
         weakest=force.min(axis=1),
-        spread=late.max(axis=1),
+        spread=np.where(made.all(axis=1), late.max(axis=1), np.nan),
         status=np.array(result.status_names, "U16"),
     )

@@ -72,6 +72,7 @@ def least_work_dataset(found: LeastWork) -> xr.Dataset:
         "largest_current": found.largest,
         "largest_slew": found.slew,
         "least": found.least,
+        "shape": found.shape,
         "adequate_dots": found.adequate,
         "net_work": work.net,
         "positive_work": work.positive,
