@@ -14,9 +14,8 @@ import numpy as np
 from printhammer.control.sensor import run_key
 from printhammer.control.switched import Switched
 from printhammer.drive_sequence import PulseSequence
-from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 from printhammer.equilibrium import rest_state
-from printhammer.kernel.modes import LOADING, RELOADING, UNLOADING
 from printhammer.printing.slots import slot_times
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ REMEMBERED: Final = 4
 """Number of the latest pulses of which anything can be left."""
 
 _APART: Final = 1e-9
-_BRANCHES: Final = (LOADING, UNLOADING, RELOADING)
+_BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
 
 
 @dataclass

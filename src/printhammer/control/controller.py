@@ -40,8 +40,10 @@ WINDOW: Final = 120e-6
 _SPEED_ERROR: Final = 0.03
 _PLACE_ERROR: Final = 0.03
 _LEAST_ERROR: Final = 1e-4
-_CLAMP: Final = 0.5
-_CLAMPED: Final = 0.5
+_CLAMP: Final = 1.0
+_CLAMPED: Final = 0.6
+_LONGEST: Final = 1.2
+_FADED: Final = 3.0
 _CLEAR: Final = 0.35
 _POLICIES: Final = 8
 
@@ -164,7 +166,7 @@ class Controller:
                 # The push has no end yet.
                 del pulse.at[1:], pulse.levels[1:]
             if rests[k] or not np.isfinite(cost[k]):
-                self._land(loop, pulse, *(float(values[k]) for values in landed))
+                self._land(loop, dot, *(float(values[k]) for values in landed))
                 if dot + 1 < len(loop.due):
                     self.launch(loop, dot + 1)
                 continue
@@ -187,14 +189,20 @@ class Controller:
             pulse.switch(max(loop.touch, loop.time), self.driver.current)
         pulse.switch(max(loop.touch + release, loop.time), back)
 
-    def _land(self, loop: Loop, pulse: Pulse, release: float, brake: float, width: float) -> None:
+    def _land(self, loop: Loop, dot: int, release: float, brake: float, width: float) -> None:
         """Print, and brake on the way back."""
+        pulse = loop.pulses[-1]
         self._push(loop, pulse, 0.0 if np.isnan(release) else release, 0.0)
         if not np.isnan(brake):
             pulse.switch(loop.touch + brake, self.driver.current)
             # Whatever is left of the motion is pressed out of it against the backstop.
             pulse.switch(loop.touch + brake + width, -_CLAMP * self.driver.current)
-            pulse.switch(loop.touch + brake + width + _CLAMPED * self.single.flight_time, 0.0)
+            single = self.single.flight_time
+            end = min(brake + width + _CLAMPED * single, self.landing.settled - _FADED * self.driver.edge)
+            if dot + 1 < len(loop.due):
+                later = float(loop.due[dot + 1]) - self.start.flight - _FADED * self.driver.edge - loop.touch
+                end = max(end, min(later, brake + width + _LONGEST * single))
+            pulse.switch(loop.touch + end, 0.0)
 
     def _landings(self, kind: Any, speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return release, begin and width of the brake pulse for some touches."""

@@ -133,8 +133,12 @@ def touch_from_samples(
         determinant = s0 * s2 - s1 * s1
         place = (s2 * b0 - s1 * b1) / determinant
         speed = (s0 * b1 - s1 * b0) / determinant
-    late = (front - place) / np.maximum(speed, _SLOWEST)
-    return reference + late, speed
+    speed = np.maximum(speed, _SLOWEST)
+    bend = accelerations(np.full((len(reference), 1), front), reference[:, np.newaxis])[:, 0]
+    late = np.zeros_like(place)
+    for _ in range(_ROUNDS):
+        late = (front - place - 0.5 * bend * late**2) / speed
+    return reference + late, speed + bend * late
 
 
 def _twice_integrated(grid: FloatArray, values: FloatArray) -> FloatArray:

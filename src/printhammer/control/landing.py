@@ -31,7 +31,7 @@ _NEAR: Final = np.linspace(-1.0, 1.0, 7)
 _FINER: Final = (0.034, 0.01, 0.003)
 _FALL: Final = 1.0 / 3.0
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
-_SETTLED: Final = 2.85
+_SETTLED: Final = 2.5
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ class Sensor:
             least = "above" if name == "interval" else "not below"
             if not (math.isfinite(value) and value >= 0.0 and (value > 0.0 or name != "interval")):
                 raise InputError(f"sensor: {name} = {value!r}{unit} is expected to be a number {least} 0")
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
+        if type(self.seed) is not int or self.seed < 0:
             raise InputError(f"sensor: seed = {self.seed!r} is expected to be a whole number not below 0")
 
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> npt.NDArray[np.int64]:
