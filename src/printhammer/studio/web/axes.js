@@ -25,7 +25,7 @@ export function widened(low, high, part = 0.04) {
 }
 
 /**
- * Draw axes; x and y are { low, high, label, factor } with the factor from SI to what is written.
+ * Draw axes; x and y are { low, high, label, factor } with the factor from SI to what is written; x also { space, whole }.
  * Returns the pixel of a quantity, the quantity of a pixel, and the box.
  */
 export function axes(pen, width, height, x, y, margin = MARGIN) {
@@ -41,6 +41,7 @@ export function axes(pen, width, height, x, y, margin = MARGIN) {
   pen.textAlign = "center";
   pen.textBaseline = "top";
   for (const tick of ticks(x.low * x.factor, x.high * x.factor, box.w, x.space ?? 60)) {
+    if (x.whole && !Number.isInteger(tick)) continue;
     const place = X(tick / x.factor);
     line(pen, place, box.y, place, box.y + box.h);
     pen.fillText(digits(Number(tick.toPrecision(6))), place, box.y + box.h + 4);

@@ -12,9 +12,10 @@ export function energyView(body, studio) {
     const c = colours();
     const { dots, energy } = frame;
     const unit = unitOf("J");
+    const of = (name) => digits(energy[name] * unit.factor, 3);
     const most = Math.max(...dots.map((dot) => dot.loading_work ?? 0), 1e-12);
     const margin = { left: 46, right: 10, top: 38, bottom: 32 };
-    const plane = axes(pen, width, height, { low: 0.5, high: dots.length + 0.5, label: "firing", factor: 1, space: 30 }, { low: 0, high: 1.08 * most, label: `energy, ${unit.name}`, factor: unit.factor }, margin);
+    const plane = axes(pen, width, height, { low: 0.5, high: dots.length + 0.5, label: "firing", factor: 1, space: 30, whole: true }, { low: 0, high: 1.08 * most, label: `energy, ${unit.name}`, factor: unit.factor }, margin);
     const wide = Math.min((plane.box.w / dots.length) * 0.36, 16);
     dots.forEach((dot, k) => {
       const middle = plane.X(k + 1);
@@ -31,7 +32,7 @@ export function energyView(body, studio) {
     pen.textBaseline = "top";
     pen.fillStyle = c.ink;
     let place = 6;
-    pen.fillText(`coil ${shown(energy.coil_work, "J", 3)}, pack ${shown(energy.pack_loss, "J", 3)}, backstop ${shown(energy.backstop_loss, "J", 3)}`, 6, 20);
+    pen.fillText(`coil ${of("coil_work")}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")} ${unit.name}`, 6, 20);
     for (const [colour, text] of [[c.x, "into the pack"], [c.pack, "kept by it"]]) {
       pen.fillStyle = colour;
       pen.fillRect(place, 6, 9, 9);

@@ -49,7 +49,7 @@ export function buildControls(holder, studio) {
     if (!sections.has(constant.section)) sections.set(constant.section, group(holder, TITLES[constant.section] ?? constant.section, false));
     add(sections.get(constant.section), {
       ...constant, id: constant.key, name: constant.symbol, title: constant.meaning,
-      hint: `${constant.key}: ${constant.meaning}. ${constant.equation}. ${constant.status}: ${constant.source}.`,
+      hint: `${constant.key}: ${constant.meaning}${constant.unit === "1" ? "" : `, ${constant.unit}`}. ${constant.equation}. ${constant.status}: ${constant.source}.`,
       get: (state) => state.constants[constant.key] ?? constant.value,
       set: (value) => ({ constants: { ...studio.store.state.constants, [constant.key]: value } }),
       reset: () => {
@@ -138,6 +138,7 @@ function sliderRow(options, studio) {
     slider.setAttribute("aria-valuetext", shown(number, unit));
     if (document.activeElement !== box) box.value = digits(number * unitOf(unit).factor, whole ? 6 : 5);
     sign.textContent = unitOf(unit).name;
+    sign.title = unitOf(unit).name;
     const start = options.value ?? null;
     row.classList.toggle("changed", start !== null && Math.abs(number - start) > 1e-9 * Math.abs(start));
   }

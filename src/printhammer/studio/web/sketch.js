@@ -52,7 +52,9 @@ export function sketchView(body, studio) {
     const c = colours();
     const { backstop, front, platen } = frame.places;
     const known = [backstop, front, platen, ...frame.data.x.subarray(0, 1)].filter((place) => place !== null);
-    const [low, high] = [Math.min(...known), Math.max(...known)];
+    const low = Math.min(...known);
+    // Without a platen the pack has no end.
+    const high = platen === null && front !== null ? front + 0.6 * (front - low) : Math.max(...known);
     const way = high - low || 1e-4;
     const [left, right] = [0.34 * width, 0.9 * width];
     const X = (x) => left + ((x - low) / way) * (right - left);
@@ -65,7 +67,7 @@ export function sketchView(body, studio) {
     if (platen !== null) block(pen, X(platen), middle - 1.3 * tall, 0.06 * width, 2.6 * tall, c.backstop, "platen", c);
     if (front !== null) {
       const touch = Math.max(x, front);
-      const thick = Math.max(X(platen ?? front + 0.2 * way) - X(front), 3);
+      const thick = Math.max(X(platen ?? high) - X(front), 3);
       pen.fillStyle = c.pack;
       pen.globalAlpha = 0.35;
       pen.fillRect(X(front), middle - 1.2 * tall, thick, 2.4 * tall);
