@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
     from printhammer.waveforms import Waveform
 
-QUIET: Final = 2e-3
+QUIET: Final = 2e-4
 """Distance from rest below which the hammer counts as settled, in parts of the way to the pack."""
 
 _LONGEST: Final = 20e-3

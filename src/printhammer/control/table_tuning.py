@@ -50,7 +50,7 @@ SPREAD: Final = (
 """By how much the hammers differ that a robust table is tuned on, beside the hammer itself."""
 
 _FREE: Final = 0.2
-_HOPELESS: Final = 3.0
+_HOPELESS: Final = 2.0
 _USABLE: Final = 0.9
 
 
@@ -141,7 +141,7 @@ def tune(
         tolerance=tolerance,
         threads=threads,
     )
-    work = _tuned(blank, grid, brake, steps)
+    work = _tuned(blank, grid, brake, steps, open_ended=asked is None)
     lost = np.flatnonzero(~np.isfinite(work.deviation.max(axis=1)))
     if asked is None:
         work = subset(work, np.arange(_kept(work)))
@@ -191,7 +191,9 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
     return found
 
 
-def _tuned(blank: Work, rates: FloatArray, brake: bool, steps: Callable[[], None]) -> Work:
+def _tuned(
+    blank: Work, rates: FloatArray, brake: bool, steps: Callable[[], None], *, open_ended: bool
+) -> Work:
     """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
 
     Parameters
@@ -204,6 +206,8 @@ def _tuned(blank: Work, rates: FloatArray, brake: bool, steps: Callable[[], None
         Whether brake pulses may be used.
     steps : callable
         Called after each step of the work.
+    open_ended : bool
+        Whether rates at which nothing comes near are left out.
     """
     own: Any = blank.pulse
     shape = rates.size, entries_of(blank.gaps, blank.reach)
@@ -212,6 +216,10 @@ def _tuned(blank: Work, rates: FloatArray, brake: bool, steps: Callable[[], None
     work.width[:] = own.width
     _begin(work)
     steps()
+    hopeless = np.flatnonzero(~(work.deviation.max(axis=1) <= _HOPELESS))
+    if open_ended and hopeless.size:
+        # A table without given rates ends below the first at which no pulse comes near.
+        work = subset(work, np.arange(hopeless[0]))
     polish_level(work, level_of(work, 1), steps)
     look_at(work, level_of(work, 1))
     if brake:
@@ -239,9 +247,12 @@ def _begin(work: Work) -> None:
             if not 0.0 < period <= work.single.settled:
                 continue
             cell = guess(planes, period, work.limits)
-            if cell is not None:
+            if cell is None:
+                work.deviation[row, column] = np.inf
+            else:
                 work.advance[row, column] = period - cell.fired
                 work.width[row, column] = cell.width
+                work.deviation[row, column] = cell.off
 
 
 def _with_brakes(work: Work, steps: Callable[[], None]) -> None:
