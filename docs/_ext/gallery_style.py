@@ -22,6 +22,7 @@ ORDER = (
     "energy_ledger",
     "compensation_table",
     "least_work",
+    "feedback",
     "sensitivities",
     "inch_pound_file",
     "measured_magnet",

@@ -49,6 +49,8 @@ BURST: Final = "11101101"
 MOST_GAPS: Final = 500
 """Number of gaps above which a double-pulse test is refused."""
 
+_GAPS: Final = (1.5, 6.0, 46)
+
 
 class FeedbackStrategy:
     """Feedback as a way to drive a hammer, see `printhammer.printing.strategy.Strategy`.
@@ -225,8 +227,8 @@ def feedback(
     beside : sequence of Strategy, optional
         Further ways to drive, for instance a compensation table.
     gaps : array, optional
-        Times between the two slots of the double-pulse test, s; by default 40 from the period on up to three
-        times the shortest at which the flight of a single pulse fits.
+        Times between the two slots of the double-pulse test, s; by default 46 from one and a half to six
+        times the flight time of the single pulse.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
     threads : int, optional
@@ -248,10 +250,12 @@ def feedback(
     seeing = Sensor() if sensor is None else sensor
     bounds = Limits() if limits is None else limits
     real = hammer if driven is None else driven
+    between = None if gaps is None else _checked_gaps(gaps)
     controller = Controller(hammer, driver, bounds, threads=threads)
     own = FeedbackStrategy(controller, seeing, tolerance=tolerance, threads=threads)
     every: list[Strategy] = [open_loop, *beside, own]
-    between = _gaps(gaps, controller.single.flight_time)
+    if between is None:
+        between = np.linspace(*_GAPS) * controller.single.flight_time
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     patterns = from_rest(every=False)
     single = controller.single
@@ -282,10 +286,8 @@ def feedback(
     )
 
 
-def _gaps(given: npt.ArrayLike | None, flight: float) -> FloatArray:
-    if given is None:
-        return np.linspace(1.5, 6.0, 46) * flight
-    gaps = np.atleast_1d(np.asarray(given, dtype=np.float64))
+def _checked_gaps(given: npt.ArrayLike) -> FloatArray:
+    gaps = np.asarray(given, dtype=np.float64)
     if gaps.ndim != 1 or not 0 < gaps.size <= MOST_GAPS or not (np.isfinite(gaps) & (gaps > 0.0)).all():
         raise InputError(f"gaps = {given!r}, expected 1 to {MOST_GAPS} positive times, s")
     return gaps

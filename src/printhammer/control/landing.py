@@ -31,7 +31,7 @@ _NEAR: Final = np.linspace(-1.0, 1.0, 7)
 _FINER: Final = (0.034, 0.01, 0.003)
 _FALL: Final = 1.0 / 3.0
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
-_SETTLED: Final = 2.5
+_SETTLED: Final = 0.65
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,8 @@ def landing(
         if finer is not None:
             tried = best[rows][:, np.newaxis, :] + finer * near
     left[np.isinf(left)] = np.nan
-    return Landing(release, force, best[:, 0] * scale, best[:, 1] * scale, left, _SETTLED * scale)
+    braked = float(np.nanmedian(best.sum(axis=1))) if len(rows) else float(_STARTS[-1])
+    return Landing(release, force, best[:, 0] * scale, best[:, 1] * scale, left, (braked + _SETTLED) * scale)
 
 
 def _left(

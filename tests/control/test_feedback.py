@@ -1,0 +1,127 @@
+"""Feedback on a hammer: the drives of the closed loop, the comparison, pictures, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from tests import hammers
+
+import printhammer as ph
+from printhammer.cli.main import main
+from printhammer.control.closed_loop import closed_loops
+from printhammer.control.controller import Controller
+from printhammer.control.driver import driver_of
+from printhammer.control.feedback import Feedback, FeedbackStrategy
+from printhammer.control.sensor import Sensor
+from printhammer.printing.limits import Limits
+from printhammer.printing.perturbation import Perturbation, perturbed
+from printhammer.printing.trial import Case, attempt
+
+CURRENT = 2.0
+PATTERNS = [(0, 1, 2, 3), (0, 2, 3), (0, 1, 4)]
+PERFECT = Sensor(noise=0.0, step=0.0)
+
+
+@pytest.fixture(scope="module")
+def controller() -> Controller:
+    hammer = hammers.crude()
+    return Controller(hammer, driver_of(hammer, CURRENT))
+
+
+@pytest.mark.slow
+def test_a_perfect_sensor_tells_when_and_how_fast_the_pack_is_touched(controller: Controller) -> None:
+    loop = closed_loops(controller.hammer, controller, PERFECT, PATTERNS[:1], 900.0)[0]
+    drive = loop.drive(controller.driver.edge)
+    motion = ph.simulate(controller.hammer, drive, duration=float(loop.due[-1]) + 2e-3)
+    touches = [contact for contact in motion.contacts if contact.surface == "pack"]
+    assert len(touches) == len(loop.touches) == len(loop.due)
+    for contact, (time, speed) in zip(touches, loop.touches, strict=True):
+        assert contact.t_in == pytest.approx(time, abs=1e-6)
+        assert contact.v_in == pytest.approx(speed, rel=0.02)
+
+
+@pytest.mark.slow
+def test_the_drive_prints_within_limits_and_bounds(controller: Controller) -> None:
+    strategy = FeedbackStrategy(controller, Sensor())
+    for real in (controller.hammer, perturbed(controller.hammer, Perturbation(current=0.03))):
+        case = Case(real, controller.single, 900.0)
+        trial = attempt([case], PATTERNS, strategy, limits=Limits(), tolerance=5e-7)
+        assert trial.passed.all()
+        assert max(drive.peak for drive in trial.drives) <= CURRENT * (1.0 + 1e-12)
+
+
+@pytest.mark.slow
+def test_drives_do_not_depend_on_company_or_threads(controller: Controller) -> None:
+    together = FeedbackStrategy(controller, Sensor(), threads=2)(controller.hammer, PATTERNS, 1100.0)
+    for pattern, drive in zip(PATTERNS, together, strict=True):
+        alone = FeedbackStrategy(controller, Sensor(), threads=1)(controller.hammer, [pattern], 1100.0)
+        assert alone == [drive]
+        assert len(drive.times) == len(pattern)
+    other = FeedbackStrategy(controller, Sensor(seed=1))(controller.hammer, PATTERNS, 1100.0)
+    assert other != together
+
+
+@pytest.mark.slow
+def test_the_comparison(controller: Controller, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("printhammer.control.feedback.Controller", lambda *_args, **_options: controller)
+    found = ph.feedback(controller.hammer, "900 Hz", gaps=[1.1e-3, 2e-3])
+    assert isinstance(found, Feedback)
+    assert found.strategies == ("open loop", "feedback")
+    assert found.passed.shape == (2, 128)
+    assert found.passed[1].all()
+    assert found.passed[1].sum() > found.passed[0].sum()
+    # A single dot from rest is the single pulse itself.
+    assert found.force[0, 0, 0] == pytest.approx(0.0, abs=1e-4)
+    assert (np.abs(found.gap_arrival[1]) < found.limits.arrival).all()
+    data = found.to_dataset()
+    assert data["force"].dims == ("strategy", "pattern", "dot")
+    assert data.attrs["hammer_fingerprint"] == controller.hammer.fingerprint
+    from printhammer.control.feedback_tables import save_feedback
+
+    save_feedback(found, tmp_path / "found.nc")
+    with xr.open_dataset(tmp_path / "found.nc", engine="scipy") as read:
+        assert np.array_equal(read["arrival"].values, found.arrival, equal_nan=True)
+    with pytest.raises(ph.InputError, match=r"ends in \.nc"):
+        save_feedback(found, tmp_path / "found.csv")
+    figure = found.plot()
+    assert [line.get_gid() for line in figure.axes[2].get_lines()][:2] == ["open loop", "feedback"]
+    run = found.plot_run()
+    samples = next(line for line in run.axes[0].get_lines() if line.get_gid() == "samples")
+    assert len(samples.get_xdata()) == len(found.seen.times)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--rate", "0 Hz"], "rate"),
+        (["--noise", "-1"], "noise = -1.0"),
+        (["--interval", "0 us"], "interval"),
+        (["--current", "0 A"], "current"),
+        (["--supply", "0"], "supply"),
+        (["--out", "found.csv"], "--out found.csv"),
+        (["--run", "run.nc"], "--run run.nc"),
+        (["--table", "nowhere.csv"], "nowhere.csv"),
+    ],
+)
+def test_bad_input_is_one_sentence(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["feedback", str(hammers.CRUDE), *arguments])
+    assert end.value.code == 2
+    error = capsys.readouterr().err
+    assert told in error.replace("\n", " ")
+    assert "Traceback" not in error
+
+
+def test_hammers_that_cannot_be_driven_are_refused() -> None:
+    bare = hammers.made_of(spring=hammers.preload(-4.0), pack=hammers.power())
+    with pytest.raises(ph.InputError, match="waveform"):
+        ph.feedback(bare, 1e3)
+
+
+@pytest.mark.parametrize("gaps", [[], [0.0], [-1e-3, 1e-3], [float("nan")], [[1e-3]]])
+def test_bad_gaps_are_refused(gaps: list[float]) -> None:
+    with pytest.raises(ph.InputError, match="gaps"):
+        ph.feedback(hammers.crude(), 1e3, gaps=gaps)
