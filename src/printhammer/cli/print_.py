@@ -74,6 +74,10 @@ def print_(
         str | None,
         typer.Option("--limits", metavar="NAME", help="Limits: slots (default), dot-matrix or engraved."),
     ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option("--table", metavar="FILE", help="Compensation table of the hammer (.csv, .json)."),
+    ] = None,
     tolerance: Annotated[str | None, typer.Option(metavar="X", help="Error allowed in one step.")] = None,
     threads: Annotated[str | None, typer.Option(metavar="N", help="Threads (all cores).")] = None,
     units: UnitsOption = Units.SI,
@@ -121,7 +125,7 @@ def print_(
         *pages, last = (Path(name) for name in _USUAL)
         wanted, views = pages, [(last, "zoom")]
     _check_names(wanted, [path for path, _view in views], save)
-    read = [path for path in (pattern, font, Path(hammer)) if path is not None]
+    read = [path for path in (pattern, font, table, Path(hammer)) if path is not None]
     check_outputs([*wanted, *(path for path, _view in views), *([save] if save else [])], read)
     asked = _pattern(text, pattern, font, whole(wires, "--wires"), whole(columns, "--columns"))
     head = _head(asked.wires, pitch, wire_diameter, number(density, "--density"))
@@ -131,6 +135,10 @@ def print_(
         "limits": None if limits is None else limits_named(limits),
     }
     loaded = load_checked(hammer)
+    if table is not None:
+        from printhammer.control.table_files import load_table
+
+        options["strategy"] = load_table(table).strategy(loaded)
     announce_compiling()
     screen = console()
     begin = perf_counter()
