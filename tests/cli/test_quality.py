@@ -94,6 +94,28 @@ def test_the_damping_study(cli: Callable, tmp_path: Path, monkeypatch: pytest.Mo
     assert out.stat().st_size > 10_000
 
 
+def test_a_compensation_table_drives_instead(cli: Callable, tmp_path: Path) -> None:
+    # As in the tests of `tune`: a hammer whose pulse is over before the touch.
+    quick, table = tmp_path / "quick.toml", tmp_path / "table.csv"
+    hammer = ph.load(CRUDE).replace({"waveform.amplitude": 1.3, "waveform.width": 200e-6})
+    hammer.save(quick)
+    ph.tune(hammer, rate=1850.0, history=1).save(table)
+    done = cli("quality", quick, "--rate", "1850 Hz", "--pattern", "1111", "--table", table)
+    assert done.status == 0
+    assert "1850 Hz, table" in done.out
+    safe = cli("quality", quick, "--safe-rate", "--table", table)
+    assert safe.status == 0
+    assert "1850 to 1850 Hz" in safe.out
+    beyond = cli("quality", quick, "--rate", "900 Hz", "--table", table)
+    assert beyond.status == 2
+    assert "made for 1850 Hz" in beyond.err
+    other = cli("quality", CRUDE, "--rate", "1850 Hz", "--table", table)
+    assert other.status == 2
+    assert "made for another hammer" in other.err
+    over = cli("quality", quick, "--rate", "1850 Hz", "--table", table, "--out", table)
+    assert over.status == 2
+
+
 def test_a_run_that_stops_is_told(cli: Callable, tmp_path: Path) -> None:
     path = tmp_path / "short.toml"
     hammer = ph.load(CRUDE)

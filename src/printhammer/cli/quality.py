@@ -49,6 +49,12 @@ def quality(
     ] = None,
     pulses: Annotated[str | None, _report("N", "Dots without a gap, instead of a pattern.")] = None,
     pitch: Annotated[str | None, _report("LENGTH", "Distance of neighbouring slots (1/60 in).")] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Drive by a compensation table (.csv, .json), not in an open loop."
+        ),
+    ] = None,
     safe_rate: Annotated[
         bool, _more("--safe-rate", "Find the rate up to which all patterns of eight slots print well.")
     ] = False,
@@ -107,7 +113,8 @@ def quality(
         if path.suffix.lower() not in (*SUFFIXES, *_PICTURES):
             known = ", ".join((*SUFFIXES, *_PICTURES))
             raise InputError(f"--out {path}: expected a name that ends in one of {known}")
-    check_outputs(wanted, [Path(hammer)])
+    read = [Path(hammer), *([] if table is None else [table])]
+    check_outputs(wanted, read)
     options = {
         "rate": rate,
         "pattern": pattern,
@@ -121,6 +128,7 @@ def quality(
         "last": last,
         "step": step,
         "threads": threads,
+        "table": table,
     }
     task = _task(safe_rate=safe_rate, yield_=yield_, damping=damping)
     _only(task, {key for key, value in options.items() if value is not None})
@@ -138,7 +146,14 @@ def quality(
     if loaded.waveform is None:
         raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
     named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
-    check_outputs(wanted, [Path(hammer), *named])
+    check_outputs(wanted, [*read, *named])
+    if table is not None:
+        from printhammer.control.table_files import load_table
+
+        loaded_table = load_table(table)
+        common["strategy"] = many["strategy"] = loaded_table.strategy(loaded)
+        # It says nothing of other rates.
+        many = {"first": float(loaded_table.rates[0]), "last": float(loaded_table.rates[-1]), **many}
     announce_compiling()
     screen = console()
     begin = perf_counter()
@@ -188,9 +203,9 @@ def quality(
 
 
 _TAKES: Final = {
-    "report": {"rate", "pattern", "pulses", "pitch"},
-    "safe-rate": {"first", "last", "step", "threads"},
-    "yield": {"rate", "spread", "judged-by", "seed", "first", "last", "step", "threads"},
+    "report": {"rate", "pattern", "pulses", "pitch", "table"},
+    "safe-rate": {"table", "first", "last", "step", "threads"},
+    "yield": {"table", "rate", "spread", "judged-by", "seed", "first", "last", "step", "threads"},
     "damping": {"current", "first", "last", "step", "threads"},
 }
 
