@@ -10,6 +10,7 @@ import printhammer as ph
 from printhammer.coil_work import coil_power
 from printhammer.control.coil_force import CoilForce
 from printhammer.control.least_work_bound import bound
+from printhammer.parts.backstop_hertz import HertzBackstop
 from printhammer.parts.magnet_inverse_root import InverseRootMagnet
 from printhammer.parts.pack_power import PowerPack
 from printhammer.parts.spring_linear import LinearSpring
@@ -18,10 +19,11 @@ from printhammer.printing.nominal import nominal
 
 def test_bound_in_closed_form() -> None:
     hammer = hammers.crude()
-    magnet, spring, pack = hammer.magnet, hammer.spring, hammer.pack
+    magnet, spring, pack, backstop = hammer.magnet, hammer.spring, hammer.pack, hammer.backstop
     assert isinstance(magnet, InverseRootMagnet)
     assert isinstance(spring, LinearSpring)
     assert isinstance(pack, PowerPack)
+    assert isinstance(backstop, HertzBackstop)
     single, share = nominal(hammer), 0.9
     found = bound(hammer, single, share, 2.0)
 
@@ -31,16 +33,17 @@ def test_bound_in_closed_form() -> None:
     def stored(x: float, current: float) -> float:
         pull = magnet.Am - magnet.Bm * current
         way = x - hammer.origin
+        pressed = 0.4 * backstop.stiffness * max(-way, 0.0) ** 2.5
         return (
             2.0 * pull**2 * math.sqrt(x) - magnet.F0 * x
-            - spring.Bs * way + 0.5 * spring.Bs / spring.As * way**2
+            - spring.Bs * way + 0.5 * spring.Bs / spring.As * way**2 + pressed
         )  # fmt: skip
 
     top = pack.front + depth
     rest = ph.rest_state(hammer)
-    assert found.loading == pytest.approx(loading, rel=1e-5)
-    assert found.first == pytest.approx(loading + stored(top, 0.0) - stored(rest, 0.0), rel=1e-5)
-    assert found.later == pytest.approx(loading + stored(top, 0.0) - stored(found.turn, 0.0), rel=1e-5)
+    assert found.loading == pytest.approx(loading, rel=1e-6)
+    assert found.first == pytest.approx(loading + stored(top, 0.0) - stored(rest, 0.0), rel=1e-6)
+    assert found.later == pytest.approx(loading + stored(top, 0.0) - stored(found.turn, 0.0), rel=1e-6)
     # Thrown from there with the largest current all the way, the armature indents the pack as asked.
     thrown = stored(found.turn, 2.0) - stored(top, 2.0)
     assert found.turn <= pack.front

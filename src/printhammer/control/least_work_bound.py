@@ -2,10 +2,10 @@
 
 The positive work of a dot is at least what lifts the armature from where it turned to its largest
 indentation and indents the pack: L + U(x_max) - U(x_turn), with L the loading work of the pack, and U the
-energy stored in magnet and spring at zero current. The first dot starts from rest; each later one can turn no
-nearer to the paper than at the front of the pack, since the contact before has to end, and no nearer than the
-largest current can throw it from. A backstop that gives energy back would lessen the work by that energy;
-this bound holds as long as the backstop is not touched between the dots.
+energy stored in magnet (at zero current), spring and backstop. The first dot starts from rest; each later one
+can turn no nearer to the paper than at the front of the pack, since the contact before has to end, and no
+nearer than a current within its bound can throw it from. A backstop that gives energy back would lessen the
+work by that energy; this bound holds as long as the backstop is not touched between the dots.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.equilibrium import rest_state
+from printhammer.ledger import stored_energy
 from printhammer.roots import bisect
 from printhammer.static_force import StaticForce
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from printhammer.printing.nominal import Nominal
 
 _POINTS: Final = 4001
+_CURRENTS: Final = 9
 
 
 @dataclass(frozen=True)
@@ -70,18 +72,18 @@ def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Boun
     deepest, loading = _indented(static, single, force)
     x = np.linspace(rest_state(hammer), static.front + deepest, _POINTS)
     step = float(x[1] - x[0])
-    held = -np.array([static.free(place) for place in x.tolist()])
-    thrown = np.array([static.free(place, largest) for place in x.tolist()])
-
-    def up_to_the_top(values: np.ndarray) -> np.ndarray:
-        # Trapezoidal rule from every place to the last one.
-        parts = 0.5 * step * (values[1:] + values[:-1])
-        return np.append(np.cumsum(parts[::-1])[::-1], 0.0)
-
-    lift = up_to_the_top(held)
-    enough = np.flatnonzero((up_to_the_top(thrown) >= loading) & (x <= static.front))
-    turn = int(enough[-1]) if enough.size else 0
-    return Bound(float(loading + lift[0]), float(loading + lift[turn]), float(x[turn]), loading)
+    # The pull of a law may grow again with the current, so that the largest is not always the strongest.
+    currents = np.linspace(0.0, largest, _CURRENTS).tolist()
+    thrown = np.array([max(static.free(place, current) for current in currents) for place in x.tolist()])
+    # Trapezoidal rule from every place to the last one.
+    parts = 0.5 * step * (thrown[1:] + thrown[:-1])
+    given = np.append(np.cumsum(parts[::-1])[::-1], 0.0)
+    enough = np.flatnonzero(given >= loading)
+    # The place after it, so that the bound errs on the safe side by a step.
+    turn = min(float(x[enough[-1] + 1]), static.front) if enough.size else float(x[0])
+    top = stored_energy(hammer, float(x[-1]))
+    first, later = (loading + top - stored_energy(hammer, start) for start in (float(x[0]), turn))
+    return Bound(first, later, turn, loading)
 
 
 def _indented(static: StaticForce, single: Nominal, force: float) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 In each slot two pulses are fired: the first brakes the armature on its way back, the second throws it. From
 rest one will do. A driver that can only be switched on and off, and whose current takes its own course, can
-do this. Pulses of a burst do not overlap: the next is not fired before the current of the one before has gone.
+do this. Pulses do not overlap: the next is not fired before the current of the one before has gone.
 """
 
 from __future__ import annotations
