@@ -1,9 +1,9 @@
 """What holds for all hammers of a family, and what depends on constants that the paper did not print.
 
-A conclusion is robust if its values differ by less than a tenth of their median over the whole family; a
-statement, if it is true of every member. For a conclusion that is not robust, the rank correlations with the
-constants tell which of them decide. The family was chosen to differ, it is no random sample: ranges are those
-of its members, and correlations hold among them.
+A conclusion is robust if its values differ by less than a tenth of their median over the whole family, or if
+no member has it; a statement, if it is true of every member or of none. For a conclusion that is not robust,
+the rank correlations with the constants tell which of them decide. The family was chosen to differ, it is no
+random sample: ranges are those of its members, and correlations hold among them.
 """
 
 from __future__ import annotations
@@ -160,17 +160,18 @@ def _quantity(
     known = [value for value in values if value is not None]
     ends = _range(known)
     spread = (ends["high"] - ends["low"]) / abs(ends["median"]) if ends["median"] else None
-    robust = len(known) == len(values) > 0 and spread is not None and spread < ROBUST
+    close = len(known) == len(values) and spread is not None and spread < ROBUST
+    robust = bool(values) and (close or not known)
     correlations = {
         key: found
         for key in constants[0]
         if (found := rank_correlation([constants[i][key] for i in rows], known)) is not None
     }
     decisive = decisive_constants(correlations, len(known))
-    if robust:
+    if not known:
+        text = "Robust: no member of the family has it."
+    elif robust:
         text = f"Robust: within {spread:.1%} over the family."
-    elif not known:
-        text = "No member of the family has it."
     else:
         share = f"varies by {spread:.0%} of its median" if spread is not None else "varies"
         missing = (
@@ -214,13 +215,14 @@ def _statement(statement: Statement, conclusions: Sequence[Values]) -> dict[str,
             # One of the conclusions compared is None: the statement is not true of this member.
             continue
     held = sum(value > 0.0 for value in values)
-    robust = held == len(conclusions) > 0
-    share = f"all {held}" if robust else f"{held} of {len(conclusions)}"
+    count = len(conclusions)
+    robust = count > 0 and (held == count or (held == 0 and len(values) == count))
+    share = f"all {held} members" if held == count else f"{held} of {count} members" if held else "no member"
     said = statement.text[:1].upper() + statement.text[1:]
     return {
         **_range(values),
         "robust": robust,
-        "text": f"{said}: true of {share} members.",
+        "text": f"{said}: true of {share}.",
         "held": held,
         "source": statement.source,
     }

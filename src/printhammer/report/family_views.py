@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import printed_verdicts
+from printhammer.reconstruction.robustness import STATEMENTS
 from printhammer.report.quantities import split_name, value_text
 from printhammer.report.views import SAME
 
@@ -28,11 +29,13 @@ def conclusions_view(report: Report) -> list[dict[str, Any]]:
     for name, conclusion in family.conclusions.items():
         words, unit = split_name(name)
         values = [member.conclusions.get(name) for member in family.hammers]
+        # The range of a statement is that of its margins, which tell a reader nothing.
+        ends = ("", "") if name in STATEMENTS else (conclusion.low, conclusion.high)
         rows.append(
             {
                 "words": words,
-                "low": value_text(conclusion.low, unit, other=False),
-                "high": value_text(conclusion.high, unit, other=False),
+                "low": value_text(ends[0], unit, other=False),
+                "high": value_text(ends[1], unit, other=False),
                 "robust": conclusion.robust,
                 "text": conclusion.text,
                 "dots": _dots([value for value in values if value is not None]),
