@@ -36,7 +36,7 @@ LEAST_WIDTH: Final = 0.3
 ROUGH: Final = 0.2
 """Deviation, in parts of the limits, above which an entry is made less wrong in all patterns."""
 
-_DENSE: Final = 5
+_DENSE: Final = 8
 _STEP: Final = 0.5e-6
 _LONGEST_STEP: Final = 25e-6
 _DAMPING: Final = 0.02
@@ -135,7 +135,7 @@ def look_at(work: Work, level: Sequence[History]) -> None:
     rows = np.array([row for row, _history in cells])
     columns = np.array([number_of(history, work.reach) for _row, history in cells])
     now = np.column_stack([work.advance[rows, columns], work.width[rows, columns]])
-    size = np.abs(last_dots(work, cells, now, [(0.0, 0.0)])).max(axis=(1, 2, 3))
+    size = last_dots(work, cells, now, [(0.0, 0.0)], whole=True).max(axis=(1, 2, 3))
     work.deviation[rows, columns] = np.where(np.isnan(size), np.inf, size)
 
 
@@ -167,7 +167,16 @@ def polish_level(work: Work, level: Sequence[History], told: Callable[[], None])
         for row, history in cells
         if work.deviation[row, number_of(history, work.reach)] > ROUGH
     ]
+    if not rough:
+        return
+    before = subset(work, np.arange(work.rates.size))
     _newton(work, rough, told, dense=True)
+    look_at(work, level)
+    for row, history in rough:
+        column = number_of(history, work.reach)
+        if not work.deviation[row, column] < before.deviation[row, column]:
+            for name in VALUES:
+                getattr(work, name)[row, column] = getattr(before, name)[row, column]
 
 
 def _newton(
@@ -251,6 +260,7 @@ def last_dots(
     shifts: Sequence[tuple[float, float]],
     *,
     dense: bool = True,
+    whole: bool = False,
 ) -> FloatArray:
     """Return deviations of last dots of patterns, in parts of the limits.
 
@@ -266,6 +276,8 @@ def last_dots(
         Changes of these to be tried, s.
     dense : bool, optional
         As for `befores`.
+    whole : bool, optional
+        Whether to return the largest deviations of any dot of a pattern instead.
 
     Returns
     -------
@@ -275,7 +287,7 @@ def last_dots(
     """
     most = max(len(befores(history, work.reach, dense=dense)) for _row, history in cells)
     drives: list[Drive] = []
-    due: list[float] = []
+    due: list[FloatArray] = []
     known: dict[tuple[float, float, float], Waveform] = {}
     for (row, history), value in zip(cells, values, strict=True):
         settings, rate = work.settings(row), float(work.rates[row])
@@ -289,31 +301,40 @@ def last_dots(
                 pulses.width[-1] = width
                 pulses.offset[-1] += advance - pulses.advance[-1]
                 drives.append(sequence(pulses, work.pulse, known))
-                due.append(float(pulses.due[-1]))
-    slot = np.array(due)
+                due.append(pulses.due)
     found = []
     for hammer in work.hammers:
         off = np.empty((len(drives), 2))
         for start in range(0, len(drives), _PIECE):
             part = slice(start, start + _PIECE)
-            off[part] = _off(work, hammer, drives[part], slot[part])
+            off[part] = _off(work, hammer, drives[part], due[part], whole=whole)
         found.append(off)
     shape = len(cells), len(shifts), most, 2
     return np.concatenate([off.reshape(shape) for off in found], axis=2)
 
 
-def _off(work: Work, hammer: Hammer, drives: Sequence[Drive], due: FloatArray) -> FloatArray:
+def _off(
+    work: Work, hammer: Hammer, drives: Sequence[Drive], due: Sequence[FloatArray], *, whole: bool
+) -> FloatArray:
     nominal = work.single.nominal
-    result = Ensemble(hammer, list(drives), due + nominal.flight_time + _TAIL, tolerance=work.tolerance).run(
-        dots=True, threads=work.threads
-    )
+    last = np.array([len(times) - 1 for times in due])
+    slots = np.full((len(drives), int(last.max()) + 1), np.nan)
+    for row, times in zip(slots, due, strict=True):
+        row[: times.size] = times
+    rows = np.arange(len(drives))
+    ends = slots[rows, last] + nominal.flight_time + _TAIL
+    ensemble = Ensemble(hammer, list(drives), ends, tolerance=work.tolerance)
+    result = ensemble.run(dots=True, threads=work.threads)
     dots = result.dots
     assert dots is not None
-    last = np.array([len(drive.times) - 1 for drive in drives])
-    rows = np.arange(len(drives))
-    force = dots.peak_force[rows, last] / nominal.force - 1.0
-    arrival = dots.fired_at[rows, last] + dots.flight_time[rows, last] - (due + nominal.flight_time)
+    force = (dots.peak_force / nominal.force - 1.0) / work.limits.force
+    touched = dots.fired_at + dots.flight_time
+    arrival = (touched - (slots + nominal.flight_time)) / work.limits.arrival
     bad = ~result.ok | (dots.extra_contacts > work.limits.extra_contacts).any(axis=1)
-    off = np.column_stack([force / work.limits.force, arrival / work.limits.arrival])
+    if whole:
+        there = np.isfinite(slots)
+        off = np.stack([np.where(there, np.abs(one), 0.0).max(axis=1) for one in (force, arrival)], axis=1)
+    else:
+        off = np.column_stack([force[rows, last], arrival[rows, last]])
     off[bad] = np.nan
     return off
