@@ -63,28 +63,56 @@ def branch_of(mode: int) -> int:
 
 
 @compiled
+def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
+    """Return the ds after which a time `left` [s] has passed where a force holds the armature there.
+
+    The root of 2 w ds - v ds^2 - kv ds^3 / 3 = left, whose left side rises throughout.
+    """
+    ds = 0.0
+    for _ in range(60):
+        rest = left - ds * (2.0 * w - ds * (v + ds * kv / 3.0))
+        change = rest / (2.0 * (w - ds * (v + 0.5 * ds * kv)))
+        ds += change
+        if abs(change) <= 1e-12 * ds:
+            break
+    return ds
+
+
+@compiled
+def length_of(left: float, w: float, v: float, kv: float) -> float:
+    """Return about the ds after which a time `left` [s] has passed in the backstop, for a correction of s.
+
+    It solves dt = 2 w ds - v ds^2, whose root stays regular where the armature leaves, w = 0; the next term
+    is added where it counts and the armature does not leave.
+    """
+    under_root = max(w * w - v * left, 0.0)
+    if w > 0.0 and under_root > 0.0:
+        change = left / (w + math.sqrt(under_root))
+    else:
+        change = (w - math.sqrt(under_root)) / v if v != 0.0 else 0.0
+    stays = w > 0.0 and kv < 0.0 and (v <= 0.0 or v * v + kv * w < 0.0)
+    if stays and -kv * change * change * change > left > 0.0:
+        return length_while_pushed_in(left, w, v, kv)
+    return change
+
+
+@compiled
 def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
     """Return the s at which a step in the backstop from time `t0` reaches time `t` [s].
 
-    Each correction solves dt = 2 w ds - v ds^2, whose root stays regular where the armature leaves, w = 0; a
-    time after that gives the s of leaving.
+    A time after that of leaving gives the s of leaving.
     """
     left = t - t0
     if left <= 0.0:
         return 0.0
     s = 0.0
-    t1, w1, v1 = t0, w0, v0
+    t1, w1, v1, kv1 = t0, w0, v0, kv0
     for _ in range(12):
-        left = t - t1
-        under_root = max(w1 * w1 - v1 * left, 0.0)
-        if w1 > 0.0 and under_root > 0.0:
-            change = left / (w1 + math.sqrt(under_root))
-        else:
-            change = (w1 - math.sqrt(under_root)) / v1
+        change = length_of(t - t1, w1, v1, kv1)
         s += change
         if abs(change) <= 1e-15 * s:
             break
-        t1, w1, v1, _kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
+        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
     return s
 
 

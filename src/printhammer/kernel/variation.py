@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.forces import Hammer, acceleration, backstop_acceleration
     from printhammer.kernel.laws import HAS_BACKSTOP, HAS_PACK, MEMORY
     from printhammer.kernel.pulses import Drive, drive_value
-    from printhammer.kernel.resample import memory_of
+    from printhammer.kernel.resample import length_of, memory_of
     from printhammer.kernel.slopes import (
         contact_slopes,
         field_slope,
@@ -233,20 +233,14 @@ def length_in_contact(
     """
     kv0 = contact_rate(w0, v0, t0, hammer, drive)
     s, change = 0.0, math.inf
-    t1, w1, v1 = t0, w0, v0
+    t1, w1, v1, kv1 = t0, w0, v0, kv0
     for number in range(12):
         if abs(change) <= 1e-8 * s:
             break
-        left = t - t1
-        under_root = max(w1 * w1 - v1 * left, 0.0)
-        if leaves and number > 0 and v1 > 0.0:
-            change = w1 / v1
-        elif w1 > 0.0 and under_root > 0.0:
-            change = left / (w1 + math.sqrt(under_root))
-        else:
-            change = (w1 - math.sqrt(under_root)) / v1
+        at_the_end = leaves and number > 0 and v1 > 0.0
+        change = w1 / v1 if at_the_end else length_of(t - t1, w1, v1, kv1)
         s += change
-        t1, w1, v1, _kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
+        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
     return s
 
 
