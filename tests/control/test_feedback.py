@@ -19,19 +19,23 @@ from printhammer.printing.perturbation import Perturbation, perturbed
 from printhammer.printing.trial import Case, attempt
 
 CURRENT = 2.0
+RATE = 1600.0
+HAMMER = Path(__file__).parent.parent / "data" / "bucked.toml"
+"""A hammer of its own, since what a controller can do depends on the hammer."""
+
 PATTERNS = [(0, 1, 2, 3), (0, 2, 3), (0, 1, 4)]
 PERFECT = Sensor(noise=0.0, step=0.0)
 
 
 @pytest.fixture(scope="module")
 def controller() -> Controller:
-    hammer = hammers.crude()
+    hammer = ph.load(HAMMER)
     return Controller(hammer, driver_of(hammer, CURRENT))
 
 
 @pytest.mark.slow
 def test_a_perfect_sensor_tells_when_and_how_fast_the_pack_is_touched(controller: Controller) -> None:
-    loop = closed_loops(controller.hammer, controller, PERFECT, PATTERNS[:1], 900.0)[0]
+    loop = closed_loops(controller.hammer, controller, PERFECT, PATTERNS[:1], RATE)[0]
     drive = loop.drive(controller.driver.edge)
     motion = ph.simulate(controller.hammer, drive, duration=float(loop.due[-1]) + 2e-3)
     touches = [contact for contact in motion.contacts if contact.surface == "pack"]
@@ -44,8 +48,9 @@ def test_a_perfect_sensor_tells_when_and_how_fast_the_pack_is_touched(controller
 @pytest.mark.slow
 def test_the_drive_prints_within_limits_and_bounds(controller: Controller) -> None:
     strategy = FeedbackStrategy(controller, Sensor())
-    for real in (controller.hammer, perturbed(controller.hammer, Perturbation(current=0.03))):
-        case = Case(real, controller.single, 900.0)
+    other = perturbed(controller.hammer, Perturbation(current=0.03))
+    for real, rate in ((controller.hammer, RATE), (other, 1000.0)):
+        case = Case(real, controller.single, rate)
         trial = attempt([case], PATTERNS, strategy, limits=Limits(), tolerance=5e-7)
         assert trial.passed.all()
         assert max(drive.peak for drive in trial.drives) <= CURRENT * (1.0 + 1e-12)
@@ -53,19 +58,19 @@ def test_the_drive_prints_within_limits_and_bounds(controller: Controller) -> No
 
 @pytest.mark.slow
 def test_drives_do_not_depend_on_company_or_threads(controller: Controller) -> None:
-    together = FeedbackStrategy(controller, Sensor(), threads=2)(controller.hammer, PATTERNS, 1100.0)
+    together = FeedbackStrategy(controller, Sensor(), threads=2)(controller.hammer, PATTERNS, RATE)
     for pattern, drive in zip(PATTERNS, together, strict=True):
-        alone = FeedbackStrategy(controller, Sensor(), threads=1)(controller.hammer, [pattern], 1100.0)
+        alone = FeedbackStrategy(controller, Sensor(), threads=1)(controller.hammer, [pattern], RATE)
         assert alone == [drive]
         assert len(drive.times) == len(pattern)
-    other = FeedbackStrategy(controller, Sensor(seed=1))(controller.hammer, PATTERNS, 1100.0)
+    other = FeedbackStrategy(controller, Sensor(seed=1))(controller.hammer, PATTERNS, RATE)
     assert other != together
 
 
 @pytest.mark.slow
 def test_the_comparison(controller: Controller, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("printhammer.control.feedback.Controller", lambda *_args, **_options: controller)
-    found = ph.feedback(controller.hammer, "900 Hz", gaps=[1.1e-3, 2e-3])
+    found = ph.feedback(controller.hammer, RATE, gaps=[0.6e-3, 1.1e-3])
     assert isinstance(found, Feedback)
     assert found.strategies == ("open loop", "feedback")
     assert found.passed.shape == (2, 128)

@@ -142,10 +142,10 @@ class ForceMap:
         return found
 
 
-def touches() -> tuple[IntArray, FloatArray]:
+def touches(single: Nominal) -> tuple[IntArray, FloatArray]:
     """Return kinds and speeds, m/s, of the touches from which tables begin."""
     kinds = np.repeat([PUSHED, FREE], [len(_PUSHED_SPEEDS), len(_FREE_SPEEDS)])
-    return kinds, np.concatenate([_PUSHED_SPEEDS, _FREE_SPEEDS])
+    return kinds, np.concatenate([_PUSHED_SPEEDS, _FREE_SPEEDS]) * single.impact_speed
 
 
 def force_map(hammer: Hammer, driver: Driver, single: Nominal, *, threads: int | None = None) -> ForceMap:
@@ -162,7 +162,7 @@ def force_map(hammer: Hammer, driver: Driver, single: Nominal, *, threads: int |
     threads : int, optional
         By default as many as there are cores.
     """
-    kinds, speeds = touches()
+    kinds, speeds = touches(single)
     assert hammer.front is not None
     front = hammer.front
     releases = np.linspace(0.0, _LAST_RELEASE, _RELEASES) * single.flight_time
