@@ -174,7 +174,7 @@ def _carry(
     since = np.maximum([loop.since for loop in loops], starts)
     numbers = sensor.numbers(since, ends, controller.samples(sensor))
     used = numbers >= 0
-    times = numbers * sensor.interval
+    times: FloatArray = (numbers * sensor.interval).astype(np.float64)
     used &= times > starts[:, np.newaxis]
     x = np.zeros(numbers.shape)
     inside = np.array([loop.state[2] in _BRANCHES for loop in loops])

@@ -76,7 +76,7 @@ def launch(
             " expected a stronger driver"
         )
     order = np.argsort(speed[struck])
-    found = (
+    width, time = (
         float(np.interp(wanted, speed[struck][order], values[struck][order])) for values in (widths, flight)
     )
-    return Launch(*found, wanted)
+    return Launch(width, time, wanted)
