@@ -17,7 +17,7 @@ from printhammer.control.flight import Expected, FreeForce, touch_from_samples
 from printhammer.control.landing import Landing, landing
 from printhammer.control.launch import Launch, launch
 from printhammer.control.policy import Policy, between
-from printhammer.control.swing_table import ALWAYS, FREE, SwingTable, swing_table
+from printhammer.control.swing_table import ALWAYS, FREE, SwingTable, force_map, swing_table
 from printhammer.errors import InputError
 from printhammer.printing.limits import Limits
 from printhammer.printing.nominal import nominal
@@ -81,9 +81,12 @@ class Controller:
         self.front: float = hammer.front
         self.stroke: float = hammer.front - hammer.origin
         self.lead = LEAD
-        self.table: SwingTable = swing_table(hammer, driver, self.single, threads=threads)
-        self.landing: Landing = landing(hammer, driver, self.single, self.table.force_map, threads=threads)
-        self.start: Launch = launch(hammer, driver, self.single, self.table.force_map, threads=threads)
+        forces = force_map(hammer, driver, self.single, threads=threads)
+        self.start: Launch = launch(hammer, driver, self.single, forces, threads=threads)
+        self.landing: Landing = landing(hammer, driver, self.single, forces, threads=threads)
+        self.table: SwingTable = swing_table(
+            hammer, driver, self.single, forces, self.start.width, threads=threads
+        )
         self._policies: dict[float, Policy] = {}
 
     @cached_property

@@ -41,7 +41,7 @@ _PUSHED_SPEEDS: Final = np.linspace(0.3, 1.1, 17)
 _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)
 _RETURNS: Final = (0.0, -0.4, -1.0)
 _FORCES: Final = (0.95, 1.0, 1.05)
-_WIDTHS: Final = (ALWAYS, 0.36, 0.45, 0.54)
+_WIDTHS: Final = (0.85, 1.0, 1.2)
 _LAST_RELEASE: Final = 0.85
 _RELEASES: Final = 29
 _EARLY: Final = np.linspace(0.14, 1.07, 38)
@@ -183,12 +183,35 @@ def force_map(hammer: Hammer, driver: Driver, single: Nominal, *, threads: int |
     return ForceMap(kinds, speeds, back, releases, force.reshape(shape), front)
 
 
-def swing_table(hammer: Hammer, driver: Driver, single: Nominal, *, threads: int | None = None) -> SwingTable:
-    """Compute where all ways to switch the coil lead; parameters as for `force_map`."""
-    forces = force_map(hammer, driver, single, threads=threads)
+def swing_table(
+    hammer: Hammer,
+    driver: Driver,
+    single: Nominal,
+    forces: ForceMap,
+    launched: float,
+    *,
+    threads: int | None = None,
+) -> SwingTable:
+    """Compute where all ways to switch the coil lead.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    driver : Driver
+        Of its coil.
+    single : Nominal
+        Its single-pulse dot.
+    forces : ForceMap
+        Its forces.
+    launched : float
+        Width of the push by which it is launched from rest, s.
+    threads : int, optional
+        By default as many as there are cores.
+    """
     scale = single.flight_time
     fires = np.concatenate([_EARLY, _LATE]) * scale
-    widths = np.array([width if width == ALWAYS else width * scale for width in _WIDTHS])
+    widths = np.array([ALWAYS, *(width * launched for width in _WIDTHS)])
     shape = len(forces.back), len(_FORCES), len(fires), len(widths)
     back, _, fire, width = (
         axis.ravel() for axis in np.meshgrid(forces.back, _FORCES, fires, widths, indexing="ij")
