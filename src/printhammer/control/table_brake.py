@@ -30,6 +30,9 @@ LATE: Final = 6e-6
 HARD: Final = 0.015
 """By how much the pulse of the first dot may be wide or narrow, in parts of its width."""
 
+BRAKES: Final = 3
+"""Number of brake pulses from which a search begins."""
+
 _DELAYS: Final = 9
 _BRAKES: Final = 8
 _FIRED: Final = 11
@@ -62,7 +65,7 @@ class Braked:
     off: float
 
 
-def braked(work: Work, period: float) -> Braked | None:
+def brakes(work: Work, period: float) -> list[Braked]:
     """Search for a brake pulse with which a dot is well made one period after another.
 
     The best one for a perfect first dot may be of no use: a brake pulse that ends just as the armature lands
@@ -78,8 +81,9 @@ def braked(work: Work, period: float) -> Braked | None:
 
     Returns
     -------
-    Braked or None
-        None where no brake pulse fits between the dots, or none leads to a dot.
+    list of Braked
+        The best of different brake pulses, at most `BRAKES`; none where no brake pulse fits between the dots,
+        or none leads to a dot.
     """
     own: Any = work.pulse
     single, fade = work.single, fading(work.pulse)
@@ -95,18 +99,22 @@ def braked(work: Work, period: float) -> Braked | None:
         if delay + brake + fade <= fired
     ]
     if not cells:
-        return None
+        return []
     off = _off(work, period, cells, _FIRST[:1])
     best = np.argsort(off, kind="stable")[:_CANDIDATES]
     best = best[np.isfinite(off[best])]
     if not best.size:
-        return None
+        return []
     chosen = [cells[k] for k in best]
     worst = _off(work, period, chosen, _FIRST)
-    place = int(np.argmin(worst))
-    delay, brake, fired, width = chosen[place]
-    found = Braked(delay, brake, fired, width, float(worst[place]))
-    return found if np.isfinite(found.off) else None
+    found: list[Braked] = []
+    for place in np.argsort(worst, kind="stable").tolist():
+        delay, brake, fired, width = chosen[place]
+        if not np.isfinite(worst[place]) or len(found) == BRAKES:
+            break
+        if all((one.delay, one.brake) != (delay, brake) for one in found):
+            found.append(Braked(delay, brake, fired, width, float(worst[place])))
+    return found
 
 
 def _off(

@@ -34,9 +34,14 @@ LEAST_WIDTH: Final = 0.5
 ROOM: Final = 150e-6
 """How far from its slot a dot is fired at most, s."""
 
+GUESSES: Final = 2
+"""Number of cells from which a search begins."""
+
+APART: Final = 30e-6
+"""How far apart their firing times are, s: there may be one solution before a rebound and one after it."""
+
 _PIECE: Final = 8192
 _WAIT: Final = 1e-3
-_SLACK: Final = 0.1
 
 
 @dataclass(frozen=True)
@@ -117,18 +122,15 @@ class Guess:
         Of the cell, s.
     off : float
         Worst deviation, in parts of the limits, of the hammer the table is made for.
-    off_others : float
-        The same over all hammers.
     """
 
     fired: float
     width: float
     off: float
-    off_others: float
 
 
-def guess(planes: list[Plane], period: float, limits: Limits) -> Guess | None:
-    """Return the best cell for a slot at a time after the first.
+def guesses(planes: list[Plane], period: float, limits: Limits) -> list[Guess]:
+    """Return the best cells for a slot at a time after the first, at most `GUESSES` that lie apart.
 
     Parameters
     ----------
@@ -138,24 +140,15 @@ def guess(planes: list[Plane], period: float, limits: Limits) -> Guess | None:
         Time from slot to slot, s.
     limits : Limits
         By which deviations are measured.
-
-    Returns
-    -------
-    Guess or None
-        None where no cell is a dot near the slot. Among the cells that are as good as the best for the hammer
-        itself, the one that is best for all.
     """
     own = planes[0].off(period, limits)
-    if not own.size or not np.isfinite(own).any():
-        return None
+    if not own.size:
+        return []
     every = np.max([each.off(period, limits) for each in planes], axis=0)
-    allowed = own <= own.min() + _SLACK
-    place = np.unravel_index(int(np.argmin(np.where(allowed, every, np.inf))), own.shape)
-    if not allowed[place]:
-        place = np.unravel_index(int(np.argmin(own)), own.shape)
-    return Guess(
-        float(planes[0].fired[place[0]]),
-        float(planes[0].widths[place[1]]),
-        float(own[place]),
-        float(every[place]),
-    )
+    found: list[Guess] = []
+    while len(found) < GUESSES and np.isfinite(every).any():
+        place = np.unravel_index(int(np.argmin(every)), every.shape)
+        fired, width = float(planes[0].fired[place[0]]), float(planes[0].widths[place[1]])
+        found.append(Guess(fired, width, float(own[place])))
+        every = np.where(np.abs(planes[0].fired - fired)[:, np.newaxis] <= APART, np.inf, every)
+    return found

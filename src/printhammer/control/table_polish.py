@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.control.histories import REST, History, histories, number_of, pattern_of, plain
+from printhammer.control.histories import REST, History, histories, histories_of, number_of, pattern_of, plain
 from printhammer.control.table import COLUMNS, Settings
 from printhammer.control.table_drive import fading, pulses_of, sequence
 from printhammer.ensemble import Ensemble
@@ -36,7 +36,7 @@ LEAST_WIDTH: Final = 0.3
 ROUGH: Final = 0.2
 """Deviation, in parts of the limits, above which an entry is made less wrong in all patterns."""
 
-_DENSE: Final = 8
+_DENSE: Final = 6
 _STEP: Final = 0.5e-6
 _LONGEST_STEP: Final = 25e-6
 _DAMPING: Final = 0.02
@@ -277,7 +277,7 @@ def last_dots(
     dense : bool, optional
         As for `befores`.
     whole : bool, optional
-        Whether to return the largest deviations of any dot of a pattern instead.
+        Whether to return the largest deviations of all dots of a pattern that have the history instead.
 
     Returns
     -------
@@ -288,6 +288,7 @@ def last_dots(
     most = max(len(befores(history, work.reach, dense=dense)) for _row, history in cells)
     drives: list[Drive] = []
     due: list[FloatArray] = []
+    alike: list[npt.NDArray[np.bool_]] = []
     known: dict[tuple[float, float, float], Waveform] = {}
     for (row, history), value in zip(cells, values, strict=True):
         settings, rate = work.settings(row), float(work.rates[row])
@@ -302,20 +303,27 @@ def last_dots(
                 pulses.offset[-1] += advance - pulses.advance[-1]
                 drives.append(sequence(pulses, work.pulse, known))
                 due.append(pulses.due)
+                numbers = histories_of(slots, work.gaps, work.reach)[:-1]
+                alike.append(numbers == numbers[-1])
     found = []
     for hammer in work.hammers:
         off = np.empty((len(drives), 2))
         for start in range(0, len(drives), _PIECE):
             part = slice(start, start + _PIECE)
-            off[part] = _off(work, hammer, drives[part], due[part], whole=whole)
+            off[part] = _off(work, hammer, drives[part], due[part], alike[part] if whole else None)
         found.append(off)
     shape = len(cells), len(shifts), most, 2
     return np.concatenate([off.reshape(shape) for off in found], axis=2)
 
 
 def _off(
-    work: Work, hammer: Hammer, drives: Sequence[Drive], due: Sequence[FloatArray], *, whole: bool
+    work: Work,
+    hammer: Hammer,
+    drives: Sequence[Drive],
+    due: Sequence[FloatArray],
+    alike: Sequence[npt.NDArray[np.bool_]] | None,
 ) -> FloatArray:
+    """Return deviations of force and arrival of last dots, or the largest ones of the dots that are asked."""
     nominal = work.single.nominal
     last = np.array([len(times) - 1 for times in due])
     slots = np.full((len(drives), int(last.max()) + 1), np.nan)
@@ -331,8 +339,10 @@ def _off(
     touched = dots.fired_at + dots.flight_time
     arrival = (touched - (slots + nominal.flight_time)) / work.limits.arrival
     bad = ~result.ok | (dots.extra_contacts > work.limits.extra_contacts).any(axis=1)
-    if whole:
-        there = np.isfinite(slots)
+    if alike is not None:
+        there = np.zeros(slots.shape, np.bool_)
+        for row, those in zip(there, alike, strict=True):
+            row[: those.size] = those
         off = np.stack([np.where(there, np.abs(one), 0.0).max(axis=1) for one in (force, arrival)], axis=1)
     else:
         off = np.column_stack([force[rows, last], arrival[rows, last]])

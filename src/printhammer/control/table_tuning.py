@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.histories import REST, checked_size, entries_of, histories, number_of, shared_numbers
+from printhammer.control.histories import checked_size, entries_of, histories, number_of, shared_numbers
 from printhammer.control.table import CompensationTable
-from printhammer.control.table_brake import braked
+from printhammer.control.table_brake import BRAKES, Braked, brakes
 from printhammer.control.table_drive import LARGEST_CURRENT, print_pulse
-from printhammer.control.table_maps import guess, plane
+from printhammer.control.table_maps import GUESSES, Guess, guesses, plane
 from printhammer.control.table_polish import (
     ROUNDS,
     VALUES,
@@ -50,6 +50,7 @@ SPREAD: Final = (
 """By how much the hammers differ that a robust table is tuned on, beside the hammer itself."""
 
 _FREE: Final = 0.2
+_FINE: Final = 0.1
 _HOPELESS: Final = 2.0
 _USABLE: Final = 0.9
 
@@ -214,16 +215,23 @@ def _tuned(
     blanks: dict[str, Any] = {name: np.zeros(shape) for name in VALUES}
     work = replace(blank, rates=rates, **blanks)
     work.width[:] = own.width
-    _begin(work)
+    for gap, numbers in _columns(work).items():
+        near = np.flatnonzero(gap / rates <= blank.single.settled)
+        for column in numbers:
+            work.deviation[near, column] = np.inf
+    starts = _starts(work)
     steps()
-    hopeless = np.flatnonzero(~(work.deviation.max(axis=1) <= _HOPELESS))
-    if open_ended and hopeless.size:
+    if open_ended:
         # A table without given rates ends below the first at which no pulse comes near.
-        work = subset(work, np.arange(hopeless[0]))
-    polish_level(work, level_of(work, 1), steps)
-    look_at(work, level_of(work, 1))
-    if brake:
-        _with_brakes(work, steps)
+        close = [all(not cells or cells[0].off <= _HOPELESS for cells in row) for row in starts]
+        ends = close.index(False) if False in close else len(close)
+        work, starts = subset(work, np.arange(ends)), starts[:ends]
+    for turn in range(GUESSES):
+        _try(work, [[cells[turn] if turn < len(cells) else None for cells in row] for row in starts], steps)
+    for turn in range(BRAKES if brake else 0):
+        if turn == 0:
+            pulses = _brakes(work)
+        _try(work, [[cells[turn] if turn < len(cells) else None for cells in row] for row in pulses], steps)
     found = np.isfinite(work.deviation.max(axis=1))
     good = subset(work, np.flatnonzero(found))
     if found.any():
@@ -233,51 +241,85 @@ def _tuned(
     return work
 
 
-def _begin(work: Work) -> None:
-    """Look up first guesses, which depend on the last gap only, in a plane of second dots."""
-    periods = np.unique(np.outer(1.0 / work.rates, np.arange(1, work.reach + 1)).ravel())
-    periods = periods[periods <= work.single.settled]
+def _starts(work: Work) -> list[list[list[Guess]]]:
+    """Return first guesses for each rate and gap from a plane of second dots; none for dots from rest.
+
+    Where there should be one and is none, the guess is the hammer's own pulse, infinitely far off.
+    """
+    own: Any = work.pulse
+    spans = [[gap / rate for gap in range(1, work.reach + 1)] for rate in work.rates.tolist()]
+    periods = np.unique([period for row in spans for period in row if period <= work.single.settled])
     if not periods.size:
-        return
+        return [[[] for _period in row] for row in spans]
     planes = [plane(work, hammer, periods) for hammer in work.hammers]
-    for history in histories(work.gaps, work.reach):
-        column = number_of(history, work.reach)
-        for row, rate in enumerate(work.rates.tolist()):
-            period = history[0] / rate
-            if not 0.0 < period <= work.single.settled:
-                continue
-            cell = guess(planes, period, work.limits)
+    return [
+        [
+            guesses(planes, period, work.limits) or [Guess(period, own.width, np.inf)]
+            if period <= work.single.settled
+            else []
+            for period in row
+        ]
+        for row in spans
+    ]
+
+
+def _brakes(work: Work) -> list[list[list[Braked]]]:
+    """Return brake pulses for each rate and gap at which dots are not good enough without."""
+    found: list[list[list[Braked]]] = []
+    for row, rate in enumerate(work.rates.tolist()):
+        found.append([])
+        for gap in range(1, work.reach + 1):
+            wanted = not work.deviation[row, _columns(work)[gap][0]] <= _FREE
+            found[-1].append(brakes(work, gap / rate) if wanted else [])
+    return found
+
+
+def _columns(work: Work) -> dict[int, list[int]]:
+    """Return the numbers of the histories that begin with a gap; the first one is rest before that."""
+    every = histories(work.gaps, work.reach)
+    return {
+        gap: [number_of(one, work.reach) for one in every if one[0] == gap]
+        for gap in range(1, work.reach + 1)
+    }
+
+
+def _try(work: Work, cells: Sequence[Sequence[Guess | Braked | None]], steps: Callable[[], None]) -> None:
+    """Polish some guesses, one for each rate and gap or none, and keep those that turn out better.
+
+    Parameters
+    ----------
+    work : Work
+        The table; changed in place.
+    cells : sequence of sequence
+        For each rate and gap.
+    steps : callable
+        Called after each step of the work.
+    """
+    columns = _columns(work)
+    wanted = {
+        (row, gap): cell
+        for row, some in enumerate(cells)
+        for gap, cell in enumerate(some, 1)
+        if cell is not None and work.deviation[row, columns[gap][0]] > _FINE
+    }
+    if not wanted:
+        return
+    rows = np.unique([row for row, _gap in wanted])
+    other = subset(work, rows)
+    for place, row in enumerate(rows.tolist()):
+        for gap, own in columns.items():
+            cell = wanted.get((row, gap))
             if cell is None:
-                work.deviation[row, column] = np.inf
-            else:
-                work.advance[row, column] = period - cell.fired
-                work.width[row, column] = cell.width
-                work.deviation[row, column] = cell.off
-
-
-def _with_brakes(work: Work, steps: Callable[[], None]) -> None:
-    """Put brake pulses into the gaps where dots are nearer to the limits with than without."""
-    for gap in range(1, work.reach + 1):
-        level = [(gap, *[REST] * (work.gaps - 1))]
-        first = number_of(level[0], work.reach)
-        own = [number_of(one, work.reach) for one in histories(work.gaps, work.reach) if one[0] == gap]
-        rows = np.flatnonzero(~(work.deviation[:, first] <= _FREE))
-        other = subset(work, rows)
-        usable = np.zeros(rows.size, np.bool_)
-        for row, rate in enumerate(other.rates.tolist()):
-            found = braked(work, gap / rate)
-            if found is None or found.off > _HOPELESS:
-                # Nothing is gained above a rate at which no pulse comes near: the table ends there.
-                break
-            usable[row] = True
-            other.advance[row, own], other.width[row, own] = gap / rate - found.fired, found.width
-            other.brake_delay[row, own], other.brake_width[row, own] = found.delay, found.brake
-        steps()
-        rows, other = rows[usable], subset(other, np.flatnonzero(usable))
-        if not rows.size:
-            continue
-        polish_level(other, level, steps)
-        look_at(other, level)
+                continue
+            other.advance[place, own] = gap / work.rates[row] - cell.fired
+            other.width[place, own] = cell.width
+            other.brake_delay[place, own] = cell.delay if isinstance(cell, Braked) else 0.0
+            other.brake_width[place, own] = cell.brake if isinstance(cell, Braked) else 0.0
+    level = level_of(work, 1)
+    polish_level(other, level, steps)
+    look_at(other, level)
+    for own in columns.values():
+        first = own[0]
         better = other.deviation[:, first] < work.deviation[rows, first]
         for column in own:
             for name in VALUES:
