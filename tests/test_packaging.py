@@ -152,7 +152,9 @@ def test_the_commands_of_the_readme_work_elsewhere(elsewhere: Path, tmp_path: Pa
     (commands,) = (block for block in blocks if "printhammer map" in block)
     output_of("sh", "-ec", f"PATH={shlex.quote(str(elsewhere))}:$PATH\n{commands}", cwd=tmp_path)
     made = {path.name for path in (tmp_path / "build").iterdir()}
-    pictures = {f"{name}.png" for name in ("map", "strobe", "branch", "bifurcation", "quench")}
+    pictures = {
+        f"{name}.png" for name in ("map", "strobe", "branch", "bifurcation", "quench", "page", "burst")
+    }
     assert made == pictures | {"sweep.toml", "sweep.zarr", "lab", "bench.json"}
 
 
