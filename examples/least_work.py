@@ -4,9 +4,9 @@ Least work
 
 "Subsequent dots would be printed by keeping the actuator moving as in a parametric
 oscillator (swing). In the limit, the only energy to be expended should be the energy
-absorbed by the ribbon/paper pack" (Hendriks, 1983, discussion). Here the coil brakes the
-armature on its way back, waits with it off the backstop, throws it again, and lets it
-down at the end.
+absorbed by the ribbon/paper pack" (Hendriks, 1983, discussion). Here the coil brakes
+the armature on its way back, waits with it off the backstop, throws it again, and lets
+it down at the end.
 """
 
 import matplotlib.pyplot as plt

@@ -26,7 +26,9 @@ def test_noise_depends_on_seed_run_and_sample_only() -> None:
 
 
 def test_noise_is_normal_and_white() -> None:
-    values = normal(0, np.array([[run_key((0,), 1e3)]], dtype=np.uint64), np.arange(200_000)[np.newaxis, :])[0]
+    values = normal(0, np.array([[run_key((0,), 1e3)]], dtype=np.uint64), np.arange(200_000)[np.newaxis, :])[
+        0
+    ]
     assert abs(values.mean()) < 5.0 / np.sqrt(values.size)
     assert values.std() == pytest.approx(1.0, abs=5.0 / np.sqrt(2.0 * values.size))
     assert abs(np.mean(values[1:] * values[:-1])) < 5.0 / np.sqrt(values.size)
@@ -34,7 +36,11 @@ def test_noise_is_normal_and_white() -> None:
 
 
 @given(
-    st.floats(0.0, 1e-3), st.floats(0.0, 2e-3), st.floats(0.0, 1e-4), st.floats(1e-6, 2e-5), st.integers(1, 80)
+    st.floats(0.0, 1e-3),
+    st.floats(0.0, 2e-3),
+    st.floats(0.0, 1e-4),
+    st.floats(1e-6, 2e-5),
+    st.integers(1, 80),
 )
 def test_no_sample_is_used_before_it_is_in(
     since: float, until: float, delay: float, interval: float, most: int

@@ -9,7 +9,11 @@ from printhammer.control.flight import Expected, FreeForce, touch_from_samples
 
 
 def estimated(
-    hammer: ph.Hammer, times: np.ndarray, shown: np.ndarray, expected: tuple[float, float], drive: ph.PulseTrain
+    hammer: ph.Hammer,
+    times: np.ndarray,
+    shown: np.ndarray,
+    expected: tuple[float, float],
+    drive: ph.PulseTrain,
 ) -> tuple[float, float]:
     assert hammer.front is not None
     force = FreeForce(hammer, hammer.origin, hammer.front, 2.0)

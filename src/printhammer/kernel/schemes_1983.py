@@ -71,7 +71,7 @@ class SchemeRun:
 def integrate(
     laws: Mapping[str, Callable[..., float]],
     constants: Mapping[str, Array],
-    drive: tuple[Array, Array, Array, bool, bool],
+    drive: tuple[Array, NDArray[np.int64], Array, bool, bool],
     *,
     mass: float,
     front: float,
