@@ -57,6 +57,15 @@ def test_the_drive_prints_within_limits_and_bounds(controller: Controller) -> No
 
 
 @pytest.mark.slow
+def test_a_hammer_far_from_the_nominal_one_spoils_dots_but_not_the_loop(controller: Controller) -> None:
+    far = perturbed(controller.hammer, Perturbation(current=-0.4, travel=60e-6))
+    drives = FeedbackStrategy(controller, Sensor(noise=0.2))(far, PATTERNS, 2200.0)
+    assert [len(drive.times) for drive in drives] == [len(pattern) for pattern in PATTERNS]
+    assert all((np.diff(drive.times) > 0.0).all() for drive in drives)
+    assert max(drive.peak for drive in drives) <= CURRENT * (1.0 + 1e-12)
+
+
+@pytest.mark.slow
 def test_drives_do_not_depend_on_company_or_threads(controller: Controller) -> None:
     together = FeedbackStrategy(controller, Sensor(), threads=2)(controller.hammer, PATTERNS, RATE)
     for pattern, drive in zip(PATTERNS, together, strict=True):

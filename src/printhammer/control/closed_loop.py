@@ -30,6 +30,7 @@ REMEMBERED: Final = 4
 """Number of the latest pulses of which anything can be left."""
 
 _APART: Final = 1e-9
+_SOON: Final = 1e-6
 _BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
 
 
@@ -169,8 +170,8 @@ def _carry(
     threads: int | None,
 ) -> None:
     """Carry some runs to their next decision, and estimate the coming touches from what the sensor shows."""
-    ends = np.array([loop.touch for loop in loops]) - controller.lead
     starts = np.array([loop.time for loop in loops])
+    ends = np.maximum(np.array([loop.touch for loop in loops]) - controller.lead, starts + _SOON)
     since = np.maximum([loop.since for loop in loops], starts)
     numbers = sensor.numbers(since, ends, controller.samples(sensor))
     used = numbers >= 0

@@ -39,6 +39,7 @@ WINDOW: Final = 120e-6
 
 _SPEED_ERROR: Final = 0.03
 _PLACE_ERROR: Final = 0.03
+_ASTRAY: Final = 0.4
 _LEAST_ERROR: Final = 1e-4
 _CLAMP: Final = 1.0
 _CLAMPED: Final = 0.6
@@ -141,7 +142,9 @@ class Controller:
         for k, loop in enumerate(loops):
             if not loop.alive:
                 continue
-            loop.touch, loop.speed = float(touch[k]), float(speed[k])
+            # What is far from all that was expected is no estimate of this touch: the plan stands.
+            if abs(touch[k] - loop.touch) < _ASTRAY * self.single.flight_time and speed[k] > 0.0:
+                loop.touch, loop.speed = float(touch[k]), float(speed[k])
             loop.touches.append((loop.touch, loop.speed))
             loop.seen.append((times[k][used[k]], shown[k][used[k]]))
 
