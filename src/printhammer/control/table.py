@@ -36,6 +36,7 @@ COLUMNS: Final = ("advance", "width", "brake_delay", "brake_width")
 """What a table says of a dot."""
 
 _NEAR: Final = 1e-9
+_JUMP: Final = 8e-6
 
 
 @dataclass(frozen=True)
@@ -171,8 +172,9 @@ class CompensationTable:
     def at(self, rate: float | str) -> Settings:
         """Return what the table says at a rate, Hz, or text with a unit.
 
-        Between two rates of the table it is interpolated in the period, entry by entry; where only one of the
-        two has a brake pulse, the nearer one holds.
+        Between two rates of the table it is interpolated in the period, entry by entry. Where the two do not
+        belong together, since their brake pulses differ or one fires before a rebound and the other after it,
+        the nearer one holds.
 
         Raises
         ------
@@ -189,8 +191,9 @@ class CompensationTable:
         periods = 1.0 / self.rates[[first, second]]
         share = 0.0 if first == second else float((periods[0] - 1.0 / asked) / (periods[0] - periods[1]))
         share = min(max(share, 0.0), 1.0)
-        braked = self.brake_width > 0.0
-        mixed = braked[first] != braked[second]
+        mixed = np.abs(self.advance[first] - self.advance[second]) > _JUMP
+        for values in (self.brake_delay, self.brake_width):
+            mixed |= values[first] != values[second]
         part = np.where(mixed, float(share > 0.5), share)
         found = {}
         for name in COLUMNS:

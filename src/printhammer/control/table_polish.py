@@ -96,7 +96,8 @@ def befores(history: History, reach: int, *, dense: bool = True) -> list[tuple[i
     late = (reach + 1,)
     if REST in history:
         return [(), late]
-    return [(), late, (1,) * _DENSE, (reach, 1, reach, 1)]
+    row = (1,) * _DENSE
+    return [(), late, (*row, reach), (*row, *late), (reach, 1, reach, 1)]
 
 
 def polish(work: Work, told: Callable[[], None]) -> None:
