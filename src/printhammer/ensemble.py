@@ -242,7 +242,7 @@ class Ensemble:
         if self._groups is None:
             alike: dict[Hashable, list[int]] = {}
             laws: dict[tuple[int, str], Laws] = {}
-            kinds: dict[int, LaneKinds | None] = {}
+            kinds: dict[bytes, LaneKinds | None] = {}
             for i, (hammer, drive) in enumerate(zip(self.hammers, self.drives, strict=True)):
                 key = (id(hammer), drive.quantity)
                 if key not in laws:

@@ -40,12 +40,13 @@ LaneKinds = tuple[int, bool, bool]
 """Number of rates of exponentials in the waveforms of a drive, whether there is a cubic piece, a sine."""
 
 
-def kernel_of(drive: Drive, known: dict[int, LaneKinds | None]) -> Hashable:
+def kernel_of(drive: Drive, known: dict[bytes, LaneKinds | None]) -> Hashable:
     """Return what of a drive decides on the kernel: the overlap rule, and the kinds of its pieces."""
     _times, _begins, pieces, replace, _force = drive.kernel_arrays()
-    if id(pieces) not in known:
-        known[id(pieces)] = closed_form(pieces)[1]
-    return bool(replace), known[id(pieces)]
+    form = pieces.tobytes()
+    if form not in known:
+        known[form] = closed_form(pieces)[1]
+    return bool(replace), known[form]
 
 
 class Group:
@@ -80,7 +81,7 @@ class Group:
         self.states = states
         self.ends = ends
         rows: dict[tuple[Any, ...], int] = {}
-        waves: dict[bytes, int] = {}
+        waves: dict[bytes, tuple[int, float]] = {}
         problems: list[Problem] = []
         tables: list[FloatArray] = []
         self.hammer_of = np.zeros(len(members), np.int64)
@@ -92,9 +93,9 @@ class Group:
                 pieces = np.asarray(drive.kernel_arrays()[2], dtype=np.float64)
                 form = pieces.tobytes()
                 if form not in waves:
-                    waves[form] = len(tables)
+                    waves[form] = len(tables), drive.largest_pulse
                     tables.append(pieces)
-                forms_of[id(drive)] = waves[form], drive.largest_pulse
+                forms_of[id(drive)] = waves[form]
             self.waveform_of[i], peak = forms_of[id(drive)]
             x, v = float(states[i, 1]), float(states[i, 2])
             key: tuple[Any, ...] = (id(hammer), peak, drive.quantity)
