@@ -34,7 +34,7 @@ for axis, (name, drive) in zip(axes, drives.items(), strict=True):
     for dot in motion.dots:
         if dot.struck:
             arrival = dot.fired_at + dot.flight_time - 1e-3 - single.flight_time
-            axis.plot(arrival * rate, 100 * dot.peak_force / single.peak_force, "o")
+            axis.plot(arrival * rate, 100 * dot.peak_force / single.peak_force, "C0o")
     axis.set(ylabel="force (%)", title=name)
 axes[0].set_ylim(60, 150)
 axes[-1].set_xlabel("place of the dot (slots)")
@@ -52,3 +52,5 @@ table.plot()
 cases = (ph.Perturbation(), ph.Perturbation(current=0.03), ph.Perturbation(current=0.1))
 report = ph.judge_table(hammer, table, perturbations=cases)
 report.plot()
+for name, share in zip(report.hammers, report.good.mean(axis=(2, 3)).T, strict=True):
+    print(f"{name:15}  open loop {share[0]:6.1%}  table {share[1]:6.1%}")
