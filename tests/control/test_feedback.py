@@ -13,7 +13,7 @@ from printhammer.control.closed_loop import closed_loops
 from printhammer.control.controller import Controller
 from printhammer.control.driver import driver_of
 from printhammer.control.feedback import Feedback, FeedbackStrategy
-from printhammer.control.sensor import Sensor
+from printhammer.control.sensor import PositionSensor
 from printhammer.printing.limits import Limits
 from printhammer.printing.perturbation import Perturbation, perturbed
 from printhammer.printing.trial import Case, attempt
@@ -24,7 +24,7 @@ HAMMER = Path(__file__).parent.parent / "data" / "bucked.toml"
 """A hammer of its own, since what a controller can do depends on the hammer."""
 
 PATTERNS = [(0, 1, 2, 3), (0, 2, 3), (0, 1, 4)]
-PERFECT = Sensor(noise=0.0, step=0.0)
+PERFECT = PositionSensor(noise=0.0, step=0.0)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def test_a_perfect_sensor_tells_when_and_how_fast_the_pack_is_touched(controller
 
 @pytest.mark.slow
 def test_the_drive_prints_within_limits_and_bounds(controller: Controller) -> None:
-    strategy = FeedbackStrategy(controller, Sensor())
+    strategy = FeedbackStrategy(controller, PositionSensor())
     other = perturbed(controller.hammer, Perturbation(current=0.03))
     for real, rate in ((controller.hammer, RATE), (other, 1000.0)):
         case = Case(real, controller.single, rate)
@@ -59,7 +59,7 @@ def test_the_drive_prints_within_limits_and_bounds(controller: Controller) -> No
 @pytest.mark.slow
 def test_a_hammer_far_from_the_nominal_one_spoils_dots_but_not_the_loop(controller: Controller) -> None:
     far = perturbed(controller.hammer, Perturbation(current=-0.4, travel=60e-6))
-    drives = FeedbackStrategy(controller, Sensor(noise=0.2))(far, PATTERNS, 2200.0)
+    drives = FeedbackStrategy(controller, PositionSensor(noise=0.2))(far, PATTERNS, 2200.0)
     assert [len(drive.times) for drive in drives] == [len(pattern) for pattern in PATTERNS]
     assert all((np.diff(drive.times) > 0.0).all() for drive in drives)
     assert max(drive.peak for drive in drives) <= CURRENT * (1.0 + 1e-12)
@@ -67,12 +67,12 @@ def test_a_hammer_far_from_the_nominal_one_spoils_dots_but_not_the_loop(controll
 
 @pytest.mark.slow
 def test_drives_do_not_depend_on_company_or_threads(controller: Controller) -> None:
-    together = FeedbackStrategy(controller, Sensor(), threads=2)(controller.hammer, PATTERNS, RATE)
+    together = FeedbackStrategy(controller, PositionSensor(), threads=2)(controller.hammer, PATTERNS, RATE)
     for pattern, drive in zip(PATTERNS, together, strict=True):
-        alone = FeedbackStrategy(controller, Sensor(), threads=1)(controller.hammer, [pattern], RATE)
+        alone = FeedbackStrategy(controller, PositionSensor(), threads=1)(controller.hammer, [pattern], RATE)
         assert alone == [drive]
         assert len(drive.times) == len(pattern)
-    other = FeedbackStrategy(controller, Sensor(seed=1))(controller.hammer, PATTERNS, RATE)
+    other = FeedbackStrategy(controller, PositionSensor(seed=1))(controller.hammer, PATTERNS, RATE)
     assert other != together
 
 

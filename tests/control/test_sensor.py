@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.control.sensor import Sensor, normal, run_key
+from printhammer.control.sensor import PositionSensor, normal, run_key
 
 STROKE = 150e-6
 
@@ -45,7 +45,7 @@ def test_noise_is_normal_and_white() -> None:
 def test_no_sample_is_used_before_it_is_in(
     since: float, until: float, delay: float, interval: float, most: int
 ) -> None:
-    sensor = Sensor(delay=delay, interval=interval)
+    sensor = PositionSensor(delay=delay, interval=interval)
     numbers = sensor.numbers(np.array([since]), np.array([until]), most)[0]
     assert numbers.shape == (most,)
     used = numbers[numbers >= 0]
@@ -59,8 +59,8 @@ def test_a_perfect_sensor_shows_the_truth_and_a_coarse_one_its_steps() -> None:
     x = np.linspace(50e-6, 200e-6, 31)[np.newaxis, :]
     numbers = np.arange(31)[np.newaxis, :]
     runs = np.array([3], dtype=np.uint64)
-    assert np.array_equal(Sensor(noise=0.0, step=0.0).read(x, numbers, runs, STROKE), x)
-    coarse = Sensor(noise=0.0, step=0.125).read(x, numbers, runs, STROKE) / (0.125 * STROKE)
+    assert np.array_equal(PositionSensor(noise=0.0, step=0.0).read(x, numbers, runs, STROKE), x)
+    coarse = PositionSensor(noise=0.0, step=0.125).read(x, numbers, runs, STROKE) / (0.125 * STROKE)
     assert np.allclose(coarse, np.round(coarse), rtol=0.0, atol=1e-9)
     assert np.abs(coarse * 0.125 * STROKE - x).max() <= 0.5 * 0.125 * STROKE * (1.0 + 1e-9)
 
@@ -78,4 +78,4 @@ def test_a_perfect_sensor_shows_the_truth_and_a_coarse_one_its_steps() -> None:
 )
 def test_bad_sensors_are_refused(change: dict[str, float], told: str) -> None:
     with pytest.raises(ph.InputError, match=told):
-        dataclasses.replace(Sensor(), **change)
+        dataclasses.replace(PositionSensor(), **change)

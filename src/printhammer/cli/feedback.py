@@ -173,9 +173,9 @@ def told(found: Feedback, units: Units) -> Table:
 
 
 def _sensor(given: dict[str, Any]) -> Any:
-    from printhammer.control.sensor import Sensor
+    from printhammer.control.sensor import PositionSensor
 
-    return Sensor(**{key: value for key, value in given.items() if value is not None})
+    return PositionSensor(**{key: value for key, value in given.items() if value is not None})
 
 
 def _driven(hammer: Hammer, supply: str, travel: str) -> Hammer:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.controller import Controller
-    from printhammer.control.sensor import Sensor
+    from printhammer.control.sensor import PositionSensor
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
@@ -115,7 +115,7 @@ class Loop:
 def closed_loops(
     hammer: Hammer,
     controller: Controller,
-    sensor: Sensor,
+    sensor: PositionSensor,
     patterns: Sequence[tuple[int, ...]],
     rate: float,
     *,
@@ -130,7 +130,7 @@ def closed_loops(
         What is driven; the controller does not know it.
     controller : Controller
         Who drives it.
-    sensor : Sensor
+    sensor : PositionSensor
         What the controller sees of it.
     patterns : sequence of tuple of int
         Numbers of the slots at which dots are wanted.
@@ -164,7 +164,7 @@ def closed_loops(
 def _carry(
     hammer: Hammer,
     controller: Controller,
-    sensor: Sensor,
+    sensor: PositionSensor,
     loops: list[Loop],
     tolerance: float,
     threads: int | None,

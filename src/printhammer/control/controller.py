@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from printhammer.control.closed_loop import Loop
     from printhammer.control.driver import Driver
-    from printhammer.control.sensor import Sensor
+    from printhammer.control.sensor import PositionSensor
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
@@ -103,7 +103,7 @@ class Controller:
             self._policies[period] = Policy(self.table, period, self.limits, self.landing)
         return self._policies[period]
 
-    def samples(self, sensor: Sensor) -> int:
+    def samples(self, sensor: PositionSensor) -> int:
         """Return how many samples are looked at."""
         return max(1, round(WINDOW / sensor.interval))
 
@@ -120,7 +120,7 @@ class Controller:
         loop.since = fired + _CLEAR * start.flight
 
     def estimate(
-        self, loops: Sequence[Loop], times: FloatArray, shown: FloatArray, used: Any, sensor: Sensor
+        self, loops: Sequence[Loop], times: FloatArray, shown: FloatArray, used: Any, sensor: PositionSensor
     ) -> None:
         """Estimate the coming touches from what the sensor shows, arrays (M, N)."""
         expected = Expected(

@@ -17,7 +17,7 @@ import numpy as np
 from printhammer.control.closed_loop import closed_loops
 from printhammer.control.controller import Controller
 from printhammer.control.driver import LARGEST_CURRENT, driver_of
-from printhammer.control.sensor import Sensor
+from printhammer.control.sensor import PositionSensor
 from printhammer.drive_input import read_number, read_positive
 from printhammer.ensemble import DISPLAY_TOLERANCE
 from printhammer.errors import InputError
@@ -59,7 +59,7 @@ class FeedbackStrategy:
     ----------
     controller : Controller
         Made for the nominal hammer.
-    sensor : Sensor, optional
+    sensor : PositionSensor, optional
         What it sees of the hammer that is driven.
     tolerance : float, optional
         Of the closed loop.
@@ -72,13 +72,13 @@ class FeedbackStrategy:
     def __init__(
         self,
         controller: Controller,
-        sensor: Sensor | None = None,
+        sensor: PositionSensor | None = None,
         *,
         tolerance: float = DISPLAY_TOLERANCE,
         threads: int | None = None,
     ) -> None:
         self.controller = controller
-        self.sensor = Sensor() if sensor is None else sensor
+        self.sensor = PositionSensor() if sensor is None else sensor
         self._options: dict[str, Any] = {"tolerance": tolerance, "threads": threads}
 
     def __call__(
@@ -126,7 +126,7 @@ class Feedback:
         The hammer that is driven.
     driver : Driver
         Of the coil, with feedback.
-    sensor : Sensor
+    sensor : PositionSensor
         What the controller sees.
     limits : Limits
         How far dots may be off.
@@ -159,7 +159,7 @@ class Feedback:
     hammer: Hammer
     driven: Hammer
     driver: Driver
-    sensor: Sensor
+    sensor: PositionSensor
     limits: Limits
     single: Nominal
     rate: float
@@ -197,7 +197,7 @@ def feedback(
     rate: float | str,
     *,
     driven: Hammer | None = None,
-    sensor: Sensor | None = None,
+    sensor: PositionSensor | None = None,
     current: float | str = LARGEST_CURRENT,
     edge: float | str | None = None,
     limits: Limits | None = None,
@@ -216,7 +216,7 @@ def feedback(
         Slots per second, Hz, or text with a unit.
     driven : Hammer, optional
         The hammer that is driven; by default the nominal one.
-    sensor : Sensor, optional
+    sensor : PositionSensor, optional
         What the controller sees; by default 1 % noise and 20 us delay.
     current : float or str, optional
         Largest current of the driver to either side, A.
@@ -247,7 +247,7 @@ def feedback(
     speed = rate_of(rate)
     wide = None if edge is None else read_positive(edge, "s", "edge")
     driver = driver_of(hammer, read_positive(current, "A", "current"), wide)
-    seeing = Sensor() if sensor is None else sensor
+    seeing = PositionSensor() if sensor is None else sensor
     bounds = Limits() if limits is None else limits
     real = hammer if driven is None else driven
     between = None if gaps is None else _checked_gaps(gaps)
@@ -296,7 +296,7 @@ def _checked_gaps(given: npt.ArrayLike) -> FloatArray:
 def _seen(
     hammer: Hammer,
     controller: Controller,
-    sensor: Sensor,
+    sensor: PositionSensor,
     rate: float,
     tolerance: float,
     threads: int | None,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Sensor:
+class PositionSensor:
     """A position sensor.
 
     Attributes
