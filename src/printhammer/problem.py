@@ -174,8 +174,8 @@ class Problem:
         Error allowed in one step, in units of the stroke and of a typical speed.
     """
 
-    max_steps: int = MAX_STEPS
-    """Number of steps after which a run is given up."""
+    max_steps: int | None = None
+    """Number of steps after which a run is given up; None: `MAX_STEPS`."""
 
     def __init__(
         self, hammer: Hammer, drive: Drive, state: tuple[float, float], start: float, tolerance: float
@@ -233,7 +233,7 @@ class Problem:
                 float(end),
                 self.control,
                 self.bounds,
-                self.max_steps,
+                self.max_steps or MAX_STEPS,
                 under_way,
                 live,
                 nodes,

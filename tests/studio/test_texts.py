@@ -73,7 +73,9 @@ def test_the_command_runs_with_the_saved_files(
     assert ended.value.code == 0, capsys.readouterr().err
 
 
-def test_a_shipped_hammer_is_named() -> None:
+def test_a_shipped_hammer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Other tests in this process may have offered a hammer of the same name.
+    monkeypatch.setattr("printhammer.studio.state._offered", {})
     texts = texts_of(read_state({**STATE, "hammer": "hendriks-1983"}))
     assert "ph.load('hendriks-1983')" in texts["python"]
     assert texts["command"].startswith("printhammer run hendriks-1983 --rate '1200.0 Hz' --pulses 9")
