@@ -65,7 +65,7 @@ class Braked:
     off: float
 
 
-def brakes(work: Work, period: float, *, fine: bool = False) -> list[Braked]:
+def brakes(work: Work, period: float) -> list[Braked]:
     """Search for a brake pulse with which a dot is well made one period after another.
 
     The best one for a perfect first dot may be of no use: a brake pulse that ends just as the armature lands
@@ -78,8 +78,6 @@ def brakes(work: Work, period: float, *, fine: bool = False) -> list[Braked]:
         What the table is to be like.
     period : float
         From slot to slot, s.
-    fine : bool, optional
-        Whether to look more closely, for four times the work.
 
     Returns
     -------
@@ -92,11 +90,10 @@ def brakes(work: Work, period: float, *, fine: bool = False) -> list[Braked]:
     # A chain asks that the print pulse is over; twice as well, since it may be a little wider.
     over = own.width * (1.0 + HARD) + LATE + fading(own, 0.5 * TAIL)
     earliest = max(single.left, over)
-    factor = 2 if fine else 1
     cells = [
         (delay, brake, fired, width)
-        for delay in np.linspace(earliest, max(earliest, single.returned), _DELAYS * factor).tolist()
-        for brake in np.linspace(0.0, work.widest, _BRAKES * factor + 1)[1:].tolist()
+        for delay in np.linspace(earliest, max(earliest, single.returned), _DELAYS).tolist()
+        for brake in np.linspace(0.0, work.widest, _BRAKES + 1)[1:].tolist()
         for fired in np.linspace(period - _ROOM, period + _ROOM, _FIRED).tolist()
         for width in np.linspace(_LEAST * own.width, work.widest, _WIDTHS).tolist()
         if delay + brake + fade <= fired
@@ -104,7 +101,7 @@ def brakes(work: Work, period: float, *, fine: bool = False) -> list[Braked]:
     if not cells:
         return []
     off = _off(work, period, cells, _FIRST[:1])
-    best = np.argsort(off, kind="stable")[: factor * factor * _CANDIDATES]
+    best = np.argsort(off, kind="stable")[:_CANDIDATES]
     best = best[np.isfinite(off[best])]
     if not best.size:
         return []

@@ -228,12 +228,10 @@ def _tuned(
         work, starts = subset(work, np.arange(ends)), starts[:ends]
     for turn in range(GUESSES):
         _try(work, [[cells[turn] if turn < len(cells) else None for cells in row] for row in starts], steps)
-    for fine in (False, True) if brake else ():
-        pulses = _brakes(work, fine=fine)
-        for turn in range(BRAKES):
-            _try(
-                work, [[cells[turn] if turn < len(cells) else None for cells in row] for row in pulses], steps
-            )
+    for turn in range(BRAKES if brake else 0):
+        if turn == 0:
+            pulses = _brakes(work)
+        _try(work, [[cells[turn] if turn < len(cells) else None for cells in row] for row in pulses], steps)
     found = np.isfinite(work.deviation.max(axis=1))
     good = subset(work, np.flatnonzero(found))
     if found.any():
@@ -265,14 +263,14 @@ def _starts(work: Work) -> list[list[list[Guess]]]:
     ]
 
 
-def _brakes(work: Work, *, fine: bool) -> list[list[list[Braked]]]:
+def _brakes(work: Work) -> list[list[list[Braked]]]:
     """Return brake pulses for each rate and gap at which dots are not good enough without."""
     found: list[list[list[Braked]]] = []
     for row, rate in enumerate(work.rates.tolist()):
         found.append([])
         for gap in range(1, work.reach + 1):
             wanted = not work.deviation[row, _columns(work)[gap][0]] <= _FREE
-            found[-1].append(brakes(work, gap / rate, fine=fine) if wanted else [])
+            found[-1].append(brakes(work, gap / rate) if wanted else [])
     return found
 
 
