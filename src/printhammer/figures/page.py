@@ -156,7 +156,9 @@ def zoomed_sheet(page: Page) -> Sheet:
 def _figure(height: float, width: float = _WIDTH) -> Figure:
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), layout="none")
+    figure = Figure(figsize=(width, height))
+    figure.set_layout_engine("none")
+    return figure
 
 
 def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, left: float = _SIDE) -> Axes:
