@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -26,8 +26,8 @@ EXAMPLE: Final = (
     " --v '-1 m/s, 1 m/s, 20' --out basins.png"
 )
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
 _SUFFIXES: Final = (".nc", ".csv")
+_DOTS: Final = 200.0
 _TRAIN: Final = "Basins (one of --period and --rate)"
 _QUENCH: Final = "Quench map"
 _ROWS: Final = 12
@@ -88,17 +88,12 @@ def basins(
     """
     from rich.markup import escape
 
-    from printhammer.cli import run_files
-    from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.drive import PulseTrain
-    from printhammer.errors import InputError
+    from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
+    from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.outputs import check_outputs
 
     wanted = out or []
-    for path in wanted:
-        if path.suffix.lower() not in (*_SUFFIXES, *_PICTURES):
-            known = ", ".join((*_SUFFIXES, *_PICTURES))
-            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    check_endings(wanted, (*_SUFFIXES, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     of_basins = {
         "period": period,
@@ -112,11 +107,7 @@ def basins(
     of_quench = {"gaps": _range(gaps, "--gaps"), "widths": _range(widths, "--widths"), "tail": tail}
     side = whole(box, "box")
     _one_kind(quench, {**of_basins, "box": side}, of_quench)
-    loaded = load_checked(hammer)
-    if loaded.waveform is None:
-        raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
-    named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
-    check_outputs(wanted, [Path(hammer), *named])
+    loaded = load_fired(hammer, wanted)
     announce_compiling()
     given = {"tolerance": number(tolerance, "tolerance"), "threads": whole(threads, "threads")}
     options: dict[str, Any] = {
@@ -132,9 +123,7 @@ def basins(
         found = mapped = _computed("cells", lambda tell: quench_map(loaded, progress=tell, **options))
         lines = quenched(mapped, units)
         failed = mapped.status[mapped.status != "ok"]
-
-        def save(path: Path) -> None:
-            save_quench(mapped, path)
+        save = partial(save_quench, mapped)
 
     else:
         from printhammer.chaos.basins import NO_STATE_STATUS
@@ -144,19 +133,12 @@ def basins(
         found = planes = _computed("cells", lambda tell: computed(loaded, progress=tell, **options))
         lines = told(planes, side, units)
         failed = planes.status[(planes.status != "ok") & (planes.status != NO_STATE_STATUS)]
-
-        def save(path: Path) -> None:
-            save_basins(planes, path)
+        save = partial(save_basins, planes)
 
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     screen.print(f"[dim]{found.status.size} cells, computed in {perf_counter() - begin:.2g} s[/dim]\n")
     screen.print(lines)
-    for path in wanted:
-        if path.suffix.lower() in _PICTURES:
-            _draw(found, path)
-        else:
-            save(path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    write_found(screen, wanted, found.plot, save, dpi=_DOTS)
     if failed.size:
         kinds = ", ".join(sorted(set(failed.tolist())))
         complain(f"{failed.size} of {found.status.size} runs ended early: {kinds}")
@@ -268,11 +250,3 @@ def quenched(found: QuenchMap, units: Units) -> Table:
         ends = [with_unit(float(end), "time", units) for end in (gain.min(), gain.max())]
         table.add_row("flies shorter by", " to ".join(ends))
     return table
-
-
-def _draw(found: Basins | QuenchMap, path: Path) -> None:
-    from printhammer.outputs import write_file
-
-    buffer = BytesIO()
-    found.plot().savefig(buffer, format=path.suffix[1:].lower(), dpi=200.0)
-    write_file(path, buffer.getvalue())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -24,9 +24,9 @@ EXAMPLE: Final = (
     " --direction both --out bifurcation.png"
 )
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
 _RANGE: Final = ("0.8 ms", "1.35 ms")
 _VALUES: Final = 500
+_DOTS: Final = 200.0
 _PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
 _ROWS: Final = 12
 
@@ -93,10 +93,9 @@ def bifurcation(
     from rich.markup import escape
 
     from printhammer.chaos.bifurcation import InterruptedDiagram
-    from printhammer.cli import run_files
-    from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.drive import PulseTrain
-    from printhammer.errors import InputError
+    from printhammer.chaos.bifurcation_tables import save_bifurcation
+    from printhammer.cli.saving import load_fired, write_found
+    from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.outputs import check_outputs
 
     wanted = out or []
@@ -113,11 +112,7 @@ def bifurcation(
     }
     if tolerance is not None:
         options["tolerance"] = number(tolerance, "tolerance")
-    loaded = load_checked(hammer)
-    if loaded.waveform is None:
-        raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
-    named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
-    check_outputs(wanted, [Path(hammer), *named])
+    loaded = load_fired(hammer, wanted)
     options |= _values(loaded, parameter, (lowest, highest), whole(values, "values") or 0, period, rate)
     announce_compiling()
     screen = console()
@@ -139,9 +134,9 @@ def bifurcation(
             screen.print(summary(found, name))
         for line in sentences(found):
             screen.print(escape(line), soft_wrap=True)
-        for path in wanted:
-            _write(found, path, show)
-            screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+        write_found(
+            screen, wanted, partial(found.plot, show=show), partial(save_bifurcation, found), dpi=_DOTS
+        )
     if stopped is not None:
         raise KeyboardInterrupt from stopped
     failed = found.status[found.status != "ok"]
@@ -153,12 +148,10 @@ def bifurcation(
 
 def _check(wanted: list[Path], show: str) -> None:
     from printhammer.chaos.bifurcation_tables import SUFFIXES
+    from printhammer.cli.saving import PICTURES, check_endings
     from printhammer.errors import InputError
 
-    for path in wanted:
-        if path.suffix.lower() not in (*SUFFIXES, *_PICTURES):
-            known = ", ".join((*SUFFIXES, *_PICTURES))
-            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    check_endings(wanted, (*SUFFIXES, *PICTURES))
     if show not in ("x", "v"):
         raise InputError(f"--show {show}: expected x or v")
 
@@ -269,15 +262,3 @@ def sentences(found: Bifurcation) -> list[str]:
         share = float(widths[apart].sum() / (widths.sum() or 1.0))
         told.append(f"Up and down lead to different attractors at {100.0 * share:.2f} % of the range.")
     return told
-
-
-def _write(found: Bifurcation, path: Path, show: str) -> None:
-    from printhammer.chaos.bifurcation_tables import save_bifurcation
-    from printhammer.outputs import write_file
-
-    if path.suffix.lower() in _PICTURES:
-        buffer = BytesIO()
-        found.plot(show=show).savefig(buffer, format=path.suffix[1:].lower(), dpi=200.0)
-        write_file(path, buffer.getvalue())
-    else:
-        save_bifurcation(found, path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -27,7 +27,6 @@ EXAMPLE: Final = (
     " --from '1.27 ms' --to '1.34 ms' --out branch.png"
 )
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
 _MOST, _LONGEST, _SEEDS = 1000, 3, 6
 _GRID: Final = 32
 _START: Final = "Start (one of --period and --rate, or --regimes)"
@@ -101,18 +100,15 @@ def continue_(
     """Follow a periodic motion, stable or not, through the values of a constant, to where it ends and why."""
     from rich.markup import escape
 
-    from printhammer.chaos.continuation_tables import SUFFIXES
-    from printhammer.cli import run_files
-    from printhammer.cli.terminal import announce_compiling, console, honesty, load_checked
-    from printhammer.drive import PulseTrain
+    from printhammer.chaos.continuation_tables import SUFFIXES, save_branches
+    from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
+    from printhammer.cli.terminal import announce_compiling, console, honesty
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
 
     wanted = out or []
-    endings = (".nc", *_PICTURES) if second is not None else (*SUFFIXES, *_PICTURES)
-    for path in wanted:
-        if path.suffix.lower() not in endings:
-            raise InputError(f"--out {path}: expected a name that ends in one of {', '.join(endings)}")
+    endings = (".nc", *PICTURES) if second is not None else (*SUFFIXES, *PICTURES)
+    check_endings(wanted, endings)
     check_outputs(wanted, [Path(hammer)])
     if lowest is None or highest is None:
         missing = "--from" if lowest is None else "--to"
@@ -124,11 +120,7 @@ def continue_(
     if second is not None and (second_from is None or second_to is None):
         missing = "--second-from" if second_from is None else "--second-to"
         raise InputError(f"{missing} is missing, expected the range of {second}")
-    loaded = load_checked(hammer)
-    if loaded.waveform is None:
-        raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
-    named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
-    check_outputs(wanted, [Path(hammer), *named])
+    loaded = load_fired(hammer, wanted)
     announce_compiling()
     common = {"most": whole(most, "most"), "overlap": overlap.value, **_tolerance(tolerance)}
     screen = console()
@@ -162,9 +154,10 @@ def continue_(
     if second is not None:
         chart = _charted(found[0], second, (second_from or "", second_to or ""), whole(grid, "grid") or 0)
         screen.print(f"\n{escape(chart.message)}", soft_wrap=True)
-    for path in wanted:
-        _write(path, found, chart, show)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    if chart is not None:
+        write_found(screen, wanted, chart.plot, partial(_save_chart, chart))
+    else:
+        write_found(screen, wanted, partial(found.plot, show=show), partial(save_branches, list(found)))
 
 
 def _tolerance(text: str | None) -> dict[str, float]:
@@ -267,19 +260,7 @@ def _number(multiplier: complex) -> str:
     return real if multiplier.imag == 0.0 else f"{real}{multiplier.imag:+.4g}i"
 
 
-def _write(path: Path, found: Branches, chart: StabilityChart | None, show: str) -> None:
-    """Write a file or a picture, of the chart where there is one."""
-    from printhammer.chaos.continuation_tables import save_branches
+def _save_chart(chart: StabilityChart, path: Path) -> None:
     from printhammer.outputs import write_file
 
-    kind = path.suffix.lower()
-    if kind in _PICTURES:
-        buffer = BytesIO()
-        figure = found.plot(show=show) if chart is None else chart.plot()
-        figure.savefig(buffer, format=kind[1:])
-        write_file(path, buffer.getvalue())
-    elif chart is not None:
-        content = chart.to_dataset().to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-        write_file(path, bytes(content))
-    else:
-        save_branches(list(found), path)
+    write_file(path, bytes(chart.to_dataset().to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")))

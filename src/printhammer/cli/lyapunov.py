@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 EXAMPLE: Final = "Example: printhammer lyapunov hendriks-1983 --period '1.10 ms, 1.30 ms' --firings 300"
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
 _FIRINGS, _TRANSIENT = 1000, 1000
 _STEPS: Final = 100
 _MOST_ROWS: Final = 40
@@ -68,18 +67,13 @@ def lyapunov(
     from printhammer.chaos import LyapunovChart
     from printhammer.chaos import lyapunov as exponents_of
     from printhammer.chaos.lyapunov_tables import SUFFIXES, save_lyapunov
-    from printhammer.cli import run_files
-    from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.drive import PulseTrain
-    from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs, write_file
+    from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
+    from printhammer.cli.terminal import announce_compiling, complain, console, honesty
+    from printhammer.outputs import check_outputs
     from printhammer.problem import TOLERANCE
 
     wanted = out or []
-    for path in wanted:
-        if path.suffix.lower() not in (*SUFFIXES, *_PICTURES):
-            known = ", ".join((*SUFFIXES, *_PICTURES))
-            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    check_endings(wanted, (*SUFFIXES, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     periods = _periods(period, rate, lowest, highest, steps)
     options: dict[str, Any] = {
@@ -88,11 +82,7 @@ def lyapunov(
         "overlap": overlap.value,
         "tolerance": TOLERANCE if tolerance is None else number(tolerance, "tolerance") or 0.0,
     }
-    loaded = load_checked(hammer)
-    if loaded.waveform is None:
-        raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
-    named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
-    check_outputs(wanted, [Path(hammer), *named])
+    loaded = load_fired(hammer, wanted)
     announce_compiling()
     single = None
     if len(periods) == 1:
@@ -107,15 +97,7 @@ def lyapunov(
     screen.print(many(chart) if single is None else summary(single))
     if single is None:
         screen.print(f"\n{tally(chart)}", soft_wrap=True)
-    for path in wanted:
-        if path.suffix.lower() in _PICTURES:
-            buffer = BytesIO()
-            drawn = chart if single is None else single
-            drawn.plot().savefig(buffer, format=path.suffix[1:].lower())
-            write_file(path, buffer.getvalue())
-        else:
-            save_lyapunov(chart, path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    write_found(screen, wanted, (chart if single is None else single).plot, partial(save_lyapunov, chart))
     stopped = sorted({status for status in chart.status if status != "ok"})
     if stopped:
         count = sum(status != "ok" for status in chart.status)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 EXAMPLE: Final = "Example: printhammer orbits hendriks-1983 --period '1.05 ms' --longest 4 --out orbits.csv"
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
 _LONGEST: Final = 8
 _STARTS: Final = 1024
 _GUESSES: Final = 48
@@ -65,25 +64,17 @@ def orbits(
     from rich.markup import escape
 
     from printhammer.chaos.orbit_tables import SUFFIXES, save_orbits
-    from printhammer.cli import run_files
-    from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.drive import PulseTrain
+    from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
+    from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs, write_file
+    from printhammer.outputs import check_outputs
 
     wanted = out or []
-    for path in wanted:
-        if path.suffix.lower() not in (*SUFFIXES, *_PICTURES):
-            known = ", ".join((*SUFFIXES, *_PICTURES))
-            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    check_endings(wanted, (*SUFFIXES, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     if (period is None) == (rate is None):
         raise InputError("--period and --rate: expected one of them, such as --period '1.05 ms'")
-    loaded = load_checked(hammer)
-    if loaded.waveform is None:
-        raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
-    named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
-    check_outputs(wanted, [Path(hammer), *named])
+    loaded = load_fired(hammer, wanted)
     announce_compiling()
     found = _searched(
         loaded,
@@ -104,14 +95,7 @@ def orbits(
         screen.print(summary(found, units))
         screen.print()
     screen.print(found.message, soft_wrap=True)
-    for path in wanted:
-        if path.suffix.lower() in _PICTURES:
-            buffer = BytesIO()
-            found.plot().savefig(buffer, format=path.suffix[1:].lower())
-            write_file(path, buffer.getvalue())
-        else:
-            save_orbits(found, path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    write_found(screen, wanted, found.plot, partial(save_orbits, found))
     if not len(found):
         complain("no periodic orbit was found; more --starts or --guesses may find one")
         raise typer.Exit(1)

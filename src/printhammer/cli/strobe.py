@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 EXAMPLE: Final = "Example: printhammer strobe hendriks-1983 --period '1.10 ms' --points 200 --out points.csv"
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
 _POINTS: Final = 200
 _TRAIN: Final = "Train (one of --period and --rate)"
 
@@ -61,26 +60,18 @@ def strobe(
 
     from printhammer.chaos import strobe as strobed
     from printhammer.chaos.tables import SUFFIXES, save_strobe
-    from printhammer.cli import run_files
-    from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.drive import PulseTrain
+    from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
+    from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs, write_file
+    from printhammer.outputs import check_outputs
     from printhammer.problem import TOLERANCE
 
     wanted = out or []
-    for path in wanted:
-        if path.suffix.lower() not in (*SUFFIXES, *_PICTURES):
-            known = ", ".join((*SUFFIXES, *_PICTURES))
-            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    check_endings(wanted, (*SUFFIXES, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     if (period is None) == (rate is None):
         raise InputError("--period and --rate: expected one of them, such as --period '1.10 ms'")
-    loaded = load_checked(hammer)
-    if loaded.waveform is None:
-        raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
-    named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
-    check_outputs(wanted, [Path(hammer), *named])
+    loaded = load_fired(hammer, wanted)
     announce_compiling()
     found = strobed(
         loaded,
@@ -98,14 +89,7 @@ def strobe(
     train = f"{found.drive.waveform.shape} {found.drive.quantity} every {found.period:.9g} s"
     screen.print(f"[dim]{escape(train)}, overlap {found.drive.overlap}[/dim]\n")
     screen.print(summary(found, units))
-    for path in wanted:
-        if path.suffix.lower() in _PICTURES:
-            buffer = BytesIO()
-            found.plot().savefig(buffer, format=path.suffix[1:].lower())
-            write_file(path, buffer.getvalue())
-        else:
-            save_strobe(found, path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    write_found(screen, wanted, found.plot, partial(save_strobe, found))
     if not found.ok:
         complain(f"the run ended early: {found.status}")
         raise typer.Exit(1)

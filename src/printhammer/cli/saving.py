@@ -1,0 +1,103 @@
+"""Files that a verb writes: their names checked before any work, their contents written at its end."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from rich.console import Console
+
+    from printhammer.hammer import Hammer
+
+PICTURES: Final = (".svg", ".png", ".pdf")
+"""Endings of the names of pictures."""
+
+
+def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "--out") -> None:
+    """Make sure that names end as what can be written there.
+
+    Raises
+    ------
+    InputError
+        One of them ends otherwise.
+    """
+    from printhammer.errors import InputError
+
+    for path in paths:
+        if path.suffix.lower() not in endings:
+            raise InputError(f"{option} {path}: expected a name that ends in one of {', '.join(endings)}")
+
+
+def load_fired(name: str, wanted: Iterable[Path]) -> Hammer:
+    """Load a hammer that is to be fired with its own waveform.
+
+    Parameters
+    ----------
+    name : str
+        Path of a hammer file, or name of a hammer that ships with the program.
+    wanted : iterable of path
+        What is to be written.
+
+    Raises
+    ------
+    InputError
+        There is no such hammer, it does not rest at its backstop, it has no waveform, or a table that it is
+        read from is to be written.
+    """
+    from printhammer.cli import run_files
+    from printhammer.cli.terminal import load_checked
+    from printhammer.drive import PulseTrain
+    from printhammer.errors import InputError
+    from printhammer.outputs import check_outputs
+
+    loaded = load_checked(name)
+    if loaded.waveform is None:
+        raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
+    named = run_files.tables(loaded, Path(name), PulseTrain(loaded.waveform), None)
+    check_outputs(wanted, [Path(name), *named])
+    return loaded
+
+
+def write_found(
+    screen: Console,
+    wanted: Iterable[Path],
+    plot: Callable[[], Any],
+    save: Callable[[Path], Any],
+    *,
+    dpi: float | None = None,
+) -> None:
+    """Write a result, as a picture where the name is that of one, and say so.
+
+    Parameters
+    ----------
+    screen : Console
+        Where it is said.
+    wanted : iterable of path
+        What is to be written.
+    plot : callable
+        Returns a matplotlib figure.
+    save : callable
+        Writes any other file.
+    dpi : float, optional
+        Dots per inch of a picture; by default those of the figure.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written.
+    """
+    from printhammer.outputs import write_file
+
+    for path in wanted:
+        ending = path.suffix.lower()
+        if ending in PICTURES:
+            buffer = BytesIO()
+            plot().savefig(buffer, format=ending[1:], dpi="figure" if dpi is None else dpi)
+            write_file(path, buffer.getvalue())
+        else:
+            save(path)
+        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
