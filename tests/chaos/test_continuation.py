@@ -13,6 +13,7 @@ from printhammer.chaos import Branch, BranchEvent, Regime
 from printhammer.chaos.branch_points import BranchPoint
 from printhammer.chaos.continuation_events import event_of
 from printhammer.chaos.continuation_family import Passage, RegimeFamily, Touch
+from printhammer.chaos.continuation_regimes import InterruptedBranches
 from printhammer.chaos.continuation_tables import save_branches
 from printhammer.chaos.strobe_map import strobe_map
 
@@ -224,6 +225,16 @@ def test_regimes_follow_each_orbit_once(hammer: "ph.Hammer") -> None:
     assert str(len(found)) in found.message
     assert found.to_dataset().sizes["branch"] == len(found)
     assert any(branch.stable.all() for branch in found)
+
+
+def test_an_interrupted_search_hands_over_what_was_followed(hammer: "ph.Hammer") -> None:
+    def stop(_done: int, _total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        ph.regimes(hammer, (330.0, 340.0), longest=1, seeds=2, progress=stop)
+    assert isinstance(caught.value, InterruptedBranches)
+    assert len(caught.value.branches) >= 1
 
 
 @pytest.mark.parametrize(

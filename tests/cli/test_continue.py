@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
+from printhammer.chaos.continuation_regimes import Branches, InterruptedBranches
 from printhammer.cli.continuation import EXAMPLE
 from printhammer.cli.main import app
 
@@ -33,6 +34,30 @@ def test_a_branch(cli: Callable, tmp_path: Path) -> None:
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert paths["pdf"].read_bytes().startswith(b"%PDF")
     assert b"<svg" in paths["svg"].read_bytes()
+
+
+def test_ctrl_c_writes_the_branches_that_were_followed(
+    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    branch = ph.continuation(ph.load("hendriks-1983"), "period", ("2.99 ms", "3.01 ms"), period="3 ms")
+
+    def interrupted(*_arguments: object, **_options: object) -> None:
+        raise InterruptedBranches(Branches((branch,)))
+
+    monkeypatch.setattr("printhammer.cli.continuation._regimes", interrupted)
+    out = tmp_path / "branches.csv"
+    done = cli("continue", "--regimes", "--from", "330 Hz", "--to", "340 Hz", "--out", out)
+    assert done.status == 130
+    assert len(pd.read_csv(out)) == len(branch)
+
+
+def test_nothing_found_is_status_1(cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("printhammer.cli.continuation._regimes", lambda *_given, **_options: Branches(()))
+    out = tmp_path / "branches.csv"
+    done = cli("continue", "--regimes", "--from", "330 Hz", "--to", "340 Hz", "--out", out)
+    assert done.status == 1
+    assert "no branch was found" in done.err
+    assert not out.exists()
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ between two folds and is joined to nothing, is a closed loop.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
@@ -99,6 +100,20 @@ class Branches:
         return import_module("printhammer.figures.continuation").plot(self, **options)
 
 
+class InterruptedBranches(KeyboardInterrupt):
+    """The search for branches was interrupted.
+
+    Attributes
+    ----------
+    branches : Branches
+        Those that were followed to their ends by then.
+    """
+
+    def __init__(self, branches: Branches) -> None:
+        super().__init__("interrupted")
+        self.branches = branches
+
+
 def regimes(
     hammer: Hammer,
     rates: tuple[float | str, float | str],
@@ -147,6 +162,8 @@ def regimes(
     ------
     InputError
         An argument is not what is described above.
+    InterruptedBranches
+        At an interrupt (Ctrl-C), with the branches that were followed by then.
     """
     try:
         low, high = (read_positive(rate, "Hz", "rates") for rate in rates)
@@ -158,31 +175,39 @@ def regimes(
     steps = Steps(most=read_count(most, "most"), precision=PRECISION)
     collected = _Collected((low, high), steps, tolerance, threads)
     many = read_count(longest, "longest")
-    for k in range(count):
-        rate = low + (high - low) * (k + 0.5) / count
-        regime = Regime.of(hammer, rate=rate, waveform=waveform, overlap=overlap)
-        search = orbits_of(regime, longest=many, threads=threads)
-        if not search.found:
-            collected.refused.append(f"at {rate:.9g} Hz {search.message}")
-        collected.add(list(search.found))
-        if progress is not None:
-            progress(k + 1, count + levels)
-    for k in range(levels):
-        collected.double(k)
-        if progress is not None:
-            progress(count + k + 1, count + levels)
+    with collected.kept_at_interrupt():
+        for k in range(count):
+            rate = low + (high - low) * (k + 0.5) / count
+            regime = Regime.of(hammer, rate=rate, waveform=waveform, overlap=overlap)
+            search = orbits_of(regime, longest=many, threads=threads)
+            if not search.found:
+                collected.refused.append(f"at {rate:.9g} Hz {search.message}")
+            collected.add(list(search.found))
+            if progress is not None:
+                progress(k + 1, count + levels)
+        for k in range(levels):
+            collected.double(k)
+            if progress is not None:
+                progress(count + k + 1, count + levels)
     return collected.result()
 
 
 def follow_doublings(
     branch: Branch, levels: int, *, most: int = MOST, threads: int | None = None
 ) -> Branches:
-    """Return a branch with those born at its period doublings, theirs, and so on, to so many levels."""
+    """Return a branch with those born at its period doublings, theirs, and so on, to so many levels.
+
+    Raises
+    ------
+    InterruptedBranches
+        At an interrupt (Ctrl-C), with the branches that were followed by then.
+    """
     steps = Steps(most=most, precision=PRECISION)
     collected = _Collected(branch.bounds, steps, branch.tolerance, threads)
     collected.found.append(branch)
-    for k in range(levels):
-        collected.double(k)
+    with collected.kept_at_interrupt():
+        for k in range(levels):
+            collected.double(k)
     return collected.result()
 
 
@@ -210,6 +235,14 @@ class _Collected:
     def result(self) -> Branches:
         """Return all, shorter periods first."""
         return Branches(tuple(sorted(self.found, key=lambda branch: branch.firings)), tuple(self.refused))
+
+    @contextmanager
+    def kept_at_interrupt(self) -> Iterator[None]:
+        """Hand over what was found at an interrupt."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            raise InterruptedBranches(self.result()) from None
 
     def add(self, orbits: list[Orbit]) -> None:
         """Follow the orbits that lie on no branch yet."""

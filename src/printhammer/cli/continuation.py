@@ -97,12 +97,16 @@ def continue_(
         ),
     ] = None,
 ) -> None:
-    """Follow a periodic motion, stable or not, through the values of a constant, to where it ends and why."""
+    """Follow a periodic motion, stable or not, through the values of a constant, to where it ends and why.
+
+    An interrupt (Ctrl-C) keeps the branches that were followed by then. Ends with status 1 where there is none.
+    """
     from rich.markup import escape
 
+    from printhammer.chaos.continuation_regimes import InterruptedBranches
     from printhammer.chaos.continuation_tables import SUFFIXES, save_branches
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
-    from printhammer.cli.terminal import announce_compiling, console, honesty
+    from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
 
@@ -124,40 +128,49 @@ def continue_(
     announce_compiling()
     common = {"most": whole(most, "most"), "overlap": overlap.value, **_tolerance(tolerance)}
     screen = console()
-    if regimes:
-        if parameter != "rate":
-            raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes")
-        found = _regimes(
-            loaded,
-            (lowest, highest),
-            longest=whole(longest, "longest"),
-            seeds=whole(seeds, "seeds"),
-            doublings=whole(doublings, "doublings"),
-            **common,
-        )
-    else:
-        found = _followed(
-            loaded,
-            parameter,
-            (lowest, highest),
-            whole(doublings, "doublings") or 0,
-            period=period,
-            rate=rate,
-            firings=whole(firings, "firings"),
-            state=_state(state),
-            phase=number(phase, "phase"),
-            **common,
-        )
+    stopped = None
+    try:
+        if regimes:
+            if parameter != "rate":
+                raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes")
+            found = _regimes(
+                loaded,
+                (lowest, highest),
+                longest=whole(longest, "longest"),
+                seeds=whole(seeds, "seeds"),
+                doublings=whole(doublings, "doublings"),
+                **common,
+            )
+        else:
+            found = _followed(
+                loaded,
+                parameter,
+                (lowest, highest),
+                whole(doublings, "doublings") or 0,
+                period=period,
+                rate=rate,
+                firings=whole(firings, "firings"),
+                state=_state(state),
+                phase=number(phase, "phase"),
+                **common,
+            )
+    except InterruptedBranches as interrupt:
+        stopped, found = interrupt, interrupt.branches
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}\n")
     tell(screen, found)
     chart = None
-    if second is not None:
+    if second is not None and stopped is None:
         chart = _charted(found[0], second, (second_from or "", second_to or ""), whole(grid, "grid") or 0)
         screen.print(f"\n{escape(chart.message)}", soft_wrap=True)
     if chart is not None:
         write_found(screen, wanted, chart.plot, partial(_save_chart, chart))
-    else:
+    elif second is None and len(found):
         write_found(screen, wanted, partial(found.plot, show=show), partial(save_branches, list(found)))
+    if stopped is not None:
+        raise KeyboardInterrupt from stopped
+    if not len(found):
+        complain("no branch was found; more --seeds or a larger --longest may find one")
+        raise typer.Exit(1)
 
 
 def _tolerance(text: str | None) -> dict[str, float]:
