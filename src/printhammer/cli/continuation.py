@@ -99,7 +99,7 @@ def continue_(
 ) -> None:
     """Follow a periodic motion, stable or not, through the values of a constant, to where it ends and why.
 
-    An interrupt (Ctrl-C) keeps the branches that were followed by then. Ends with status 1 where there is none.
+    Ctrl-C keeps the branches that were followed by then. Ends with status 1 where there is none.
     """
     from rich.markup import escape
 
