@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.control.learning import Learned, Touched
 from printhammer.control.sensor import run_key
 from printhammer.control.switched import Switched
 from printhammer.drive_sequence import PulseSequence
@@ -21,10 +22,14 @@ from printhammer.printing.slots import slot_times
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy.typing as npt
+
     from printhammer.control.controller import Controller
     from printhammer.control.sensor import PositionSensor
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
+
+    _Shown = tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]
 
 REMEMBERED: Final = 4
 """Number of the latest pulses of which anything can be left."""
@@ -86,6 +91,14 @@ class Loop:
         Displacement, m, velocity, m/s, mode, memory.
     alive : bool
         Whether the run goes on.
+    launched : bool
+        Whether the coming touch is that of a launch from rest.
+    rests : bool
+        Whether the armature comes to rest, and is still to be launched.
+    learned : Learned
+        What the controller knows of the hammer by now.
+    touched : Touched or None
+        The latest touch, from which it learns.
     seen : list
         What the sensor showed at each decision: times, s, and displacements, m.
     touches : list of tuple
@@ -103,6 +116,10 @@ class Loop:
     state: FloatArray
     time: float = 0.0
     alive: bool = True
+    launched: bool = True
+    rests: bool = False
+    learned: Learned = field(default_factory=Learned)
+    touched: Touched | None = None
     seen: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
     touches: list[tuple[float, float]] = field(default_factory=list)
 
@@ -156,54 +173,93 @@ def closed_loops(
             continue
         moving = [loop for loop, _dot in now if loop.alive]
         if moving:
-            _carry(hammer, controller, sensor, moving, tolerance, threads)
+            run = _Run(hammer, controller, sensor, tolerance, threads)
+            rested = [(loop, dot) for loop, dot in now if loop.alive and loop.rests]
+            if rested:
+                run.see_contacts([loop for loop, _dot in rested])
+                for loop, dot in rested:
+                    controller.launch(loop, dot)
+            run.see_flights(moving)
         controller.decide(now, policy)
     return loops
 
 
-def _carry(
-    hammer: Hammer,
-    controller: Controller,
-    sensor: PositionSensor,
-    loops: list[Loop],
-    tolerance: float,
-    threads: int | None,
-) -> None:
-    """Carry some runs to their next decision, and estimate the coming touches from what the sensor shows."""
-    starts = np.array([loop.time for loop in loops])
-    ends = np.maximum(np.array([loop.touch for loop in loops]) - controller.lead, starts + _SOON)
-    since = np.maximum([loop.since for loop in loops], starts)
-    numbers = sensor.numbers(since, ends, controller.samples(sensor))
-    used = numbers >= 0
-    times: FloatArray = (numbers * sensor.interval).astype(np.float64)
-    used &= times > starts[:, np.newaxis]
-    x = np.zeros(numbers.shape)
-    inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
-    for group in (np.flatnonzero(inside), np.flatnonzero(~inside)):
-        if not group.size:
-            continue
-        own = [loops[k] for k in group]
-        strobes = [np.append(times[k][used[k]], ends[k]) for k in group]
-        width = 4 if inside[group[0]] else 2
-        result = Ensemble(
-            hammer,
-            [loop.drive(controller.driver.edge, REMEMBERED) for loop in own],
-            ends[group],
-            states=np.array([loop.state[:width] for loop in own]),
-            starts=starts[group],
-            tolerance=tolerance,
-        ).run(strobes=strobes, threads=threads)
-        found = result.strobes
-        assert found is not None
-        for row, (k, loop) in enumerate(zip(group.tolist(), own, strict=True)):
-            count = len(strobes[row])
-            loop.alive = bool(result.ok[row])
-            x[k, used[k]] = found.x[row, : count - 1]
-            last = count - 1
-            loop.time = float(ends[k])
-            loop.state = np.array(
-                [found.x[row, last], found.v[row, last], found.branch[row, last], found.memory[row, last]]
-            )
-    runs = np.array([loop.key for loop in loops], dtype=np.uint64)
-    shown = np.where(used, sensor.read(np.nan_to_num(x), numbers, runs, controller.stroke), np.nan)
-    controller.estimate(loops, times, shown, used, sensor)
+@dataclass(frozen=True)
+class _Run:
+    """What carries runs on, and shows the controller what its sensor shows."""
+
+    hammer: Hammer
+    controller: Controller
+    sensor: PositionSensor
+    tolerance: float
+    threads: int | None
+
+    def see_contacts(self, loops: list[Loop]) -> None:
+        """Carry some runs until their latest contacts are over, and learn from these."""
+        starts = np.array([loop.time for loop in loops])
+        over = [loop.touched.end if loop.touched is not None else loop.time for loop in loops]
+        ends = np.maximum(np.array(over) + self.sensor.delay, starts + _SOON)
+        contacts, _flights = self._carry(loops, ends, ends)
+        self.controller.learn(loops, *contacts, self.sensor)
+
+    def see_flights(self, loops: list[Loop]) -> None:
+        """Carry some runs to their next decisions, and estimate the coming touches."""
+        starts = np.array([loop.time for loop in loops])
+        touches = np.array([loop.touch for loop in loops])
+        ends = np.maximum(touches - self.controller.lead, starts + _SOON)
+        since = np.maximum([loop.since for loop in loops], starts)
+        contacts, flights = self._carry(loops, since, ends)
+        self.controller.learn(loops, *contacts, self.sensor)
+        self.controller.estimate(loops, *flights, self.sensor)
+
+    def _carry(self, loops: list[Loop], since: FloatArray, ends: FloatArray) -> tuple[_Shown, _Shown]:
+        """Carry runs to an end; return what is shown of contacts and, since a time, of flights."""
+        controller, sensor = self.controller, self.sensor
+        starts = np.array([loop.time for loop in loops])
+        # What is seen of a contact that has not been: nothing.
+        spans = np.array(
+            [(one.touched.start, one.touched.end) if one.touched else (1.0, 0.0) for one in loops]
+        )
+        until = np.minimum(spans[:, 1] + sensor.delay, ends)
+        contacts = sensor.numbers(spans[:, 0], until, controller.contact_samples(sensor))
+        flights = sensor.numbers(since, ends, controller.samples(sensor))
+        numbers = np.concatenate([contacts, flights], axis=1)
+        used = numbers >= 0
+        times: FloatArray = (numbers * sensor.interval).astype(np.float64)
+        used &= times > starts[:, np.newaxis]
+        x = np.full(numbers.shape, np.nan)
+        inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
+        for group in (np.flatnonzero(inside), np.flatnonzero(~inside)):
+            if not group.size:
+                continue
+            own = [loops[k] for k in group]
+            # A sample may be one of the contact and one of the flight.
+            strobes = [np.append(np.unique(times[k][used[k]]), ends[k]) for k in group]
+            width = 4 if inside[group[0]] else 2
+            result = Ensemble(
+                self.hammer,
+                [loop.drive(self.controller.driver.edge, REMEMBERED) for loop in own],
+                ends[group],
+                states=np.array([loop.state[:width] for loop in own]),
+                starts=starts[group],
+                tolerance=self.tolerance,
+            ).run(strobes=strobes, threads=self.threads)
+            found = result.strobes
+            assert found is not None
+            for row, (k, loop) in enumerate(zip(group.tolist(), own, strict=True)):
+                count = len(strobes[row])
+                loop.alive = bool(result.ok[row])
+                x[k, used[k]] = found.x[row, np.searchsorted(strobes[row][:-1], times[k][used[k]])]
+                last = count - 1
+                loop.time = float(ends[k])
+                loop.state = np.array(
+                    [found.x[row, last], found.v[row, last], found.branch[row, last], found.memory[row, last]]
+                )
+        used &= np.isfinite(x)
+        runs = np.array([loop.key for loop in loops], dtype=np.uint64)
+        shown = np.where(used, sensor.read(np.nan_to_num(x), numbers, runs, controller.stroke), np.nan)
+        first, second = slice(None, contacts.shape[1]), slice(contacts.shape[1], None)
+        return (
+            (times[:, first], shown[:, first], used[:, first]),
+            (times[:, second], shown[:, second], used[:, second]),
+        )

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.control.closed_loop import REMEMBERED, Pulse
-from printhammer.control.flight import Expected, FreeForce, touch_from_samples
+from printhammer.control.flight import Expected, FreeForce, flight_from_samples
 from printhammer.control.landing import Landing, landing
 from printhammer.control.launch import Launch, launch
+from printhammer.control.learning import Contacts, Touched
 from printhammer.control.policy import Policy, between
 from printhammer.control.swing_table import ALWAYS, FREE, SwingTable, force_map, swing_table
 from printhammer.errors import InputError
@@ -39,6 +40,10 @@ WINDOW: Final = 120e-6
 
 _SPEED_ERROR: Final = 0.03
 _PLACE_ERROR: Final = 0.03
+_LAUNCH_PLACE_ERROR: Final = 0.01
+_LAUNCH_SPEED_ERROR: Final = 0.006
+_BEFORE: Final = 0.15
+_CONTACT: Final = 1.1
 _ASTRAY: Final = 0.4
 _LEAST_ERROR: Final = 1e-4
 _CLAMP: Final = 1.0
@@ -89,11 +94,17 @@ class Controller:
             hammer, driver, self.single, forces, self.start.width, threads=threads
         )
         self._policies: dict[float, Policy] = {}
+        self._threads = threads
 
     @cached_property
     def force(self) -> FreeForce:
         """Force on the flying armature."""
         return FreeForce(self.hammer, self.hammer.origin, self.front, self.driver.current)
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """Contacts of the nominal hammer with packs at several places."""
+        return Contacts(self.hammer, self.stroke, self.driver.edge, REMEMBERED)
 
     def policy(self, period: float) -> Policy:
         """Return the policy for a period, s."""
@@ -107,17 +118,42 @@ class Controller:
         """Return how many samples are looked at."""
         return max(1, round(WINDOW / sensor.interval))
 
+    def contact_samples(self, sensor: PositionSensor) -> int:
+        """Return how many samples of a contact are looked at."""
+        return max(1, round(_CONTACT * self.single.flight_time / sensor.interval))
+
     def launch(self, loop: Loop, dot: int) -> None:
         """Fire from rest, so that a dot comes when it is due."""
         start = self.start
+        known = loop.learned
+        late = (known.front * self.stroke - start.place_slope * known.scale) / start.speed
         earliest = loop.pulses[-1].at[-1] if loop.pulses else 0.0
-        fired = max(float(loop.due[dot]) - start.flight, earliest)
+        fired = max(float(loop.due[dot]) - start.flight - late, earliest)
         pulse = Pulse(fired, [], [])
         pulse.switch(fired, self.driver.current)
         pulse.switch(fired + start.width, 0.0)
         loop.pulses.append(pulse)
-        loop.touch, loop.speed, loop.kind = fired + start.flight, start.speed, FREE
+        loop.touch, loop.speed, loop.kind = fired + start.flight + late, start.speed, FREE
+        loop.speed += start.speed_slope * known.scale
+        loop.launched, loop.rests = True, False
         loop.since = fired + _CLEAR * start.flight
+
+    def learn(
+        self, loops: Sequence[Loop], times: FloatArray, shown: FloatArray, used: Any, sensor: PositionSensor
+    ) -> None:
+        """Learn where the front of the pack is from what the sensor showed of contacts, arrays (M, N)."""
+        rows = [k for k, loop in enumerate(loops) if loop.alive and loop.touched is not None]
+        for loop in loops:
+            loop.learned.drift()
+        if rows:
+            self.contacts.learn(
+                [loops[k] for k in rows],
+                times[rows],
+                np.nan_to_num(shown[rows]),
+                used[rows].astype(np.float64),
+                self._error(sensor),
+                self._threads,
+            )
 
     def estimate(
         self, loops: Sequence[Loop], times: FloatArray, shown: FloatArray, used: Any, sensor: PositionSensor
@@ -126,27 +162,55 @@ class Controller:
         expected = Expected(
             np.array([loop.touch for loop in loops]),
             np.array([loop.speed for loop in loops]),
-            _PLACE_ERROR * self.stroke,
-            _SPEED_ERROR,
+            np.array([loop.learned.scale for loop in loops]),
+            np.array([self._expected(loop) for loop in loops]),
         )
-        error = max(float(np.hypot(sensor.noise, sensor.step / np.sqrt(12.0))), _LEAST_ERROR) * self.stroke
+        front = self.front + self.stroke * np.array([loop.learned.front for loop in loops])
         steps = _steps(loops)
 
-        def accelerations(x: FloatArray, t: FloatArray) -> FloatArray:
-            current = _current(*steps, self.driver.edge, t)
+        def accelerations(x: FloatArray, t: FloatArray, scale: FloatArray) -> FloatArray:
+            current = (1.0 + scale) * _current(*steps, self.driver.edge, t)
             return self.force(x, current) / self.hammer.mass
 
-        touch, speed = touch_from_samples(
-            times, np.nan_to_num(shown), used.astype(np.float64), error, expected, self.front, accelerations
+        flight = flight_from_samples(
+            times,
+            np.nan_to_num(shown),
+            used.astype(np.float64),
+            self._error(sensor),
+            expected,
+            front,
+            accelerations,
         )
+        before = flight.touch - _BEFORE * self.stroke / flight.speed
+        begins = np.maximum(before, np.array([loop.since for loop in loops]))
+        states, covariances = flight.at(begins, accelerations)
         for k, loop in enumerate(loops):
             if not loop.alive:
                 continue
             # What is far from all that was expected is no estimate of this touch: the plan stands.
-            if abs(touch[k] - loop.touch) < _ASTRAY * self.single.flight_time and speed[k] > 0.0:
-                loop.touch, loop.speed = float(touch[k]), float(speed[k])
+            if (
+                abs(flight.touch[k] - loop.touch) < _ASTRAY * self.single.flight_time
+                and flight.speed[k] > 0.0
+            ):
+                loop.touch, loop.speed = float(flight.touch[k]), float(flight.speed[k])
+                loop.learned.take_scale(float(flight.scale[k]), float(flight.covariance[k, 2, 2]))
+                end = loop.touch + _CONTACT * self.single.flight_time
+                loop.touched = Touched(float(begins[k]), end, states[k], covariances[k])
             loop.touches.append((loop.touch, loop.speed))
             loop.seen.append((times[k][used[k]], shown[k][used[k]]))
+
+    def _error(self, sensor: PositionSensor) -> float:
+        return max(float(np.hypot(sensor.noise, sensor.step / np.sqrt(12.0))), _LEAST_ERROR) * self.stroke
+
+    def _expected(self, loop: Loop) -> FloatArray:
+        """Return the covariance of displacement, speed and scale that are expected at a touch."""
+        if loop.launched:
+            start = self.start
+            slope = np.array([start.place_slope, start.speed_slope, 1.0])
+            errors = np.array([_LAUNCH_PLACE_ERROR * self.stroke, _LAUNCH_SPEED_ERROR, 0.0])
+            # What a launch differs by is what the scale of the currents makes of it, and little else.
+            return np.outer(slope, slope) * loop.learned.scale_error**2 + np.diag(errors**2)
+        return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
     def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
         """Decide how some runs go on after a touch that is about to come; each with the number of its dot."""
@@ -173,8 +237,7 @@ class Controller:
                 del pulse.at[1:], pulse.levels[1:]
             if rests[k] or not np.isfinite(cost[k]):
                 self._land(loop, dot, *(float(values[k]) for values in landed))
-                if dot + 1 < len(loop.due):
-                    self.launch(loop, dot + 1)
+                loop.rests = dot + 1 < len(loop.due)
                 continue
             self._push(loop, pulse, float(release[k]), float(table.back[way[k]]))
             fired = loop.touch + float(table.fire[way[k]])
@@ -186,7 +249,7 @@ class Controller:
             loop.pulses.append(throw)
             clear = max(float(leaves[k]), float(table.fire[way[k]])) if width != ALWAYS else float(leaves[k])
             loop.since = loop.touch + clear
-            loop.kind = int(table.next_kind[way[k]])
+            loop.kind, loop.launched = int(table.next_kind[way[k]]), False
             loop.touch, loop.speed = loop.touch + float(following[k]), float(following_speed[k])
 
     def _push(self, loop: Loop, pulse: Pulse, release: float, back: float) -> None:

@@ -1,9 +1,10 @@
 """Where a flying armature is and will touch the pack, from samples of its position and a model of its forces.
 
 In flight the acceleration is that of magnet and spring, a function of displacement and current, which the
-controller knows. What it does not know are two numbers: where the armature is at one instant, and how fast.
-With c the twofold integral of the acceleration from that instant, x = X + V tau + c(tau), which is linear in
-the two, so that they follow from the samples by least squares, together with what was expected before.
+controller knows. What it does not know are three numbers: where the armature is at one instant, how fast, and
+by which part s all currents are larger than they should be, as with another supply. With c the twofold
+integral of the acceleration from that instant, x = X + V tau + c(tau; s). This is linear in X and V, and
+nearly so in s: they follow from the samples by least squares, together with what was expected before.
 """
 
 from __future__ import annotations
@@ -16,16 +17,20 @@ import numpy as np
 from printhammer.static_force import StaticForce
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
-    Accelerations = Callable[[FloatArray, FloatArray], FloatArray]
+    Accelerations = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 _ROUNDS: Final = 3
 _NODES: Final = 65
 _SLOWEST: Final = 1e-2
+_SHORTEST: Final = 1e-6
+_STEP: Final = 0.01
+_SCALE_STEP: Final = 0.02
+_BENDS: Final = 2
 _PLACES, _CURRENTS = 97, 129
 
 
@@ -75,26 +80,74 @@ class Expected:
     ----------
     time, speed : array, shape (M,)
         Of the touch, s and m/s.
-    place_error, speed_error : float
-        Standard deviations of the displacement at that time, m, and of the speed, m/s.
+    scale : array, shape (M,)
+        By which part all currents are larger than they should be.
+    covariance : array, shape (M, 3, 3)
+        Of displacement at that time, m, speed, m/s, and scale.
     """
 
     time: FloatArray
     speed: FloatArray
-    place_error: float
-    speed_error: float
+    scale: FloatArray
+    covariance: FloatArray
 
 
-def touch_from_samples(
+@dataclass(frozen=True)
+class Flight:
+    """A flight as the samples tell it.
+
+    Attributes
+    ----------
+    touch, speed : array, shape (M,)
+        Time, s, and speed, m/s, of the coming touch.
+    scale : array, shape (M,)
+        By which part all currents are larger than they should be.
+    reference : array, shape (M,)
+        Time, s, for which `state` and `covariance` hold.
+    state, covariance : array, shape (M, 3) and (M, 3, 3)
+        Displacement, m, speed, m/s, and scale, and their covariance.
+    """
+
+    touch: FloatArray
+    speed: FloatArray
+    scale: FloatArray
+    reference: FloatArray
+    state: FloatArray
+    covariance: FloatArray
+
+    def at(self, time: FloatArray, accelerations: Accelerations) -> tuple[FloatArray, FloatArray]:
+        """Return state (M, 3) and covariance (M, 3, 3) at another time, s, in free flight."""
+        place, speed, scale = self.state.T
+        way = time - self.reference
+        grid = self.reference[:, np.newaxis] + np.linspace(1.0, 0.0, _NODES) * way[:, np.newaxis]
+        once, twice = np.zeros_like(grid), np.zeros_like(grid)
+        more_once, more_twice = once, twice
+        for _ in range(_ROUNDS):
+            along = place[:, np.newaxis] + speed[:, np.newaxis] * (grid - self.reference[:, np.newaxis])
+            along = along + twice
+            once, twice = _integrated(grid, accelerations(along, grid, scale[:, np.newaxis]))
+            stepped = accelerations(along, grid, scale[:, np.newaxis] + _SCALE_STEP)
+            more_once, more_twice = _integrated(grid, stepped)
+        found = self.state.copy()
+        found[:, 0] += speed * way + twice[:, 0]
+        found[:, 1] += once[:, 0]
+        carry = np.broadcast_to(np.eye(3), (len(way), 3, 3)).copy()
+        carry[:, 0, 1] = way
+        carry[:, 0, 2] = (more_twice[:, 0] - twice[:, 0]) / _SCALE_STEP
+        carry[:, 1, 2] = (more_once[:, 0] - once[:, 0]) / _SCALE_STEP
+        return found, _sandwich(carry, self.covariance)
+
+
+def flight_from_samples(
     times: FloatArray,
     seen: FloatArray,
     used: FloatArray,
     error: float,
     expected: Expected,
-    front: float,
+    front: FloatArray,
     accelerations: Accelerations,
-) -> tuple[FloatArray, FloatArray]:
-    """Return time, s, and speed, m/s, of the coming touch of the pack.
+) -> Flight:
+    """Return what samples tell of a flight and the coming touch of the pack.
 
     Parameters
     ----------
@@ -106,43 +159,104 @@ def touch_from_samples(
         Standard deviation of a sample, m.
     expected : Expected
         What is expected before.
-    front : float
+    front : array, shape (M,)
         Front of the pack, m.
     accelerations : callable
-        Of a flying armature: displacements, m, and times, s, both of shape (M, K), to m/s².
+        Of a flying armature: displacements, m, times, s, and scales, all of shape (M, K) or such that they
+        broadcast to it, to m/s².
     """
     reference = expected.time
-    place, speed = np.full(len(reference), front), expected.speed.copy()
+    mean = np.stack([front, expected.speed, expected.scale], axis=1)
+    state = mean.copy()
     first = np.where(used > 0.0, times, np.inf).min(axis=1, initial=np.inf)
     first = np.minimum(np.where(np.isfinite(first), first, reference), reference)
     grid = reference[:, np.newaxis] + np.linspace(-1.0, 0.0, _NODES) * (reference - first)[:, np.newaxis]
     curve = np.zeros_like(grid)
-    weight = used / error**2
-    place_weight, speed_weight = expected.place_error**-2.0, expected.speed_error**-2.0
     tau = np.where(used > 0.0, times - reference[:, np.newaxis], 0.0)
+    ways = [np.ones_like(grid), grid - reference[:, np.newaxis]]
+    span = np.maximum(-ways[1][:, 0], _SHORTEST)
+    quick = _STEP * np.maximum(np.abs(expected.speed), _SLOWEST)
+    steps = [(quick * span)[:, np.newaxis], quick[:, np.newaxis]]
+    prior = np.asarray(np.linalg.inv(expected.covariance), np.float64)
+    precision = prior
+
+    def bent(straight: FloatArray, curve: FloatArray, scale: FloatArray) -> FloatArray:
+        for _ in range(_BENDS):
+            curve = _integrated(grid, accelerations(straight + curve, grid, scale))[1]
+        return curve
+
     for _ in range(_ROUNDS):
-        along = place[:, np.newaxis] + speed[:, np.newaxis] * (grid - reference[:, np.newaxis]) + curve
-        curve = _twice_integrated(grid, accelerations(along, grid))
-        bend = _interpolated(grid, curve, times)
-        rest = np.where(used > 0.0, seen - bend, 0.0)
-        s0 = weight.sum(axis=1) + place_weight
-        s1 = (weight * tau).sum(axis=1)
-        s2 = (weight * tau * tau).sum(axis=1) + speed_weight
-        b0 = (weight * rest).sum(axis=1) + place_weight * front
-        b1 = (weight * tau * rest).sum(axis=1) + speed_weight * expected.speed
-        determinant = s0 * s2 - s1 * s1
-        place = (s2 * b0 - s1 * b1) / determinant
-        speed = (s0 * b1 - s1 * b0) / determinant
+        scale = state[:, 2:]
+        straight = state[:, :1] + state[:, 1:2] * ways[1]
+        # How the path bends depends on the path (Picard).
+        curve = bent(straight, curve, scale)
+        others = [bent(straight + step * way, curve, scale) for way, step in zip(ways, steps, strict=True)]
+        others.append(bent(straight, curve, scale + _SCALE_STEP))
+        slopes = [
+            _interpolated(grid, (other - curve) / step, times)
+            for other, step in zip(others, [*steps, _SCALE_STEP], strict=True)
+        ]
+        slopes[0] += 1.0
+        slopes[1] += tau
+        rest = seen - state[:, :1] - state[:, 1:2] * tau - _interpolated(grid, curve, times)
+        step, precision = least_squares(slopes, rest, used / error**2, prior, mean - state)
+        state = state + step
+    place, speed, scale = state.T
     speed = np.maximum(speed, _SLOWEST)
-    bend = accelerations(np.full((len(reference), 1), front), reference[:, np.newaxis])[:, 0]
+    bend = accelerations(front[:, np.newaxis], reference[:, np.newaxis], scale[:, np.newaxis])[:, 0]
     late = np.zeros_like(place)
     for _ in range(_ROUNDS):
         late = (front - place - 0.5 * bend * late**2) / speed
-    return reference + late, speed + bend * late
+    covariance = np.asarray(np.linalg.inv(precision), np.float64)
+    return Flight(reference + late, speed + bend * late, scale, reference, state, covariance)
 
 
-def _twice_integrated(grid: FloatArray, values: FloatArray) -> FloatArray:
-    """Integrate twice over evenly spaced times, (M, K), back from the last one; trapezoidal rule."""
+def least_squares(
+    slopes: Sequence[FloatArray],
+    rest: FloatArray,
+    weight: FloatArray,
+    prior: FloatArray,
+    expected: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the step of some unknowns that fits samples best, and its precision, after Gauss and Newton.
+
+    Parameters
+    ----------
+    slopes : sequence of array, shape (M, N)
+        How the samples depend on each of U unknowns.
+    rest : array, shape (M, N)
+        What is left of the samples.
+    weight : array, shape (M, N)
+        Of the samples, 0 for those that do not count.
+    prior : array, shape (M, U, U)
+        Inverse of the covariance of what was expected.
+    expected : array, shape (M, U)
+        The step that was expected.
+
+    Returns
+    -------
+    tuple of array
+        Steps (M, U), and the inverse of their covariance (M, U, U).
+    """
+    precision, pull = prior.copy(), np.empty(expected.shape)
+    # Sum by sum, so that a run does not depend on the others, as it may in a product of matrices.
+    for i, one in enumerate(slopes):
+        pull[:, i] = (prior[:, i] * expected).sum(axis=1)
+        pull[:, i] += np.where(weight > 0.0, weight * one * rest, 0.0).sum(axis=1)
+        for j, other in enumerate(slopes):
+            precision[:, i, j] += np.where(weight > 0.0, weight * one * other, 0.0).sum(axis=1)
+    step = np.linalg.solve(precision, pull[..., np.newaxis])[..., 0]
+    return np.asarray(step, np.float64), precision
+
+
+def _sandwich(carry: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return J C J^T for each member."""
+    found: FloatArray = np.einsum("mij,mjk,mlk->mil", carry, covariance, carry, optimize=False)
+    return found
+
+
+def _integrated(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Integrate once and twice over evenly spaced times, (M, K), back from the last one; trapezoidal rule."""
     step = (grid[:, -1:] - grid[:, :1]) / (grid.shape[1] - 1)
 
     def backwards(integrand: FloatArray) -> FloatArray:
@@ -150,7 +264,8 @@ def _twice_integrated(grid: FloatArray, values: FloatArray) -> FloatArray:
         summed = np.cumsum(pieces[:, ::-1], axis=1)[:, ::-1]
         return -np.concatenate([summed, np.zeros((len(grid), 1))], axis=1)
 
-    return backwards(backwards(values))
+    once = backwards(values)
+    return once, backwards(once)
 
 
 def _interpolated(grid: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:

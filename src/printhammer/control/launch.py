@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.swing_table import FREE
+from printhammer.control.swing_table import AHEAD, FREE
 from printhammer.control.switched import Switched
 from printhammer.drive_sequence import PulseSequence
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _WIDTHS: Final = np.linspace(0.2, 1.0, 81)
 _ALMOST: Final = 0.9
+_WEAKER: Final = 0.03
 
 
 @dataclass(frozen=True)
@@ -35,11 +36,16 @@ class Launch:
         From firing to touch, s.
     speed : float
         At the touch, m/s.
+    place_slope, speed_slope : float
+        By how much the displacement, m, and the speed, m/s, at the time of the touch grow with the currents,
+        for currents twice as large.
     """
 
     width: float
     flight: float
     speed: float
+    place_slope: float
+    speed_slope: float
 
 
 def launch(
@@ -79,4 +85,22 @@ def launch(
     width, time = (
         float(np.interp(wanted, speed[struck][order], values[struck][order])) for values in (widths, flight)
     )
-    return Launch(width, time, wanted)
+    return Launch(width, time, wanted, *_slopes(hammer, driver, width, time - AHEAD, threads))
+
+
+def _slopes(
+    hammer: Hammer, driver: Driver, width: float, time: float, threads: int | None
+) -> tuple[float, float]:
+    """Return how displacement and speed at a time before the touch depend on the scale of the currents."""
+    pulse = Switched(at=(0.0, width), levels=(driver.current, 0.0), edge=driver.edge)
+    # Weaker, so that none of the two is at the pack by then.
+    scales = np.array([1.0, 1.0 - _WEAKER])
+    drives = [PulseSequence([pulse.scaled(scale)], at=[0.0]) for scale in scales.tolist()]
+    states = (
+        Ensemble(hammer, drives, time, tolerance=DISPLAY_TOLERANCE)
+        .run(strobes=[np.array([time])] * len(drives), threads=threads)
+        .strobes
+    )
+    assert states is not None
+    place, speed = ((values[0, 0] - values[1, 0]) / _WEAKER for values in (states.x, states.v))
+    return float(place), float(speed)
