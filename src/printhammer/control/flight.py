@@ -177,6 +177,7 @@ def flight_from_samples(
     span = np.maximum(-ways[1][:, 0], _SHORTEST)
     quick = _STEP * np.maximum(np.abs(expected.speed), _SLOWEST)
     steps = [(quick * span)[:, np.newaxis], quick[:, np.newaxis]]
+    scale_step = np.full((len(reference), 1), _SCALE_STEP)
     prior = np.asarray(np.linalg.inv(expected.covariance), np.float64)
     precision = prior
 
@@ -191,10 +192,10 @@ def flight_from_samples(
         # How the path bends depends on the path (Picard).
         curve = bent(straight, curve, scale)
         others = [bent(straight + step * way, curve, scale) for way, step in zip(ways, steps, strict=True)]
-        others.append(bent(straight, curve, scale + _SCALE_STEP))
+        others.append(bent(straight, curve, scale + scale_step))
         slopes = [
             _interpolated(grid, (other - curve) / step, times)
-            for other, step in zip(others, [*steps, _SCALE_STEP], strict=True)
+            for other, step in zip(others, [*steps, scale_step], strict=True)
         ]
         slopes[0] += 1.0
         slopes[1] += tau
