@@ -383,6 +383,7 @@ def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, 
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_hammer_of_other_parts_and_a_force(hammer: "ph.Hammer") -> None:
     oscillator = ph.Hammer.build(1e-3, spring=PreloadSpring(preload=0.0, stiffness=900.0))
     force = ph.SineForce("0.5 N", "100 Hz")

@@ -203,6 +203,7 @@ def test_a_motion_is_shown_up_to_a_time(single: "ph.Motion") -> None:
         plot(single, until=0.0)
 
 
+@pytest.mark.slow
 def test_an_impact_on_a_rigid_backstop_is_a_jump(hammer: "ph.Hammer") -> None:
     part = {"law": "rigid", "position": "0.002 in", "restitution": 0.5}
     rigid = hammer.replace({"backstop": part, "waveform.amplitude": "1.1 A"})

@@ -255,6 +255,7 @@ def test_backstops_of_all_hardnesses(stiffness: float, mass: float) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gentle", [1e-3, 1e-6, 1e-9])
 def test_a_backstop_that_may_not_pull_lets_go_once(gentle: float) -> None:
     """Damped so that v > k/l at every speed: after letting go it must not chatter."""

@@ -118,6 +118,7 @@ def test_a_step_without_a_finite_error_is_shortened(ratio: float) -> None:
     assert step_factor(ratio) == 0.2
 
 
+@pytest.mark.slow
 def test_a_nan_error_estimate_is_no_small_error() -> None:
     """Beyond x = 0 the magnet's law is NaN: stages there must not be accepted, nor tried for ever."""
     hammer = hammers.made_of(magnet=hammers.MAGNETS["inverse-root"], spring=hammers.SPRINGS["linear"])
@@ -155,6 +156,7 @@ def test_reversals_inside_the_pack_from_below(force: float, speed: float, goes_i
     assert found.horizon > 4e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reloading", ["loading-branch", "unloading-curve"])
 def test_held_inside_the_pack_until_the_force_fades(reloading: str) -> None:
     """Rest inside the pack ends when the force begins to change, not some time later."""

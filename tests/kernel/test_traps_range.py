@@ -25,6 +25,7 @@ def test_the_end_of_the_range_of_a_fit_is_met() -> None:
     assert full.at(motion.end + 1e-7)[0][0] > 250e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("over", [1e-7, 1e-9, 1e-11])
 def test_a_short_visit_beyond_the_range_is_not_overlooked(over: float) -> None:
     """The flight leaves the range and comes back inside it within one step."""
@@ -43,6 +44,7 @@ def test_a_short_visit_beyond_the_range_is_not_overlooked(over: float) -> None:
     assert outside.end == pytest.approx((speed - math.sqrt(2.0 * pull * over)) / pull, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_current_outside_a_table_is_a_status(tmp_path: Path) -> None:
     """Beyond its currents a table is NaN: named, at once, and not tried for ever."""
     hammer = hammers.made_of(

@@ -45,6 +45,7 @@ def test_bounces_under_a_constant_force(restitution: float, weight: float) -> No
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping", [1e8, 4.175e8, 2e9])
 def test_one_touch_of_a_damped_backstop(damping: float) -> None:
     """A free contact obeys z - ln(1 + z) = -(y + ln(1 - y)), z = (l/k) v_in and y = (l/k) v_out."""
