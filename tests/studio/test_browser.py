@@ -16,6 +16,7 @@ import printhammer as ph
 from printhammer.studio.bundle import module
 from printhammer.studio.engine import motion_frame
 from printhammer.studio.session import answer, read_message
+from printhammer.studio.shelf import Shelf
 
 CTRL, SHIFT = 2, 8
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
@@ -240,7 +241,7 @@ def test_the_widget_is_the_same_page(opened_browser: Any) -> None:
     )
     assert page.run("document.querySelectorAll('.panel').length") == len(VIEWS)
     kind, serial, content = read_message(json.dumps(page.run("window.sent[0]")))
-    page.run(answered(answer(kind, serial, content)))
+    page.run(answered(answer(kind, serial, content, Shelf())))
     kind, serial, found = read_message(json.dumps(page.wait("window.sent[1]")))
     assert (kind, found.rate) == ("state", 900.0)
     data, _ = motion_frame(found, serial)

@@ -10,10 +10,14 @@ import pytest
 from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
+from printhammer.hammer import Hammer
+from printhammer.studio import bounds
 from printhammer.studio import session as sessions
 from printhammer.studio.bounds import LARGEST_MESSAGE
 from printhammer.studio.frames import unframe
+from printhammer.studio.section import AT_ONCE, LATER
 from printhammer.studio.session import Session, read_message
+from printhammer.studio.shelf import Shelf
 from printhammer.studio.state import ProtocolError
 
 TEXT = CRUDE.read_text("utf-8")
@@ -47,9 +51,9 @@ class Page:
 
 
 @contextmanager
-def opened() -> Iterator[tuple[Session, Page]]:
+def opened(shelf: Shelf | None = None) -> Iterator[tuple[Session, Page]]:
     page = Page()
-    made = Session(page.take)
+    made = Session(page.take, shelf)
     try:
         yield made, page
     finally:
@@ -178,3 +182,63 @@ def test_too_many_questions_at_once_are_refused(monkeypatch: pytest.MonkeyPatch)
         hold.set()
         made.close()
         made.join(60)
+
+
+def test_points_arrive_before_the_verdict() -> None:
+    with opened() as (made, page):
+        made.receive(state(1, views=["strobe"], rate=900.0))
+        with page.arrived:
+            assert page.arrived.wait_for(lambda: judged(page.frames), 300), [
+                (frame["kind"], frame.get("reason")) for frame in page.frames
+            ]
+        found = [frame for frame in page.frames if frame["kind"] == "strobe"]
+    counts = [frame["arrays"][0]["shape"][0] for frame in found]
+    assert counts == [*AT_ONCE, *LATER, LATER[-1]]
+    assert [frame["exponent"] is not None for frame in found] == [False] * 3 + [True] * 4 + [False]
+    assert [frame["verdict"] is not None for frame in found] == [False] * 7 + [True]
+
+
+def judged(found: list[dict[str, Any]]) -> bool:
+    return any(frame["kind"] == "strobe" and frame["verdict"] for frame in found)
+
+
+def test_a_map_that_takes_too_long_is_told_and_the_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bounds, "MOST_MAP_STEPS", 20)
+    with opened() as (made, page):
+        made.receive(state(1, views=["motion", "map", "strobe"]))
+        page.until("dots")
+        found = page.until("strobe")
+    maps = [frame for frame in found if frame["kind"] == "map"]
+    assert len(maps) == 1
+    assert "expected fewer" in maps[0]["reason"]
+    assert {frame["kind"] for frame in found} == {"motion", "map", "dots", "strobe"}
+
+
+def test_what_nobody_thought_of_is_told_and_the_page_lives_on(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(*_: Any) -> bytes:
+        raise ZeroDivisionError("nobody thought of this")
+
+    with opened() as (made, page):
+        with monkeypatch.context() as patched:
+            patched.setattr(sessions, "motion_frame", broken)
+            made.receive(state(1))
+            (told,) = page.until("refusal", serial=1)
+        made.receive(state(2, views=["motion"]))
+        page.until("dots", serial=2)
+    assert told["reason"] == "this could not be computed, ZeroDivisionError: nobody thought of this"
+    assert "nobody thought of this" in caplog.text
+
+
+def test_two_studios_in_one_process_have_hammers_of_their_own() -> None:
+    hammer = Hammer.from_toml(TEXT.replace('"hendriks-1983"', '"mine"', 1), name="mine.toml")
+    question = json.dumps({"kind": "hammer", "serial": 1, "name": hammer.name, "text": ""})
+    with opened(Shelf(hammer)) as (made, page), opened() as (other, empty):
+        made.receive(question)
+        other.receive(question)
+        (told,) = page.until("hammer")
+        (refused,) = empty.until("refusal")
+    assert told["hammer"]["name"] == hammer.name
+    assert hammer.name in told["offered"]
+    assert hammer.name in refused["reason"]

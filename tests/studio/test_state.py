@@ -14,7 +14,8 @@ from tests.studio.server import STATE
 from printhammer.errors import InputError
 from printhammer.hammer import load
 from printhammer.studio import bounds
-from printhammer.studio.state import ProtocolError, dropped_hammer, offered, read_state
+from printhammer.studio.shelf import Shelf
+from printhammer.studio.state import ProtocolError, dropped_hammer, read_state
 
 NAME = "tung-shaw-1988"
 TEXT = CRUDE.read_text("utf-8")
@@ -112,10 +113,10 @@ def test_constants_stay_near_those_of_the_hammer(constants: dict[str, float], re
 
 
 def test_a_hammer_is_offered_by_name_and_never_read_from_a_path() -> None:
-    assert offered(NAME).name == NAME
+    assert Shelf().hammer(NAME).name == NAME
     for name in (str(CRUDE), "../hammers/" + NAME, "", NAME + ".toml"):
         with pytest.raises(InputError, match="expected one of"):
-            offered(name)
+            Shelf().hammer(name)
 
 
 @pytest.mark.parametrize(

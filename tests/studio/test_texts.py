@@ -11,6 +11,7 @@ from tests.studio.server import STATE
 
 import printhammer as ph
 from printhammer.drive_file import read_drive
+from printhammer.studio.shelf import Shelf
 from printhammer.studio.state import State, read_state
 from printhammer.studio.texts import DRIVE_FILE, HAMMER_FILE, texts_of
 
@@ -73,9 +74,13 @@ def test_the_command_runs_with_the_saved_files(
     assert ended.value.code == 0, capsys.readouterr().err
 
 
-def test_a_shipped_hammer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Other tests in this process may have offered a hammer of the same name.
-    monkeypatch.setattr("printhammer.studio.state._offered", {})
+def test_a_shipped_hammer_is_named() -> None:
     texts = texts_of(read_state({**STATE, "hammer": "hendriks-1983"}))
     assert "ph.load('hendriks-1983')" in texts["python"]
     assert texts["command"].startswith("printhammer run hendriks-1983 --rate '1200.0 Hz' --pulses 9")
+
+
+def test_the_hammer_that_the_studio_opened_with_is_named_by_its_file() -> None:
+    hammer = ph.load(CRUDE)
+    state = read_state({**STATE, "hammer": hammer.name}, Shelf(hammer))
+    assert texts_of(state)["command"].startswith(f"printhammer run {CRUDE}")

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
     from printhammer.studio.guard import Guard
+    from printhammer.studio.shelf import Shelf
 
 REFUSED: Final = 1008
 BUSY: Final = 1013
@@ -32,13 +33,15 @@ BUSY: Final = 1013
 _PATIENCE: Final = 20.0
 
 
-def application(guard: Guard) -> Starlette:
+def application(guard: Guard, shelf: Shelf) -> Starlette:
     """Return the application.
 
     Parameters
     ----------
     guard : Guard
         Who may speak to it.
+    shelf : Shelf
+        The hammers that it offers.
     """
     tabs: set[Session] = set()
 
@@ -62,7 +65,7 @@ def application(guard: Guard) -> Starlette:
         if len(tabs) >= MOST_TABS:
             await connection.close(BUSY, f"the studio is open {MOST_TABS} times already")
             return
-        session = Session(_sender(connection))
+        session = Session(_sender(connection), shelf)
         tabs.add(session)
         try:
             await _listen(connection, session)

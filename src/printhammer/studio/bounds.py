@@ -25,11 +25,20 @@ LARGEST_CURRENT: Final = 100.0
 SPAN: Final = 10.0
 """Factor by which a constant may differ from the one of the hammer that is loaded."""
 
-MOST_STEPS: Final = 200_000
+MOST_STEPS: Final = 50_000
 """Steps after which a run is given up."""
 
 MOST_MAP_STEPS: Final = 20_000
-"""Steps of a single run above which no map, no strobe section and no line is computed."""
+"""Steps of one run of the map."""
+
+MOST_WORK: Final = 20_000_000
+"""Steps of all runs of a printed line, and of the first points of a strobe section."""
+
+ALIKE: Final = 1.25
+"""Factor by which a constant may move before the work of a map is tried out anew."""
+
+PATIENCE: Final = 20.0
+"""Seconds after which work on a view is given up; what takes longer is told so instead."""
 
 MOST_SAMPLES: Final = 2000
 """Samples of a waveform, and of a measured curve."""

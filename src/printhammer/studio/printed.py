@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.drive import PulseTrain
 from printhammer.errors import InputError
-from printhammer.studio.engine import watch
+from printhammer.studio import bounds
 from printhammer.studio.frames import frame
+from printhammer.studio.work import Patience, try_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from printhammer.printing.pattern import Pattern
     from printhammer.studio.state import State
+
+_TRIED: Final = 16
 
 
 def line_key(state: State) -> tuple[Any, ...]:
@@ -21,8 +26,26 @@ def line_key(state: State) -> tuple[Any, ...]:
     return (state.hammer, state.text, state.constants, state.waveform, state.rate, state.line)
 
 
+def check_line(state: State, pattern: Pattern) -> None:
+    """Refuse a line that would take too long, by a run of some slots that are all fired.
+
+    Raises
+    ------
+    InputError
+        It would.
+    """
+    train = PulseTrain(state.fired, rate=state.rate, pulses=_TRIED, overlap=state.overlap)
+    tried = try_out(state, train, _TRIED / state.rate, f"{_TRIED} slots of the line")
+    runs = int(pattern.dots.any(axis=2).sum())
+    steps = runs * pattern.slots * tried.steps / _TRIED
+    if steps > bounds.MOST_WORK:
+        raise InputError(
+            f"the line would take about {steps:.2g} steps, expected at most {bounds.MOST_WORK:.2g}"
+        )
+
+
 def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
-    """Return the dots of the line; where it cannot be printed, the reason instead.
+    """Return the dots of the line; where it cannot be printed, or takes too long, the reason instead.
 
     Raises
     ------
@@ -30,12 +53,15 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
         A newer state has come before it was done.
     """
     from printhammer.printing.page import print_page
+    from printhammer.printing.pattern import Pattern
 
     try:
         hammer = state.changed
         if state.waveform is not None:
             hammer = hammer.replace("waveform", state.fired, source="set in the studio")
-        page = print_page(hammer, state.line, state.rate, progress=watch(newer))
+        pattern = Pattern.from_text(state.line)
+        check_line(state, pattern)
+        page = print_page(hammer, pattern, state.rate, progress=Patience(newer, "the line").progress)
     except InputError as error:
         return frame("line", serial, reason=str(error))
     (x, y), (wanted_x, wanted_y) = page.places, page.intended

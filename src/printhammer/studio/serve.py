@@ -51,14 +51,12 @@ def serve(
         ) from None
     from printhammer.studio.bounds import LARGEST_MESSAGE
     from printhammer.studio.guard import HOSTS, Guard
-    from printhammer.studio.state import offer
+    from printhammer.studio.shelf import Shelf
 
-    if hammer is not None:
-        offer(hammer.name, hammer)
     listening = _listen(HOSTS[0], port)
     guard = Guard(listening.getsockname()[1], token)
     config = uvicorn.Config(
-        application(guard),
+        application(guard, Shelf(hammer)),
         log_level="warning",
         access_log=False,
         lifespan="off",

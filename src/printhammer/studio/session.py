@@ -8,17 +8,32 @@ soon as there is a newer state.
 from __future__ import annotations
 
 import json
+import logging
 import threading
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
-from printhammer.studio import engine
+from printhammer.studio.chart import FULL, PREVIEW, check_map, map_frame, map_key, no_map
+from printhammer.studio.engine import dots_frame, motion_frame
 from printhammer.studio.frames import frame
 from printhammer.studio.printed import line_frame, line_key
-from printhammer.studio.state import ProtocolError, State, names, offered, read_state
+from printhammer.studio.section import (
+    AT_ONCE,
+    LATER,
+    VERDICT_WORK,
+    check_strobe,
+    no_section,
+    strobe_frame,
+    strobe_key,
+)
+from printhammer.studio.shelf import Shelf
+from printhammer.studio.state import ProtocolError, State, read_state
+from printhammer.studio.work import GivenUp, Patience
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+logger = logging.getLogger(__name__)
 
 REST: Final = 0.15
 """Seconds without a newer state after which the verdict on a train is worked out."""
@@ -31,10 +46,14 @@ class Session:
     ----------
     send : callable
         Takes a frame to the page and returns when it is on its way; raises where the page is gone.
+    shelf : Shelf, optional
+        The hammers that are offered; by default those that come with the program.
     """
 
-    def __init__(self, send: Callable[[bytes], None]) -> None:
+    def __init__(self, send: Callable[[bytes], None], shelf: Shelf | None = None) -> None:
         self._send = send
+        self._shelf = shelf or Shelf()
+        self._tried: State | None = None
         self._change = threading.Condition()
         self._latest: tuple[int, State] | None = None
         self._answered = 0
@@ -57,7 +76,7 @@ class Session:
         ProtocolError
             It is none that the page would send.
         """
-        kind, serial, content = read_message(text)
+        kind, serial, content = read_message(text, self._shelf)
         with self._change:
             if kind == "state":
                 self._latest = (serial, content)
@@ -99,32 +118,55 @@ class Session:
             taken = self._latest if self._waiting() else None
             if taken is not None:
                 self._answered = taken[0]
-        for question in questions:
-            self._tell(answer(*question))
+        for kind, serial, content in questions:
+            self._sure(self._answer, serial, kind, content)
         if taken is not None:
-            self._first(*taken)
+            self._sure(self._first, *taken)
+
+    def _sure(self, work: Callable[..., None], serial: int, *given: Any) -> None:
+        """Do some work; where it fails in a way nobody thought of, that is told, and the page lives on."""
+        try:
+            work(serial, *given)
+        except OSError:
+            raise
+        except GivenUp:
+            return
+        except Exception as error:
+            logger.exception("%s, message %d", work.__name__, serial)
+            reason = f"this could not be computed, {type(error).__name__}: {error}"
+            self._tell(frame("refusal", serial, reason=reason[:500]))
+
+    def _answer(self, serial: int, kind: str, content: Any) -> None:
+        self._tell(answer(kind, serial, content, self._shelf))
 
     def _waiting(self) -> bool:
         return self._latest is not None and self._latest[0] != self._answered
 
     def _first(self, serial: int, state: State) -> None:
         try:
-            data, motion = engine.motion_frame(state, serial)
-            self._tell(data)
-            if reason := engine.too_long(motion):
-                raise InputError(reason)
-            if "map" in state.views and self._sent.get("preview") != engine.map_key(state):
-                # Never given up: a coarse map is to arrive while a slider moves. The browser draws meanwhile,
-                # and has another core for that.
-                self._tell(engine.map_frame(state, serial, engine.PREVIEW, lambda: False, threads=1))
-                self._sent["preview"] = engine.map_key(state)
+            data, motion = motion_frame(state, serial)
         except InputError as error:
             self._tell(frame("refusal", serial, reason=str(error)))
             return
+        self._tell(data)
+        if "map" in state.views and self._sent.get("preview") != map_key(state):
+            self._preview(serial, state)
         with self._change:
             self._detail = (serial, state)
             self._change.notify_all()
-        self._tell(engine.dots_frame(serial, motion))
+        self._tell(dots_frame(serial, motion))
+
+    def _preview(self, serial: int, state: State) -> None:
+        try:
+            check_map(state, self._tried)
+            self._tried = state
+            # Not given up for a newer state: a coarse map is to arrive while a slider moves. The browser
+            # draws meanwhile, and has another core for that.
+            self._tell(map_frame(state, serial, PREVIEW, lambda: self._closed, threads=1))
+        except InputError as error:
+            self._tell(no_map(serial, str(error)))
+            self._sent["map"] = map_key(state)
+        self._sent["preview"] = map_key(state)
 
     def _details(self) -> None:
         with self._change:
@@ -132,35 +174,55 @@ class Session:
             taken, self._detail = self._detail, None
         if self._closed or taken is None:
             return
-        try:
-            self._second(*taken)
-        except engine.GivenUp:
-            return
-        except InputError as error:
-            self._tell(frame("refusal", taken[0], reason=str(error)))
+        self._sure(self._second, *taken)
 
     def _second(self, serial: int, state: State) -> None:
         def newer() -> bool:
             return self._closed or self._latest is None or self._latest[0] != serial
 
-        if "map" in state.views and self._sent.get("map") != engine.map_key(state):
-            self._tell(engine.map_frame(state, serial, engine.FULL, newer))
-            self._sent["map"] = engine.map_key(state)
-        if "line" in state.views and state.line.strip() and self._sent.get("line") != line_key(state):
-            self._tell(line_frame(state, serial, newer))
-            self._sent["line"] = line_key(state)
-        if "strobe" in state.views and self._sent.get("strobe") != engine.strobe_key(state):
-            if newer():
-                raise engine.GivenUp
-            self._tell(engine.strobe_frame(state, serial, engine.SECTION[0], judged=False))
+        self._map(serial, state, newer)
+        self._line(serial, state, newer)
+        self._section(serial, state, newer)
+
+    def _map(self, serial: int, state: State, newer: Callable[[], bool]) -> None:
+        if "map" not in state.views or self._sent.get("map") == map_key(state):
+            return
+        try:
+            self._tell(map_frame(state, serial, FULL, newer))
+        except InputError as error:
+            self._tell(no_map(serial, str(error)))
+        self._sent["map"] = map_key(state)
+
+    def _line(self, serial: int, state: State, newer: Callable[[], bool]) -> None:
+        if "line" not in state.views or not state.line.strip() or self._sent.get("line") == line_key(state):
+            return
+        self._tell(line_frame(state, serial, newer))
+        self._sent["line"] = line_key(state)
+
+    def _section(self, serial: int, state: State, newer: Callable[[], bool]) -> None:
+        if "strobe" not in state.views or self._sent.get("strobe") == strobe_key(state):
+            return
+        patience = Patience(newer, "the strobe section")
+        try:
+            check_strobe(state)
+            for points in AT_ONCE:
+                patience.check()
+                self._tell(strobe_frame(state, serial, points))
             with self._change:
                 if self._change.wait_for(newer, REST):
-                    raise engine.GivenUp
-            self._tell(engine.strobe_frame(state, serial, engine.SECTION[1], judged=True))
-            self._sent["strobe"] = engine.strobe_key(state)
+                    raise GivenUp
+            for points in LATER:
+                patience.check()
+                begun = patience.spent
+                self._tell(strobe_frame(state, serial, points, exponent=True))
+            patience.check(VERDICT_WORK * (patience.spent - begun))
+            self._tell(strobe_frame(state, serial, LATER[-1], judged=True))
+        except InputError as error:
+            self._tell(no_section(serial, str(error)))
+        self._sent["strobe"] = strobe_key(state)
 
 
-def read_message(text: str) -> tuple[str, int, Any]:
+def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
     """Read a message: its kind, the serial number of the page, and its content.
 
     Raises
@@ -189,14 +251,14 @@ def read_message(text: str) -> tuple[str, int, Any]:
             f"a message of kind {kind} has the keys kind, serial, {', '.join(sorted(contents[kind]))}"
         )
     if "state" in contents[kind]:
-        return kind, serial, read_state(message["state"])
+        return kind, serial, read_state(message["state"], shelf)
     pair = (message["name"], message["text"])
     if not all(isinstance(part, str) and len(part) <= LARGEST_FILE for part in pair):
         raise ProtocolError(f"name and text are expected to be texts of at most {LARGEST_FILE} characters")
     return kind, serial, pair
 
 
-def answer(kind: str, serial: int, content: Any) -> bytes:
+def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
     """Return the answer to a question: what a hammer is, what a dropped file holds, a state as texts."""
     from printhammer.studio.controls import describe, vocabulary
     from printhammer.studio.drops import dropped
@@ -206,8 +268,8 @@ def answer(kind: str, serial: int, content: Any) -> bytes:
     try:
         if kind == "hammer":
             name, text = content
-            hammer = dropped_hammer(text) if text else offered(name or names()[0])
-            told = {"offered": names(), "asked": name or names()[0], "text": text, **vocabulary()}
+            hammer = dropped_hammer(text) if text else shelf.hammer(name or shelf.names[0])
+            told = {"offered": shelf.names, "asked": name or shelf.names[0], "text": text, **vocabulary()}
             return frame("hammer", serial, hammer=describe(hammer), **told)
         if kind == "drop":
             return dropped(serial, *content)

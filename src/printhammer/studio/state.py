@@ -9,7 +9,7 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,19 +18,14 @@ from printhammer.drive import PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer import Hammer
 from printhammer.studio import bounds
+from printhammer.studio.shelf import Shelf
 from printhammer.waveforms import SHAPES, Sampled, Waveform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from printhammer.drive_base import Overlap
 
 VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe", "energy", "line")
 """Names of the views."""
-
-
-DEFAULT: Final = "hendriks-1983"
-"""Hammer that the studio opens with unless told otherwise."""
 
 
 class ProtocolError(Exception):
@@ -65,6 +60,8 @@ class State:
         Text that is printed.
     views : tuple of str
         Views that are shown, see `VIEWS`.
+    shelf : Shelf
+        Where hammers are looked up by name; no part of what the page sends.
     """
 
     hammer: str
@@ -79,11 +76,12 @@ class State:
     high: float
     line: str
     views: tuple[str, ...]
+    shelf: Shelf = field(default_factory=Shelf, compare=False, repr=False)
 
     @cached_property
     def base(self) -> Hammer:
         """The hammer before any change."""
-        return dropped_hammer(self.text) if self.text else offered(self.hammer)
+        return dropped_hammer(self.text) if self.text else self.shelf.hammer(self.hammer)
 
     @cached_property
     def changed(self) -> Hammer:
@@ -137,49 +135,6 @@ class State:
         return PulseTrain(self.fired, at=times, overlap=self.overlap)
 
 
-_offered: dict[str, Callable[[], Hammer]] = {}
-
-
-def offer(name: str, hammer: Hammer) -> None:
-    """Offer another hammer by name, beside those that come with the program."""
-    _offered[name] = lambda: hammer
-
-
-def is_guest(name: str) -> bool:
-    """Whether a hammer is offered that does not come with the program, or stands in the place of one."""
-    return name in _offered
-
-
-def names() -> list[str]:
-    """List the names of the hammers that the studio offers, the one that it opens with first."""
-    from printhammer.hammer import shipped
-
-    others = sorted(shipped(), key=lambda name: (name != DEFAULT, name))
-    return [*_offered, *(name for name in others if name not in _offered)]
-
-
-@lru_cache(maxsize=16)
-def _shipped(name: str) -> Hammer:
-    from printhammer.hammer import load
-
-    return load(name)
-
-
-def offered(name: str) -> Hammer:
-    """Return a hammer that the studio offers; a name is never taken for a path.
-
-    Raises
-    ------
-    InputError
-        It is not offered.
-    """
-    if name in _offered:
-        return _offered[name]()
-    if name not in names():
-        raise InputError(f"hammer = {name!r}, expected one of {', '.join(names())}")
-    return _shipped(name)
-
-
 @lru_cache(maxsize=8)
 def dropped_hammer(text: str) -> Hammer:
     """Read the text of a dropped hammer file, which may name no other file.
@@ -201,16 +156,24 @@ def dropped_hammer(text: str) -> Hammer:
     return hammer
 
 
-def read_state(given: Any) -> State:
+def read_state(given: Any, shelf: Shelf | None = None) -> State:
     """Read a state from a message.
+
+    Parameters
+    ----------
+    given
+        What the message holds.
+    shelf : Shelf, optional
+        The hammers that are offered; by default those that come with the program.
 
     Raises
     ------
     ProtocolError
         A key is missing, unknown, of the wrong kind or out of bounds: the page would never send it.
     """
-    table = _table(given, "state", set(State.__dataclass_fields__))
-    missing = set(State.__dataclass_fields__) - set(table)
+    keys = set(State.__dataclass_fields__) - {"shelf"}
+    table = _table(given, "state", keys)
+    missing = keys - set(table)
     if missing:
         raise ProtocolError(f"state.{min(missing)} is missing")
     return State(
@@ -226,6 +189,7 @@ def read_state(given: Any) -> State:
         high=_number(table["high"], "high", *bounds.RATES),
         line=_text(table["line"], "line", bounds.LONGEST_TEXT),
         views=_views(table["views"]),
+        shelf=shelf or Shelf(),
     )
 
 

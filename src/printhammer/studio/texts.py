@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from printhammer.studio.state import is_guest
 from printhammer.waveforms import Sampled
 
 if TYPE_CHECKING:
@@ -83,4 +82,4 @@ def command_of(state: State) -> str:
 
 
 def _name(state: State) -> str:
-    return state.base.path if is_guest(state.hammer) else state.hammer
+    return state.base.path if state.shelf.is_guest(state.hammer) else state.hammer

@@ -41,7 +41,10 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
         ) from None
     from printhammer.studio.bundle import module, style
     from printhammer.studio.session import Session
-    from printhammer.studio.state import ProtocolError, offer
+    from printhammer.studio.shelf import Shelf
+    from printhammer.studio.state import ProtocolError
+
+    shelf = Shelf(hammer)
 
     class StudioWidget(anywidget.AnyWidget):
         """A page and the work for it."""
@@ -53,7 +56,7 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
 
         def __init__(self, **traits: Any) -> None:
             super().__init__(**traits)
-            self._session = Session(self._pass_on)
+            self._session = Session(self._pass_on, shelf)
             self.on_msg(self._take)
 
         def _pass_on(self, data: bytes) -> None:
@@ -71,6 +74,4 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
             self._session.close()
             super().close()
 
-    if hammer is not None:
-        offer(hammer.name, hammer)
     return StudioWidget(state=state, height=height)

@@ -155,3 +155,20 @@ export function key(pen, box, entries) {
   }
   pen.restore();
 }
+
+/** Tell in the middle of a view why it is empty, in lines that fit. */
+export function refusal(pen, width, height, reason) {
+  const lines = [""];
+  const most = Math.max(Math.floor((width - 24) / 6), 8);
+  for (const word of reason.split(" ")) {
+    if (lines.at(-1) && lines.at(-1).length + word.length + 1 > most) lines.push("");
+    lines[lines.length - 1] += (lines.at(-1) ? " " : "") + word;
+  }
+  pen.save();
+  pen.font = FONT;
+  pen.fillStyle = colours().ink;
+  pen.textAlign = "center";
+  pen.textBaseline = "middle";
+  lines.forEach((text, k) => pen.fillText(text, width / 2, height / 2 + 15 * (k - (lines.length - 1) / 2)));
+  pen.restore();
+}

@@ -1,5 +1,5 @@
 // What each firing did: energies of the dots, and the line that they print.
-import { axes, extent, line } from "./axes.js";
+import { axes, extent, line, refusal } from "./axes.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { digits, shown, unitOf } from "./units.js";
@@ -111,8 +111,8 @@ function printed(pen, width, height, frame) {
   pen.fillStyle = c.ink;
   pen.textAlign = "center";
   if (frame.reason) {
-    pen.fillText(frame.reason.slice(0, Math.floor(width / 6)), width / 2, height / 2);
     pen.restore();
+    refusal(pen, width, height, frame.reason);
     return;
   }
   const { data } = frame;

@@ -1,5 +1,5 @@
 // The frequency-time map: colours of displacement, and a cursor that sets the rate.
-import { axes, line } from "./axes.js";
+import { axes, line, refusal } from "./axes.js";
 import { surface } from "./pen.js";
 import { colours } from "./theme.js";
 import { shown, timeUnit } from "./units.js";
@@ -7,24 +7,26 @@ import { shown, timeUnit } from "./units.js";
 // Cividis (J. R. Nunez, C. R. Anderton, R. S. Renslow, PLoS ONE 13 (2018) e0199239), every fourth colour.
 const CIVIDIS = "00224e00255400285b002b62002e6a0030700533711235701a386f213b6e273e6e2d416d32436d36466c3b496c3f4c6c434e6c47516c4b546c4f576c535a6d565c6d5a5f6e5e626e61656f656870686a716c6d726f70737273747676767979777d7c78807f788482798885788c8878908b78938e789791779b94769f9775a39a74a79d73aba072afa471b4a76fb8aa6ebcae6cc0b16ac4b468c8b866cdbb63d1bf61d5c25edac65bdec958e2cd54e7d150ebd44bf0d846f5dc41f9e03afee434";
 const CONTACT = [[253, 190, 133], [166, 54, 3]];
+const SHADES = 64;
 const GAP = 65535;
 const MARGIN = { left: 54, right: 12, top: 8, bottom: 32 };
 
 /** Return 65536 colours: cividis from backstop to pack, orange to brown inside the pack, grey where unknown. */
 function palette(low, high, front, dark) {
   const table = new Uint32Array(65536);
-  const border = front === null ? GAP : Math.min(Math.max(((front - low) / (high - low)) * (GAP - 1), 1), GAP);
+  const border = front === null ? GAP : Math.round(Math.min(Math.max(((front - low) / (high - low)) * (GAP - 1), 1), GAP));
   const stops = CIVIDIS.length / 6;
   const little = (r, g, b) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
-  for (let code = 0; code < GAP; code += 1) {
-    if (code < border) {
-      const at = Math.min(Math.floor((code / border) * stops), stops - 1);
-      const colour = parseInt(CIVIDIS.slice(6 * at, 6 * at + 6), 16);
-      table[code] = little(colour >> 16, (colour >> 8) & 255, colour & 255);
-    } else {
-      const part = Math.min((code - border) / Math.max((GAP - border) * 0.6, 1), 1);
-      table[code] = little(...CONTACT[0].map((start, k) => Math.round(start + part * (CONTACT[1][k] - start))));
-    }
+  // It is made anew for every place of the pack: a stretch of codes at a time, not a code.
+  for (let at = 0; at < stops; at += 1) {
+    const colour = parseInt(CIVIDIS.slice(6 * at, 6 * at + 6), 16);
+    table.fill(little(colour >> 16, (colour >> 8) & 255, colour & 255), Math.ceil((at * border) / stops), Math.ceil(((at + 1) * border) / stops));
+  }
+  const last = border + Math.max((GAP - border) * 0.6, 1);
+  for (let at = 0; at < SHADES; at += 1) {
+    const part = at / (SHADES - 1);
+    const shade = little(...CONTACT[0].map((start, k) => Math.round(start + part * (CONTACT[1][k] - start))));
+    table.fill(shade, Math.ceil(border + (at / SHADES) * (last - border)), at === SHADES - 1 ? GAP : Math.ceil(border + ((at + 1) / SHADES) * (last - border)));
   }
   table[GAP] = dark ? little(60, 60, 60) : little(230, 230, 230);
   return table;
@@ -56,6 +58,8 @@ export function mapView(body, studio) {
     const frame = studio.frames.map;
     if (!frame) return;
     const c = colours();
+    plane = null;
+    if (frame.reason) { refusal(pen, width, height, frame.reason); return; }
     const time = timeUnit(frame.end);
     const x = { low: 0, high: frame.end, label: `time, ${time.name}`, factor: time.factor };
     const y = { low: frame.rates[0], high: frame.rates[1], label: "firing rate, Hz", factor: 1 };
@@ -109,7 +113,7 @@ export function mapView(body, studio) {
   canvas.addEventListener("pointerleave", () => { tip.textContent = ""; });
   canvas.addEventListener("keydown", (event) => {
     const step = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
-    if (!step || !studio.frames.map) return;
+    if (!step || !studio.frames.map?.rates) return;
     event.preventDefault();
     const [low, high] = studio.frames.map.rates;
     const rate = studio.store.state.rate + (step * (high - low)) / 200;
@@ -140,15 +144,15 @@ export function mapView(body, studio) {
   }
   return {
     update: (what) => {
-      if (what === "map") render(studio.frames.map);
+      if (what === "map" && !studio.frames.map.reason) render(studio.frames.map);
       if (what === "map" || what === "state") refresh();
     },
-    draw: () => { if (studio.frames.map) render(studio.frames.map); refresh(); },
+    draw: () => { if (studio.frames.map && !studio.frames.map.reason) render(studio.frames.map); refresh(); },
     cursor: area.draw,
     paint,
     table: () => {
       const frame = studio.frames.map;
-      if (!frame) return null;
+      if (!frame || frame.reason) return null;
       const [rows, columns] = frame.data.codes.shape;
       const at = (k, count, low, high) => low + (k / (count - 1)) * (high - low);
       const all = [...frame.data.codes.keys()];

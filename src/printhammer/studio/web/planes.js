@@ -1,5 +1,5 @@
 // Phase plane, force-displacement loops and strobe section.
-import { axes, before, curve, dots, extent, inside, key, widened } from "./axes.js";
+import { axes, before, curve, dots, extent, inside, key, refusal, widened } from "./axes.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { digits, unitOf } from "./units.js";
@@ -101,6 +101,7 @@ export function strobeView(body, studio) {
     const frame = studio.frames.strobe;
     if (!frame) return;
     const c = colours();
+    if (frame.reason) { refusal(pen, width, height, frame.reason); return; }
     const { x, v } = frame.data;
     const known = [...x.keys()].filter((k) => Number.isFinite(x[k]));
     const [xs, vs] = [known.map((k) => x[k]), known.map((k) => v[k])];
@@ -123,15 +124,24 @@ export function strobeView(body, studio) {
     pen.restore();
   }, () => {
     const frame = studio.frames.strobe;
-    return frame && { "displacement [m]": frame.data.x, "velocity [m/s]": frame.data.v };
+    return frame && !frame.reason && { "displacement [m]": frame.data.x, "velocity [m/s]": frame.data.v };
   });
 }
 
 export function strobeText(frame) {
-  const told = `${frame.data.x.length} points at ${digits(frame.rate, 5)} Hz`;
+  const told = `${frame.data.x.length} of ${frame.last} points at ${digits(frame.rate, 5)} Hz`;
   if (frame.status !== "ok") return `${told}: ${frame.status}`;
   const judged = frame.verdict;
-  if (!judged) return `${told}, verdict follows`;
+  const sofar = frame.exponent;
+  if (!judged) return `${told}${sofar ? `, exponent so far ${exponentText(sofar.value, sofar.standard_error)}` : ""}`;
   const exponent = judged.exponent_per_firing;
-  return `${judged.verdict.replace("-", " ")}${exponent === null ? "" : `, exponent ${exponent > 0 ? "+" : ""}${digits(exponent, 3)} per firing`}`;
+  return `${judged.verdict.replace("-", " ")}${exponent === null ? "" : `, exponent ${exponentText(exponent, judged.standard_error)} per firing`}`;
+}
+
+/** Tell an exponent with as many digits as its standard error leaves it. */
+function exponentText(value, error) {
+  const sign = value > 0 ? "+" : "";
+  if (error === null || !(error > 0)) return `${sign}${digits(value, 3)}`;
+  const places = Math.min(Math.max(1 - Math.floor(Math.log10(error)), 0), 3);
+  return `${sign}${value.toFixed(places)} ± ${error.toFixed(places)}`;
 }

@@ -1,0 +1,116 @@
+"""An end to all work: what is likely to take long is not begun, what does is given up, and both are told.
+
+The run of a state ends after `bounds.MOST_STEPS`. Many runs at a time know no such end; before them some of
+their kind are run one by one with an end, anew as soon as a constant has moved by `bounds.ALIKE`.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+from printhammer.ensemble import DISPLAY_TOLERANCE
+from printhammer.errors import InputError
+from printhammer.studio import bounds
+from printhammer.studio.controls import fields_of
+from printhammer.studio.engine import limited_run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.drive import Drive
+    from printhammer.motion import Motion
+    from printhammer.studio.state import State
+
+STEP_LIMIT: Final = "step limit"
+"""Status of a run that was given up."""
+
+
+class GivenUp(Exception):
+    """A newer state has come."""
+
+
+class Patience:
+    """Asked now and then whether work on a view may go on.
+
+    Parameters
+    ----------
+    newer : callable
+        Whether a newer state has come.
+    what : str
+        What is worked on.
+    seconds : float, optional
+        How long it may take.
+    """
+
+    def __init__(self, newer: Callable[[], bool], what: str, seconds: float = bounds.PATIENCE) -> None:
+        self._newer = newer
+        self._what = what
+        self._seconds = seconds
+        self._begun = time.monotonic()
+
+    @property
+    def spent(self) -> float:
+        """Time since the beginning, s."""
+        return time.monotonic() - self._begun
+
+    def check(self, more: float = 0.0) -> None:
+        """Go on, unless there is a newer state, or no time for what is expected to take `more` seconds.
+
+        Raises
+        ------
+        GivenUp
+            A newer state has come.
+        InputError
+            It takes too long.
+        """
+        if self._newer():
+            raise GivenUp
+        if self.spent + more > self._seconds:
+            raise InputError(f"{self._what} would take more than {self._seconds:g} s for this hammer")
+
+    def progress(self, _done: int, _all: int) -> None:
+        """Do as `check`, where progress is told."""
+        self.check()
+
+
+def try_out(
+    state: State, drive: Drive, end: float, what: str, tolerance: float = DISPLAY_TOLERANCE
+) -> Motion:
+    """Run a drive once; where it takes more than `bounds.MOST_MAP_STEPS`, refuse what needs many such runs.
+
+    Raises
+    ------
+    InputError
+        It does.
+    """
+    found = limited_run(state.changed, drive, end, bounds.MOST_MAP_STEPS, tolerance)
+    if found.status == STEP_LIMIT:
+        most = bounds.MOST_MAP_STEPS
+        raise InputError(f"{what} would take more than {most} steps for this hammer, expected fewer")
+    return found
+
+
+def alike(one: State, other: State) -> bool:
+    """Whether two states differ by so little that a map of them is about the same work."""
+    keys = ("hammer", "text", "pulses", "pattern", "overlap", "low", "high")
+    if any(getattr(one, key) != getattr(other, key) for key in keys):
+        return False
+    base = one.base.constants
+    mine, theirs = dict(one.constants), dict(other.constants)
+    pairs = [(mine.get(key, base[key].si), theirs.get(key, base[key].si)) for key in {*mine, *theirs}]
+    if one.waveform != other.waveform:
+        waves = fields_of(one.fired), fields_of(other.fired)
+        if waves[0].keys() != waves[1].keys():
+            return False
+        for name, value in waves[0].items():
+            if isinstance(value, float):
+                pairs.append((value, waves[1][name]))
+            elif value != waves[1][name]:
+                return False
+    return all(near(*pair) for pair in pairs)
+
+
+def near(one: float, other: float) -> bool:
+    """Whether two numbers are equal, or of the same sign and apart by less than the factor `bounds.ALIKE`."""
+    return one == other or (one * other > 0.0 and 1.0 / bounds.ALIKE < one / other < bounds.ALIKE)
