@@ -59,6 +59,18 @@ def test_a_pattern_and_a_head_of_ones_own(cli: Callable, tmp_path: Path) -> None
     np.testing.assert_array_equal(Pattern.load(tmp_path / "b.toml").dots, bars.dots)
 
 
+def test_a_drawing_goes_on_from_line_to_line(cli: Callable, tmp_path: Path) -> None:
+    Pattern("bar", np.ones((18, 2), dtype=bool)).save(tmp_path / "bar.PNG")
+    words = ("--pattern", tmp_path / "bar.PNG", "--rate", "500 Hz", "--out", tmp_path / "dots.nc")
+    for more, gap in (((), 0.0), (("--line-gap", "0.5"), 0.5)):
+        assert cli("print", *HAMMER, *words, *more).status == 0
+        attributes = xr.load_dataset(tmp_path / "dots.nc").attrs
+        assert attributes["line_pitch"] == pytest.approx((1.0 + gap) * 9 * attributes["wire_pitch"])
+    below = cli("print", *HAMMER, *words, "--line-gap", "-0.1")
+    assert below.status == 2
+    assert "line_gap = -0.1" in below.err
+
+
 def test_without_names_three_files_are_written(
     cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

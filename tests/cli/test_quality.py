@@ -27,6 +27,7 @@ def test_the_report_and_its_files(cli: Callable, tmp_path: Path) -> None:
     assert "lbf" in done.out
     assert "dot matrix" in done.out
     assert json.loads(paths["json"].read_text())["force_mean_N"] == found.force_spread.mean
+    assert json.loads(paths["json"].read_text())["dot_matrix_tolerance"] == int(found.dot_matrix)
     assert len(pd.read_csv(paths["csv"])) == 3
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
 
@@ -148,7 +149,8 @@ def test_a_run_that_stops_is_told(cli: Callable, tmp_path: Path) -> None:
         (("--rate", "1 kHz", "--seed", "1"), "--seed is given"),
         (("--safe-rate", "--damping"), "--safe-rate and --damping"),
         (("--safe-rate", "--last", "50 Hz"), "last"),
-        (("--yield", "0"), "number"),
+        (("--yield", "0"), "--yield 0"),
+        (("--yield", "none"), "--yield"),
         (("--yield", "2", "--spread", "magnet.Xm=1%"), "magnet.Xm"),
         (("--yield", "2", "--spread", "1%", "--spread", "2%"), "--spread 2%"),
         (("--yield", "2", "--judged-by", "me"), "judged_by"),

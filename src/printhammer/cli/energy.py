@@ -161,7 +161,7 @@ def told(found: LeastWork, units: Units) -> Table:
     table.add_row(
         "positive work W+",
         f"{with_unit(work.positive, 'energy', units)}, [bold]{found.positive_ratio:.4f}[/bold] of it;"
-        f" no current does with less than {found.bound_ratio:.4f}",
+        f" no current does with less than {found.bound_ratio:.4f} for this force",
     )
     if work.heat is not None:
         table.add_row("heat of the coil", with_unit(work.heat, "energy", units))
@@ -249,9 +249,8 @@ def _planned(name: str, compute: Callable[[Callable[[int, int], None]], Any]) ->
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-    with Progress(
-        TextColumn(name), BarColumn(), MofNCompleteColumn(), console=Console(stderr=True), transient=True
-    ) as shown:
+    columns, console = (TextColumn(name), BarColumn(), MofNCompleteColumn()), Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
         task = shown.add_task(name, total=None)
         return compute(lambda done, total: shown.update(task, completed=done, total=total))
 

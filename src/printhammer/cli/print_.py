@@ -70,6 +70,15 @@ def print_(
     density: Annotated[
         str | None, _option(_HEAD, "--density", "X", "Optical density of the dot of a single pulse (1).")
     ] = None,
+    line_gap: Annotated[
+        str | None,
+        _option(
+            _HEAD,
+            "--line-gap",
+            "X",
+            "Between print lines, in parts of the height of the wires (1/3; 0 for a bitmap).",
+        ),
+    ] = None,
     limits: Annotated[
         str | None,
         typer.Option("--limits", metavar="NAME", help="Limits: slots (default), dot-matrix or engraved."),
@@ -115,6 +124,7 @@ def print_(
     from printhammer.printing.limits import limits_named
     from printhammer.printing.nominal import rate_of
     from printhammer.printing.page import print_page
+    from printhammer.printing.pattern_file import BITMAPS
 
     if rate is None:
         raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'")
@@ -128,7 +138,11 @@ def print_(
     read = [path for path in (pattern, font, table, Path(hammer)) if path is not None]
     check_outputs([*wanted, *(path for path, _view in views), *([save] if save else [])], read)
     asked = _pattern(text, pattern, font, whole(wires, "--wires"), whole(columns, "--columns"))
-    head = _head(asked.wires, pitch, wire_diameter, number(density, "--density"))
+    gap = number(line_gap, "--line-gap")
+    if gap is None and pattern is not None and pattern.suffix.lower() in BITMAPS:
+        # A drawing goes on from print line to print line.
+        gap = 0.0
+    head = _head(asked.wires, pitch, wire_diameter, number(density, "--density"), gap)
     options: dict[str, Any] = {
         "tolerance": number(tolerance, "tolerance"),
         "threads": whole(threads, "threads"),
@@ -203,15 +217,18 @@ def _pattern(
     )
 
 
-def _head(wires: int, pitch: str | None, wire_diameter: str | None, density: float | None) -> Any:
+def _head(
+    wires: int, pitch: str | None, wire_diameter: str | None, density: float | None, gap: float | None
+) -> Any:
     from printhammer.drive_input import read_positive
-    from printhammer.printing.head import DENSITY, head_of
+    from printhammer.printing.head import DENSITY, LINE_GAP, head_of
 
     return head_of(
         wires,
         pitch=None if pitch is None else read_positive(pitch, "m", "--pitch"),
         wire_diameter=None if wire_diameter is None else read_positive(wire_diameter, "m", "--wire"),
         density=DENSITY if density is None else density,
+        line_gap=LINE_GAP if gap is None else gap,
     )
 
 
@@ -242,7 +259,8 @@ def told(page: Page, units: Units) -> Table:
         spread, most = (with_unit(float(value), "length", units) for value in (np.std(error), error[worst]))
         table.add_row(
             "placement",
-            f"spread {spread}, worst {most} (line {where[0]}, wire {where[1]}, slot {where[2]})",
+            f"spread {spread}, worst {most}"
+            f" (line {where[0]}, wire {where[1]}, slot {where[2]}, counted from 1)",
         )
         table.add_row(
             "flight time",

@@ -180,7 +180,9 @@ def quality(
         if judged_by is not None:
             many["judged_by"] = judged_by
         spreads = _spreads(loaded, spread or [])
-        count = whole(yield_, "--yield") or 0
+        count = whole(yield_, "--yield")
+        if not count or count < 1:
+            raise InputError(f"--yield {yield_}: expected a number of hammers, 1 or more")
         found = _computed(
             "hammers",
             lambda tell: tolerance_yield(loaded, rate, number=count, progress=tell, **spreads, **many),
@@ -280,8 +282,8 @@ def _safely(compute: Callable[[Callable[[float], None]], Any]) -> Any:
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    columns, console = (SpinnerColumn(), TextColumn("{task.description}")), Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("patterns", total=None)
         return compute(lambda rate: bar.update(task, description=f"patterns up to {rate:g} Hz"))
 
@@ -291,8 +293,8 @@ def _computed(name: str, compute: Callable[[Callable[[int, int], None]], Any]) -
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-    columns = (TextColumn(name), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    columns, console = (TextColumn(name), BarColumn(), MofNCompleteColumn()), Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(name, total=None)
         return compute(lambda done, total: bar.update(task, completed=done, total=total))
 

@@ -123,6 +123,7 @@ def _panel(ax: Axes, found: DampingStudy, values: FloatArray, otherwise: list[st
             va="center",
             fontsize=TINY,
             fontweight="bold" if row == best else "normal",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
         )
         if one.kind == "as it is":
             ax.axvline(values[row], color=MUTED, lw=THIN, ls=(0, (4, 3)), zorder=0.5)

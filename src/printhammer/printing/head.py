@@ -17,8 +17,10 @@ from printhammer.errors import InputError
 DENSITY: Final = 1.0
 """Optical density of the dot of a single pulse, an assumption: a tenth of the light comes back."""
 
+_THICKNESS: Final = 4 / 3
 _HEIGHT: Final = 9 * 25.4e-3 / 72
-_BETWEEN: Final = 1 / 3
+LINE_GAP: Final = 1 / 3
+"""Between print lines, in parts of the height of the wires."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +39,13 @@ class Head:
         Also that of a dot, m.
     density : float
         Optical density of the dot of a single pulse.
+    line_gap : float
+        Between print lines, in parts of the height of the wires; 0 for drawings that go on from line to line.
 
     Raises
     ------
     InputError
-        A number is not positive and finite.
+        A number is not positive, or the gap not at least 0, or one is not finite.
     """
 
     wires: int
@@ -49,17 +53,20 @@ class Head:
     pitch: float
     wire_diameter: float
     density: float = DENSITY
+    line_gap: float = LINE_GAP
 
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
-            if isinstance(value, bool) or not (value > 0.0 and math.isfinite(value)):
-                raise InputError(f"head: {one.name} = {value!r}, expected a positive number")
+            least = 0.0 if one.name == "line_gap" else math.ulp(0.0)
+            if isinstance(value, bool) or not (value >= least and math.isfinite(value)):
+                expected = "a positive number" if least else "a number not below 0"
+                raise InputError(f"head: {one.name} = {value!r}, expected {expected}")
 
     @property
     def line_pitch(self) -> float:
-        """From print line to print line, m: the height of the wires and a third more."""
-        return (1.0 + _BETWEEN) * self.wires * self.wire_pitch
+        """From print line to print line, m: the height of the wires, and the gap."""
+        return (1.0 + self.line_gap) * self.wires * self.wire_pitch
 
 
 _STANDARD: Final = {
@@ -75,6 +82,7 @@ def head_of(
     pitch: float | None = None,
     wire_diameter: float | None = None,
     density: float = DENSITY,
+    line_gap: float = LINE_GAP,
 ) -> Head:
     """Return a head of an assumed kind: as high as that of nine wires, whatever their number.
 
@@ -89,20 +97,23 @@ def head_of(
         than from wire to wire.
     density : float, optional
         Optical density of the dot of a single pulse.
+    line_gap : float, optional
+        Between print lines, in parts of the height of the wires.
 
     Raises
     ------
     InputError
-        A number is not positive and finite.
+        As for `Head`.
     """
     if wires < 1:
         raise InputError(f"head: wires = {wires!r}, expected a positive number")
     apart = _HEIGHT / wires
-    usual = _STANDARD.get(wires, Head(wires, apart, apart, (1.0 + _BETWEEN) * apart))
+    usual = _STANDARD.get(wires, Head(wires, apart, apart, _THICKNESS * apart))
     return Head(
         wires,
         usual.wire_pitch,
         usual.pitch if pitch is None else pitch,
         usual.wire_diameter if wire_diameter is None else wire_diameter,
         density,
+        line_gap,
     )

@@ -97,7 +97,7 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
         found += [
             Material(
                 "elastomer",
-                f"k {stiffness:.0e} N/m^1.5, A {1e6 * time:g} us",
+                f"k {1e-6 * stiffness:g} MN/m^1.5, A {1e6 * time:g} us",
                 {
                     "backstop": ElastomerBackstop(
                         position=hammer.position, stiffness=stiffness, relaxation_time=time
@@ -116,7 +116,7 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
         found += [
             Material(
                 "pack",
-                f"spring and dashpot, {ratio:g} of critical",
+                f"dashpot, {ratio:g} of critical",
                 {"pack": DashpotPack(stiffness=stiff, damping=ratio * critical, front=pack.front)},
             )
             for ratio in PACK_DAMPINGS

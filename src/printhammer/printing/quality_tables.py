@@ -162,8 +162,8 @@ def figures_of(found: Quality) -> dict[str, Any]:
             result[f"{name}_{part}_{unit}"] = None if math.isnan(value) else value
     result |= {
         "pitch_m": found.pitch,
-        "dot_matrix_tolerance": str(found.dot_matrix).lower(),
-        "engraved_tolerance": str(found.engraved).lower(),
+        "dot_matrix_tolerance": int(found.dot_matrix),
+        "engraved_tolerance": int(found.engraved),
         "backstop_touches_per_dot": found.wear.touches / found.fired,
         "backstop_impulse_per_dot_N_s": found.backstop_impulse,
         "backstop_loss_per_dot_J": found.backstop_loss,

@@ -92,7 +92,7 @@ class Failure:
             f"in the cycle after {self.pattern[:-1]}" if self.in_cycle else f"of the pattern {self.pattern}"
         )
         what = {
-            "force": f"has a force off by {100.0 * self.deviation:+.1f} %",
+            "force": f"has a force off by {100.0 * self.deviation:+.2f} %",
             "arrival": f"arrives {1e6 * self.deviation:+.1f} µs off",
             "extra contacts": f"has {self.deviation:.0f} extra contacts",
             "lost": "is lost",
