@@ -1,5 +1,6 @@
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,13 @@ def test_tolerances_of_the_paper(hammer: "ph.Hammer") -> None:
     assert math.isnan(lost.force_spread.mean)
     assert not lost.dot_matrix
     assert not lost.passed
+
+
+def test_a_dot_fired_ahead_of_its_slot_may_fly_longer(hammer: "ph.Hammer") -> None:
+    slow = quality(hammer, 100.0, 2)
+    longer = np.array([0.0, 1e-3])
+    assert replace(slow, flight_time=slow.flight_time + longer).engraved
+    assert not replace(slow, arrival_deviation=slow.arrival_deviation + longer).dot_matrix
 
 
 def test_heat_needs_a_resistance(hammer: "ph.Hammer", found: Quality) -> None:

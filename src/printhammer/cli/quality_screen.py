@@ -48,8 +48,8 @@ def report(found: Quality, units: Units) -> Table:
         ("placement", found.placement_spread, "length", None),
     ):
         table.add_row(name, _spread(spread, kind, single, units))
-    table.add_row("dot matrix", _verdict(found.dot_matrix, "flight times within 200 µs of each other"))
-    table.add_row("engraved", _verdict(found.engraved, "flight times within 30 µs of each other"))
+    table.add_row("dot matrix", _verdict(found.dot_matrix, "arrivals within 200 µs of each other"))
+    table.add_row("engraved", _verdict(found.engraved, "arrivals within 30 µs of each other"))
     wear = found.wear
     pressed = "" if wear.largest_force is None else f", up to {with_unit(wear.largest_force, 'force', units)}"
     table.add_row(

@@ -192,18 +192,21 @@ class Quality:
 
     @property
     def dot_matrix(self) -> bool:
-        """Whether no dot is lost and flight times vary by 200 us at most, what dot matrix printing bears."""
+        """Whether no dot is lost and arrivals vary by 200 us at most, what dot matrix printing bears.
+
+        Where every dot is fired at its slot they vary as the flight times do, of which the paper tells.
+        """
         return self._within(DOT_MATRIX_SPREAD)
 
     @property
     def engraved(self) -> bool:
-        """Whether no dot is lost and flight times vary by 30 us at most, what engraved characters bear."""
+        """Whether no dot is lost and arrivals vary by 30 us at most, what engraved characters bear."""
         return self._within(ENGRAVED_SPREAD)
 
     def _within(self, peak_to_peak: float) -> bool:
         # Comparison with the NaN of dots that are lost or not run is False.
-        known = not np.isnan(self.flight_time).any()
-        return bool(known and self.flight_time_spread.peak_to_peak <= peak_to_peak)
+        known = not np.isnan(self.arrival_deviation).any()
+        return bool(known and self.arrival_spread.peak_to_peak <= peak_to_peak)
 
     @property
     def backstop_impulse(self) -> float:
