@@ -37,6 +37,7 @@ FADED: Final = 0.02
 _ROUNDING: Final = 1e-9
 _HALVINGS: Final = 50
 _SAMPLES: Final = 4001
+_WAIT: Final = 1e-6
 
 
 def of_width(pulse: Waveform, width: float) -> Waveform:
@@ -78,6 +79,23 @@ def fading(pulse: Waveform, share: float = FADED) -> float:
     times = np.linspace(own.width, max(pulse.support, own.width), _SAMPLES)
     loud = np.flatnonzero(np.abs(pulse.value(times)) > share * pulse.peak)
     return float(times[min(loud[-1] + 1, _SAMPLES - 1)] - own.width) if loud.size else 0.0
+
+
+def clearance(pulse: Waveform, widest: float, largest: float) -> float:
+    """Return how long after the width of a brake pulse the next pulse may begin, s.
+
+    By then it has faded, and so far that the widest pulses one after another keep to the bound on the
+    current, A.
+    """
+    wide = of_width(pulse, widest)
+    wait, times = fading(pulse), np.linspace(0.0, wide.support, _SAMPLES)
+    rising = np.abs(wide.value(times))
+    while wait < wide.support - widest:
+        left = np.abs(wide.value(widest + wait + times))
+        if (rising + left).max() <= largest * (1.0 + _ROUNDING):
+            break
+        wait += _WAIT
+    return wait
 
 
 def with_brake(pulse: Waveform, brake: Waveform | None, offset: float) -> Waveform:

@@ -9,7 +9,8 @@ import numpy as np
 
 from printhammer.control.histories import REST, History, histories, histories_of, number_of, pattern_of, plain
 from printhammer.control.table import COLUMNS, Settings
-from printhammer.control.table_drive import fading, pulses_of, sequence
+from printhammer.control.table_drive import pulses_of, sequence
+from printhammer.control.table_search import earliest, latest
 from printhammer.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -50,7 +51,11 @@ VALUES: Final = (*COLUMNS, "deviation")
 
 @dataclass
 class Work:
-    """A table in the making: arrays of shape (rates, entries), and what is asked of it."""
+    """A table in the making: arrays of shape (rates, entries), and what is asked of it.
+
+    It is tuned on `hammers`, the one it is made for first; those of `spread` differ a little from that one.
+    No pulse is wider than `widest`, and none begins earlier than `wait` after a brake pulse, s.
+    """
 
     rates: FloatArray
     gaps: int
@@ -61,8 +66,10 @@ class Work:
     brake_width: FloatArray
     deviation: FloatArray
     hammers: Sequence[Hammer]
+    spread: Sequence[Hammer]
     pulse: Waveform
     widest: float
+    wait: float
     single: Single
     limits: Limits
     tolerance: float
@@ -190,9 +197,7 @@ def _newton(
     now = np.column_stack([work.advance[rows, columns], work.width[rows, columns]])
     gap = np.array([history[0] for _row, history in cells]) / work.rates[rows]
     brake = work.brake_width[rows, columns]
-    # No dot is fired before the brake pulse has faded.
-    faded = work.brake_delay[rows, columns] + brake + fading(work.pulse)
-    earliest = np.where(brake > 0.0, faded, 0.0)
+    first = earliest(work, work.brake_delay[rows, columns], brake)
     best, best_off = now.copy(), np.full(len(cells), np.inf)
     for turn in range(ROUNDS + 1):
         active = np.flatnonzero(best_off > GOOD)
@@ -228,7 +233,7 @@ def _newton(
             least = LEAST_WIDTH * work.widest - now[k, 1]
             change = _step(slopes, here[place].ravel(), least, work.widest - now[k, 1])
             now[k] = now[k] + change
-            now[k, 0] = min(now[k, 0], gap[k] - earliest[k])
+            now[k, 0] = min(max(now[k, 0], -float(latest(work, now[k, 1]))), gap[k] - first[k])
     work.advance[rows, columns], work.width[rows, columns] = best.T
 
 

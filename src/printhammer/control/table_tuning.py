@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.histories import checked_size, entries_of, histories, number_of, shared_numbers
-from printhammer.control.table import CompensationTable
-from printhammer.control.table_brake import BRAKES, Braked, brakes
-from printhammer.control.table_drive import LARGEST_CURRENT, print_pulse
-from printhammer.control.table_maps import GUESSES, Guess, guesses, plane
+from printhammer.control.histories import checked_size, entries_of, histories, number_of
+from printhammer.control.table_drive import LARGEST_CURRENT, clearance, print_pulse
 from printhammer.control.table_polish import (
     ROUNDS,
     VALUES,
     Work,
-    level_of,
-    look_at,
     polish,
-    polish_level,
     subset,
 )
+from printhammer.control.table_refine import refined, table_of
+from printhammer.control.table_search import chosen
 from printhammer.control.table_single import Single, single_of
 from printhammer.drive_input import read_count, read_positive
 from printhammer.ensemble import DISPLAY_TOLERANCE
@@ -32,6 +29,7 @@ from printhammer.printing.perturbation import Perturbation, perturbed
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from printhammer.control.table import CompensationTable
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
@@ -49,9 +47,6 @@ SPREAD: Final = (
 )
 """By how much the hammers differ that a robust table is tuned on, beside the hammer itself."""
 
-_FREE: Final = 0.2
-_FINE: Final = 0.1
-_HOPELESS: Final = 2.0
 _USABLE: Final = 0.9
 
 
@@ -127,6 +122,7 @@ def tune(
     asked = [rate] if rate is not None else rates
     grid = _all_rates(single) if asked is None else _given_rates(asked)
     hammers = [hammer, *([perturbed(hammer, by) for by in SPREAD] if robust else [])]
+    spread = _spread(hammer)
     steps = _Steps(progress, 2 + ROUNDS * (gaps + 1))
     shape = 0, entries_of(gaps, far)
     blank = Work(
@@ -135,8 +131,10 @@ def tune(
         reach=far,
         **{name: np.zeros(shape) for name in VALUES},
         hammers=hammers,
+        spread=spread,
         pulse=pulse,
         widest=widest,
+        wait=clearance(pulse, widest, largest),
         single=single,
         limits=bounds,
         tolerance=tolerance,
@@ -145,24 +143,23 @@ def tune(
     work = _tuned(blank, grid, brake, steps, open_ended=asked is None)
     lost = np.flatnonzero(~np.isfinite(work.deviation.max(axis=1)))
     if asked is None:
-        work = subset(work, np.arange(_kept(work)))
+        work = refined(subset(work, np.arange(_kept(work))), largest, steps)
     elif lost.size:
         speed = float(grid[lost[0]])
         raise InputError(
             f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before,"
             " expected a lower rate"
         )
-    shared = shared_numbers(gaps, far)
-    values: dict[str, Any] = {name: getattr(work, name)[:, shared] for name in VALUES}
-    return CompensationTable(
-        hammer=hammer.name,
-        fingerprint=hammer.fingerprint,
-        rates=work.rates,
-        gaps=gaps,
-        reach=far,
-        largest_current=largest,
-        **values,
-    )
+    return table_of(work, largest)
+
+
+def _spread(hammer: Hammer) -> list[Hammer]:
+    """Return the hammers that differ a little, as far as the laws of the hammer let them."""
+    found = []
+    for by in SPREAD:
+        with suppress(InputError):
+            found.append(perturbed(hammer, by))
+    return found
 
 
 class _Steps:
@@ -215,63 +212,32 @@ def _tuned(
     blanks: dict[str, Any] = {name: np.zeros(shape) for name in VALUES}
     work = replace(blank, rates=rates, **blanks)
     work.width[:] = own.width
-    for gap, numbers in _columns(work).items():
-        near = np.flatnonzero(gap / rates <= blank.single.settled)
-        for column in numbers:
-            work.deviation[near, column] = np.inf
-    starts = _starts(work)
-    steps()
-    if open_ended:
-        # A table without given rates ends below the first at which no pulse comes near.
-        close = [all(not cells or cells[0].off <= _HOPELESS for cells in row) for row in starts]
-        ends = close.index(False) if False in close else len(close)
-        work, starts = subset(work, np.arange(ends)), starts[:ends]
-    for turn in range(GUESSES):
-        _try(work, [[cells[turn] if turn < len(cells) else None for cells in row] for row in starts], steps)
-    for turn in range(BRAKES if brake else 0):
-        if turn == 0:
-            pulses = _brakes(work)
-        _try(work, [[cells[turn] if turn < len(cells) else None for cells in row] for row in pulses], steps)
+    every = np.arange(1, work.reach + 1) / rates[:, np.newaxis]
+    periods = np.unique(every[every <= work.single.settled])
+    there, ways = chosen(work, periods, brake=brake, told=steps)
+    for gap, columns in _columns(work).items():
+        for row, period in enumerate(every[:, gap - 1].tolist()):
+            if period > work.single.settled:
+                continue
+            place = int(np.searchsorted(there, period))
+            if place == there.size or there[place] != period:
+                work.deviation[row, columns] = np.inf
+                continue
+            work.advance[row, columns] = period - ways.fired[place]
+            work.width[row, columns] = ways.width[place]
+            work.brake_delay[row, columns] = ways.delay[place]
+            work.brake_width[row, columns] = ways.brake[place]
     found = np.isfinite(work.deviation.max(axis=1))
+    if open_ended and not found.all():
+        # A table without given rates ends below the first at which no pulse comes near.
+        work = subset(work, np.arange(int(np.argmin(found))))
+        found = found[: work.rates.size]
     good = subset(work, np.flatnonzero(found))
     if found.any():
         polish(good, steps)
     for name in VALUES:
         getattr(work, name)[found] = getattr(good, name)
     return work
-
-
-def _starts(work: Work) -> list[list[list[Guess]]]:
-    """Return first guesses for each rate and gap from a plane of second dots; none for dots from rest.
-
-    Where there should be one and is none, the guess is the hammer's own pulse, infinitely far off.
-    """
-    own: Any = work.pulse
-    spans = [[gap / rate for gap in range(1, work.reach + 1)] for rate in work.rates.tolist()]
-    periods = np.unique([period for row in spans for period in row if period <= work.single.settled])
-    if not periods.size:
-        return [[[] for _period in row] for row in spans]
-    planes = [plane(work, hammer, periods) for hammer in work.hammers]
-    return [
-        [
-            guesses(planes, period, work.limits) or [Guess(period, own.width, np.inf)]
-            if period <= work.single.settled
-            else []
-            for period in row
-        ]
-        for row in spans
-    ]
-
-
-def _brakes(work: Work) -> list[list[list[Braked]]]:
-    """Return brake pulses for each rate and gap at which dots are not good enough without."""
-    found: list[list[list[Braked]]] = []
-    for row, rate in enumerate(work.rates.tolist()):
-        found.append([])
-        for gap in range(1, work.reach + 1):
-            wanted = not work.deviation[row, _columns(work)[gap][0]] <= _FREE
-            found[-1].append(brakes(work, gap / rate) if wanted else [])
-    return found
 
 
 def _columns(work: Work) -> dict[int, list[int]]:
@@ -281,49 +247,6 @@ def _columns(work: Work) -> dict[int, list[int]]:
         gap: [number_of(one, work.reach) for one in every if one[0] == gap]
         for gap in range(1, work.reach + 1)
     }
-
-
-def _try(work: Work, cells: Sequence[Sequence[Guess | Braked | None]], steps: Callable[[], None]) -> None:
-    """Polish some guesses, one for each rate and gap or none, and keep those that turn out better.
-
-    Parameters
-    ----------
-    work : Work
-        The table; changed in place.
-    cells : sequence of sequence
-        For each rate and gap.
-    steps : callable
-        Called after each step of the work.
-    """
-    columns = _columns(work)
-    wanted = {
-        (row, gap): cell
-        for row, some in enumerate(cells)
-        for gap, cell in enumerate(some, 1)
-        if cell is not None and work.deviation[row, columns[gap][0]] > _FINE
-    }
-    if not wanted:
-        return
-    rows = np.unique([row for row, _gap in wanted])
-    other = subset(work, rows)
-    for place, row in enumerate(rows.tolist()):
-        for gap, own in columns.items():
-            cell = wanted.get((row, gap))
-            if cell is None:
-                continue
-            other.advance[place, own] = gap / work.rates[row] - cell.fired
-            other.width[place, own] = cell.width
-            other.brake_delay[place, own] = cell.delay if isinstance(cell, Braked) else 0.0
-            other.brake_width[place, own] = cell.brake if isinstance(cell, Braked) else 0.0
-    level = level_of(work, 1)
-    polish_level(other, level, steps)
-    look_at(other, level)
-    for own in columns.values():
-        first = own[0]
-        better = other.deviation[:, first] < work.deviation[rows, first]
-        for column in own:
-            for name in VALUES:
-                getattr(work, name)[rows[better], column] = getattr(other, name)[better, first]
 
 
 def _kept(work: Work) -> int:
