@@ -173,7 +173,7 @@ def chosen(
     ways : Ways
         One for each of these.
     """
-    nodes = _spaced(periods, SPACING)
+    nodes = spaced(periods, SPACING)
     known = []
     for node in nodes:
         known.append(searched(work, node, brake=brake))
@@ -195,7 +195,7 @@ def chosen(
     return found.period, found
 
 
-def _spaced(periods: FloatArray, spacing: float) -> list[float]:
+def spaced(periods: FloatArray, spacing: float) -> list[float]:
     """Return some of the times, the first and the last one among them."""
     nodes: list[float] = []
     for period in periods.tolist():
@@ -228,7 +228,7 @@ def _look_closely(work: Work, periods: FloatArray, groups: list[Ways]) -> None:
     bad = [row for row, group in enumerate(groups) if not group.cost.min(initial=np.inf) <= _BAD]
     # Where not even the neighbours have a way that is any good, there is none.
     hope = [row for row in bad if groups[row].cost.min(initial=np.inf) <= _HOPELESS]
-    nodes = _spaced(periods[hope], _CLOSE)
+    nodes = spaced(periods[hope], _CLOSE)
     own: Any = work.pulse
     found = []
     for node in nodes:

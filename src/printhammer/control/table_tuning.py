@@ -18,7 +18,7 @@ from printhammer.control.table_polish import (
     subset,
 )
 from printhammer.control.table_refine import refined, table_of
-from printhammer.control.table_search import chosen
+from printhammer.control.table_search import SPACING, chosen, spaced
 from printhammer.control.table_single import Single, single_of
 from printhammer.drive_input import read_count, read_positive
 from printhammer.ensemble import DISPLAY_TOLERANCE
@@ -70,9 +70,11 @@ def tune(
     A dot made like a dot from rest leaves the hammer as every such dot does. So its pulse is a function of
     the time since the dot before, as long as that one was made right; longer histories put right what is
     left. For each history, width and advance are found by Newton's method so that force and arrival of the
-    last dot of patterns with that history are those of the single pulse. Where no pulse does it, because the
-    armature falls back from a rebound when it should be fired, a brake pulse, one for the whole table, takes
-    some of the rebound away.
+    last dot of patterns with that history are those of the single pulse. Mostly there is more than one way
+    to do it: before a rebound or after it, with one or another brake pulse that takes some of the rebound
+    away, or without. The one is taken in which a row of such dots stays nearest to the single pulse on
+    hammers with 3 % more and less current and 10 um more and less travel, counting what this hammer itself
+    does three times. No dot is fired before the armature has left the pack of the one before.
 
     Parameters
     ----------
@@ -80,7 +82,8 @@ def tune(
         A hammer with a pack, a backstop and a current waveform that has a width.
     rate, rates : float or str, or sequence of them, optional
         Slots per second, Hz, or text with a unit; by default rates from 100 Hz, at which every dot is printed
-        from rest, to the highest one at which the table keeps to the limits.
+        from rest, to the highest one at which the table keeps to the limits, `STEP` apart, and closer where
+        the way to fire a dot changes.
     history : int, optional
         Number of gaps that a history holds, 1 to 4.
     reach : int, optional
@@ -90,8 +93,8 @@ def tune(
     brake : bool, optional
         Whether brake pulses may be used.
     robust : bool, optional
-        Tune on hammers with 3 % more and less current and 10 um more and less travel as well, for the least
-        mean square of all, instead of on this hammer alone.
+        Tune width and advance on the hammers that differ as well, for the least mean square of all, instead
+        of on this hammer alone.
     largest_current : float or str, optional
         Bound on the current, A, or text with a unit.
     tolerance : float, optional
@@ -123,7 +126,9 @@ def tune(
     grid = _all_rates(single) if asked is None else _given_rates(asked)
     hammers = [hammer, *([perturbed(hammer, by) for by in SPREAD] if robust else [])]
     spread = _spread(hammer)
-    steps = _Steps(progress, 2 + ROUNDS * (gaps + 1))
+    nodes = len(spaced(_periods(grid, far, single), SPACING))
+    # Once a time at which ways are looked for, once a step of Newton's method, with and without long rows.
+    steps = _Steps(progress, nodes + 3 + 2 * (ROUNDS + 1) * gaps)
     shape = 0, entries_of(gaps, far)
     blank = Work(
         rates=grid[:0],
@@ -213,7 +218,7 @@ def _tuned(
     work = replace(blank, rates=rates, **blanks)
     work.width[:] = own.width
     every = np.arange(1, work.reach + 1) / rates[:, np.newaxis]
-    periods = np.unique(every[every <= work.single.settled])
+    periods = _periods(rates, work.reach, work.single)
     there, ways = chosen(work, periods, brake=brake, told=steps)
     for gap, columns in _columns(work).items():
         for row, period in enumerate(every[:, gap - 1].tolist()):
@@ -238,6 +243,12 @@ def _tuned(
     for name in VALUES:
         getattr(work, name)[found] = getattr(good, name)
     return work
+
+
+def _periods(rates: FloatArray, reach: int, single: Single) -> FloatArray:
+    """Return all times between dots, s, within which the hammer does not come to rest, ascending."""
+    every = np.arange(1, reach + 1) / rates[:, np.newaxis]
+    return np.unique(every[every <= single.settled])
 
 
 def _columns(work: Work) -> dict[int, list[int]]:
