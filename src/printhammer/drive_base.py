@@ -166,7 +166,7 @@ class Drive:
 
     def _begins(self) -> IntArray:
         """Return the row of the kernel's tables at which that of each firing begins."""
-        return np.broadcast_to(np.int64(0), self._times.shape)
+        return np.zeros(len(self._times), np.int64)
 
     def _ends(self) -> FloatArray:
         """Return the times at which the pulses end, s."""
