@@ -22,6 +22,9 @@ const { mount } = await import(places["mount.js"]);
 export default {
   render({ model, el }) {
     el.classList.add("studio-widget");
+    // Notebooks have keys of their own, some of which cut cells: what is typed here is not for them.
+    el.dataset.lmSuppressShortcuts = "true";
+    el.addEventListener("keydown", (event) => event.stopPropagation());
     el.style.setProperty("--height", model.get("height"));
     const studio = mount(el, (text) => model.send({ text }), {
       read: () => model.get("state"),

@@ -142,16 +142,25 @@ export function key(pen, box, entries) {
   pen.textBaseline = "middle";
   pen.textAlign = "right";
   let [place, row] = [box.x + box.w - 4, box.y + 8];
+  const placed = [];
   for (const { name, colour, dash = [] } of [...entries].reverse()) {
     const wide = pen.measureText(name).width + 4 + 14;
     if (place - wide < box.x) [place, row] = [box.x + box.w - 4, row + 14];
+    placed.push({ name, colour, dash, place, row, wide });
+    place -= wide + 10;
+  }
+  // Curves below it do not strike out the names.
+  pen.fillStyle = c.panel;
+  pen.globalAlpha = 0.8;
+  for (const entry of placed) pen.fillRect(entry.place - entry.wide - 3, entry.row - 7, entry.wide + 6, 14);
+  pen.globalAlpha = 1;
+  for (const { name, colour, dash, place: right, row: middle, wide } of placed) {
     pen.fillStyle = c.ink;
-    pen.fillText(name, place, row);
+    pen.fillText(name, right, middle);
     pen.strokeStyle = colour;
     pen.lineWidth = 2;
     pen.setLineDash(dash);
-    line(pen, place - wide, row, place - wide + 14, row);
-    place -= wide + 10;
+    line(pen, right - wide, middle, right - wide + 14, middle);
   }
   pen.restore();
 }

@@ -120,7 +120,9 @@ export function strobeView(body, studio) {
     pen.fillStyle = c.ink;
     pen.textAlign = "left";
     pen.textBaseline = "top";
-    pen.fillText(strobeText(frame), 6, 5);
+    const told = strobeText(frame);
+    const lines = pen.measureText(told).width < width - 12 ? [told] : told.split(/, (?=exponent)/);
+    lines.forEach((text, k) => pen.fillText(text, 6, 5 + 14 * k));
     pen.restore();
   }, () => {
     const frame = studio.frames.strobe;
