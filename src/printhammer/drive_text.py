@@ -6,6 +6,7 @@ Numbers are written in SI with all their digits, so that what is read back is th
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 from printhammer.constants import quantities
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from printhammer.waveform_base import Waveform
+
+_BARE = re.compile("[A-Za-z0-9_-]+")
 
 FORMAT = 1
 """Version of the drive file format."""
@@ -51,7 +54,7 @@ def waveform_text(waveform: Waveform) -> dict[str, Any]:
 def inline(value: Any) -> str:
     """Write one TOML value on one line."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {inline(entry)}" for key, entry in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(key)} = {inline(entry)}" for key, entry in value.items()) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(inline(entry) for entry in value) + "]"
     if isinstance(value, str):
@@ -59,9 +62,16 @@ def inline(value: Any) -> str:
     return repr(value)
 
 
+def _key(name: str) -> str:
+    """Write a TOML key, in quotes where it needs them."""
+    return name if _BARE.fullmatch(name) else inline(name)
+
+
 def document(head: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> str:
     """Write a TOML document: keys first, then one table after the other."""
     blocks = ["\n".join(f"{key} = {inline(value)}" for key, value in head.items())]
     for name, table in tables.items():
-        blocks.append("\n".join([f"[{name}]", *(f"{key} = {inline(value)}" for key, value in table.items())]))
+        blocks.append(
+            "\n".join([f"[{name}]", *(f"{_key(key)} = {inline(value)}" for key, value in table.items())])
+        )
     return "\n\n".join(blocks) + "\n"

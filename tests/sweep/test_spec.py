@@ -25,6 +25,12 @@ LATIN = {"design": "latin-hypercube", "members": 5, "seed": 1}
 RANGE = {"key": "mass", "low": "3 g", "high": "4 g"}
 
 
+SEQUENCE = {
+    "sequence": {"at": ["0 us"], "waveforms": ["a"]},
+    "waveforms": {"a": {"shape": "half-sine", "amplitude": "1 A", "width": "1 ms"}},
+}
+
+
 def changed(**changes: Any) -> dict[str, Any]:
     found = {**deepcopy(GOOD), **changes}
     return {name: value for name, value in found.items() if value is not None}
@@ -69,6 +75,18 @@ def axes(*tables: dict[str, Any], **changes: Any) -> dict[str, Any]:
         (axes({"key": "pack.stifness", "values": ["1 N"]}), r"expected 'pack.stiffness'"),
         (axes({"key": "drive.rat", "values": ["1 Hz"]}), r"axis\[0\].key = 'drive.rat' names no constant"),
         (axes({"key": "drive.at.1", "values": ["1 ms"]}), r"the axis 'drive.at.1' names no firing"),
+        (
+            changed(drive=SEQUENCE, axis=[{"key": "waveform.width", "values": ["1 ms"]}]),
+            r"the axis 'waveform.width' changes what \[drive.sequence\] does not fire",
+        ),
+        (
+            changed(drive=SEQUENCE, axis=[{"key": "waveforms.b.width", "values": ["1 ms"]}]),
+            r"names no constant of .* or its drive, expected 'waveforms.a.amplitude'",
+        ),
+        (
+            changed(drive=SEQUENCE, axis=[{"key": "waveforms.a.amplitude", "values": ["1 N"]}]),
+            r"is a force, expected a current",
+        ),
         (axes({"key": "mass"}), r"axis\[0\] \(mass\).low is missing, expected values, or low, high"),
         (axes({"key": "mass", "values": []}), r"values = \[\]: expected a list of quantities, at least one"),
         (axes({"key": "mass", "values": [1.0]}), r"values\[0\] = 1.0 has no unit, expected a mass \(kg\)"),

@@ -138,6 +138,27 @@ def test_the_waveform_of_the_drive_takes_the_place_of_the_hammers(tmp_path: Path
         check_member(found.sel(waveform_width=width), motion)
 
 
+def test_pulses_of_a_sequence_are_swept_by_their_names(tmp_path: Path, hammer: ph.Hammer) -> None:
+    pulse = {"shape": "rectangle", "amplitude": "1.3 A", "width": "300 us", "rise": "60 us", "decay": "50 us"}
+    drive = {
+        "sequence": {"at": ["0 us", "900 us"], "waveforms": ["print", "the brake"]},
+        "waveforms": {"print": pulse, "the brake": {**pulse, "amplitude": "0.4 A"}},
+    }
+    axes = [
+        {"key": "waveforms.the brake.width", "values": ["100 us", "200 us"]},
+        {"key": "drive.at.1", "values": ["0.8 ms", "1 ms"]},
+    ]
+    found = run(tmp_path, drive=drive, axis=axes)
+    assert set(found.dims) >= {"waveforms_the_brake_width", "at_1"}
+    first = Rectangle(amplitude=1.3, width=300e-6, rise=60e-6, decay=50e-6)
+    for width in found["waveforms_the_brake_width"].values:
+        for time in found.at_1.values:
+            brake = Rectangle(amplitude=0.4, width=float(width), rise=60e-6, decay=50e-6)
+            own = ph.PulseSequence([first, brake], [0.0, float(time)])
+            row = found.sel({"waveforms_the_brake_width": width, "at_1": time})
+            check_member(row, ph.simulate(hammer, own, tolerance=TIGHT))
+
+
 def test_members_that_fail_are_rows(tmp_path: Path, hammer: ph.Hammer) -> None:
     axes = [
         {"key": "pack.front", "values": ["8 mil", "20 mil"]},

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
@@ -15,8 +17,6 @@ from printhammer.hammer_file import SELECTORS, Body, kinds_of, model_of
 from printhammer.sweep.quantities import read_quantities, read_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
     from printhammer.sweep.tables import AxisTable
@@ -82,7 +82,12 @@ class Axis:
 
 
 def read_axis(
-    table: AxisTable, where: str, hammer: Hammer, own_waveform: Mapping[str, object] | None, grid: bool
+    table: AxisTable,
+    where: str,
+    hammer: Hammer,
+    own_waveform: Mapping[str, object] | None,
+    grid: bool,
+    named: Mapping[str, object] = MappingProxyType({}),
 ) -> Axis:
     """Read an axis.
 
@@ -98,13 +103,15 @@ def read_axis(
         The waveform table of the drive, if it has one.
     grid : bool
         Whether the axes form a grid; else a range is asked for.
+    named : mapping, optional
+        The waveform tables of a sequence by their names.
 
     Raises
     ------
     InputError
         The key names nothing, a value is none or out of bounds, a range is empty.
     """
-    target, field, note = _resolved(table.key, where, hammer, own_waveform)
+    target, field, note = _resolved(table.key, where, hammer, own_waveform, named)
     told = f"{where} ({table.key})"
     geometric = table.spacing == "geometric"
     values = _values(table, told, note.si, grid, geometric)
@@ -116,7 +123,7 @@ def read_axis(
             raise InputError(f"{told}: a count cannot be drawn, expected an axis of a grid")
         if not all(value.is_integer() for value in values):
             raise InputError(f"{told}: expected whole numbers")
-    name = table.key.removeprefix("drive.").replace(".", "_")
+    name = table.key.removeprefix("drive.").replace(".", "_").replace(" ", "_")
     return Axis(table.key, name, target, field, note, np.array(values), geometric)
 
 
@@ -145,7 +152,11 @@ def _driven(note: Quantity, unit: str) -> Quantity:
 
 
 def _resolved(
-    key: str, where: str, hammer: Hammer, own_waveform: Mapping[str, object] | None
+    key: str,
+    where: str,
+    hammer: Hammer,
+    own_waveform: Mapping[str, object] | None,
+    named: Mapping[str, object],
 ) -> tuple[Target, str, Quantity]:
     section, _, name = key.partition(".")
     if section == "state" and name in _STATE:
@@ -156,19 +167,33 @@ def _resolved(
         number = name.removeprefix("at.")
         if name.startswith("at.") and number.isascii() and number.isdigit():
             return "at", number, _FIRING
-    if section == "waveform" and own_waveform is not None:
-        shape = own_waveform.get("shape")
-        if isinstance(shape, str) and shape in kinds_of("waveform"):
-            note = quantities(model_of("waveform", shape)).get(name)
-            if note is not None:
-                return "waveform", name, _driven(note, _own_unit(own_waveform.get(name), note))
+    if section == "waveforms":
+        one, _, constant = name.rpartition(".")
+        if (note := _constant_of(named.get(one), constant)) is not None:
+            return "waveform", name, note
+    elif section == "waveform" and own_waveform is not None:
+        if (note := _constant_of(own_waveform, name)) is not None:
+            return "waveform", name, note
     elif (found := quantity_of(key, hammer)) is not None:
         return "hammer", key, found
     known = [*(f"drive.{name}" for name in DRIVE), "drive.at.0", *(f"state.{name}" for name in _STATE)]
-    known += [name for name in hammer.constants if own_waveform is None or not name.startswith("waveform.")]
+    known += [f"waveforms.{name}.amplitude" for name in named]
+    fired = own_waveform is None and not named
+    known += [name for name in hammer.constants if fired or not name.startswith("waveform.")]
     close = get_close_matches(key, known, 1)
     hint = f"{close[0]!r}" if close else "one such as 'pack.stiffness', 'drive.rate' or 'state.x'"
-    raise InputError(f"{where}.key = {shown(key)} names no constant of {hammer.name}, expected {hint}")
+    raise InputError(
+        f"{where}.key = {shown(key)} names no constant of {hammer.name} or its drive, expected {hint}"
+    )
+
+
+def _constant_of(waveform: object, name: str) -> Quantity | None:
+    """Return what is known of a constant of a waveform table of the drive."""
+    shape = waveform.get("shape") if isinstance(waveform, Mapping) else None
+    if not isinstance(waveform, Mapping) or not isinstance(shape, str) or shape not in kinds_of("waveform"):
+        return None
+    note = quantities(model_of("waveform", shape)).get(name)
+    return None if note is None else _driven(note, _own_unit(waveform.get(name), note))
 
 
 def _own_unit(given: object, note: Quantity) -> str:

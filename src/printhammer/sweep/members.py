@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
     from printhammer.waveforms import Waveform
 
-KINDS: Final = ("train", "times", "burst", "sine")
+KINDS: Final = ("train", "times", "burst", "sequence", "sine")
 """Tables of a drive file that say when it fires."""
 
 
@@ -128,7 +128,12 @@ class Maker:
         for axis, value in changes.items():
             quantity = {"value": value, "unit": axis.note.si}
             if axis.target == "waveform":
-                tables["waveform"][axis.field] = quantity
+                name, _, constant = axis.field.rpartition(".")
+                if name:
+                    own = dict(tables["waveforms"][name])
+                    tables["waveforms"][name] = {**own, constant: quantity}
+                else:
+                    tables["waveform"][constant] = quantity
             elif axis.target == "drive":
                 tables[kind][axis.field] = int(value) if axis.field in COUNTS else quantity
             else:

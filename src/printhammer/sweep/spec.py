@@ -145,7 +145,11 @@ def _spec(found: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
     drive, place = _drive_tables(table.drive, folder)
     own = drive.get("waveform")
     own = own if isinstance(own, Mapping) else None
-    axes = tuple(read_axis(entry, f"axis[{i}]", hammer, own, grid) for i, entry in enumerate(table.axis))
+    named = drive.get("waveforms")
+    named = named if isinstance(named, Mapping) else {}
+    axes = tuple(
+        read_axis(entry, f"axis[{i}]", hammer, own, grid, named) for i, entry in enumerate(table.axis)
+    )
     for i, axis in enumerate(axes):
         if any(axis.name == other.name for other in axes[:i]):
             raise InputError(f"axis[{i}].key = {axis.key!r}: expected another key, this one has an axis")
@@ -203,6 +207,11 @@ def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
         raise InputError(f"drive: expected exactly one of the tables {tables}")
     timing = base.drive[kinds[0]]
     for axis in base.axes:
+        if kinds == ["sequence"] and axis.key.startswith("waveform."):
+            raise InputError(
+                f"the axis {axis.key!r} changes what [drive.sequence] does not fire, expected one of its"
+                " waveforms, such as 'waveforms.NAME.amplitude'"
+            )
         if axis.target == "drive" and axis.field in timing:
             raise InputError(f"drive.{kinds[0]}.{axis.field} is given beside the axis {axis.key!r}")
         if axis.target == "at":
