@@ -20,6 +20,7 @@ ORDER = (
     "backstops",
     "damping_materials",
     "energy_ledger",
+    "brake_pulse",
     "compensation_table",
     "least_work",
     "feedback",
