@@ -12,7 +12,7 @@ from printhammer.ensemble import DISPLAY_TOLERANCE
 from printhammer.errors import InputError
 from printhammer.maps import TAIL
 from printhammer.studio import bounds
-from printhammer.studio.chart import GAP, check_map, codes_of, map_frame, map_key
+from printhammer.studio.chart import GAP, codes_of, map_frame, map_key, try_map
 from printhammer.studio.frames import unframe
 from printhammer.studio.state import State, read_state
 from printhammer.studio.work import GivenUp
@@ -73,22 +73,32 @@ def test_it_is_given_up_for_a_newer_state() -> None:
 def test_what_takes_too_long_is_refused_by_runs_at_some_rates(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bounds, "MOST_MAP_STEPS", 200)
     with pytest.raises(InputError, match=r"at 500 Hz, would take more than 200 steps"):
-        check_map(of(), None)
-    check_map(of(pulses=1, low=1999.0), None)
+        try_map(of(), None)
+    try_map(of(pulses=1, low=1999.0), None)
 
 
 def test_what_is_like_a_map_before_is_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    known = of()
-    check_map(known, None)
+    known = try_map(of(), None)
     monkeypatch.setattr(bounds, "MOST_MAP_STEPS", 1)
-    stiffness = known.changed.constants["pack.stiffness"].si
-    check_map(of(constants={"pack.stiffness": 1.1 * stiffness}), known)
+    stiffness = known.state.changed.constants["pack.stiffness"].si
+    assert try_map(of(constants={"pack.stiffness": 1.1 * stiffness}), known) is known
     with pytest.raises(InputError, match="steps"):
-        check_map(of(constants={"pack.stiffness": 2.0 * stiffness}), known)
+        try_map(of(constants={"pack.stiffness": 2.0 * stiffness}), known)
     with pytest.raises(InputError, match="steps"):
-        check_map(of(pulses=10), known)
+        try_map(of(pulses=10), known)
 
 
 def test_descending_rates_are_refused() -> None:
     with pytest.raises(InputError, match="expected ascending"):
-        check_map(of(low=900.0, high=800.0), None)
+        try_map(of(low=900.0, high=800.0), None)
+
+
+def test_runs_that_fail_are_not_computed_side_by_side() -> None:
+    assert try_map(of(), None).engine == "auto"
+    # So strong a current drives the armature away from where the law of the magnet holds.
+    pulse = {"shape": "half-sine", "amplitude": -90.0, "width": 4e-4}
+    away = of(waveform=pulse)
+    tried = try_map(away, None)
+    assert tried.engine == "plain"
+    heading, _ = unframe(map_frame(away, 1, (8, 16), lambda: False, engine=tried.engine))
+    assert heading["failed"] == 8

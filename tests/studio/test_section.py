@@ -58,5 +58,11 @@ def test_the_verdict_is_that_of_the_library() -> None:
 def test_a_section_that_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     check_strobe(of())
     monkeypatch.setattr(bounds, "MOST_MAP_STEPS", 100)
-    with pytest.raises(InputError, match="25 points of the strobe section would take more than 100 steps"):
+    with pytest.raises(InputError, match="the first 25 strobe points would take more than 100 steps"):
         check_strobe(of())
+
+
+def test_a_section_of_a_run_that_fails_is_refused() -> None:
+    pulse = {"shape": "half-sine", "amplitude": -90.0, "width": 4e-4}
+    with pytest.raises(InputError, match=r"the first 25 strobe points: .* range"):
+        check_strobe(of(waveform=pulse))

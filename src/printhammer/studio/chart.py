@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.drive_base import Overlap
+    from printhammer.ensemble import Engine
     from printhammer.studio.state import State
     from printhammer.waveforms import Waveform
 
@@ -50,15 +52,31 @@ def map_key(state: State) -> tuple[Any, ...]:
     )
 
 
-def check_map(state: State, known: State | None) -> None:
+@dataclass(frozen=True)
+class Tried:
+    """A state, a map of which is known not to take too long.
+
+    Attributes
+    ----------
+    state : State
+        The state.
+    engine : str
+        By which it is computed, see `printhammer.Ensemble.run`.
+    """
+
+    state: State
+    engine: Engine
+
+
+def try_map(state: State, known: Tried | None) -> Tried:
     """Refuse a map that would take too long, by runs at some of its rates.
 
     Parameters
     ----------
     state : State
         What the map is of.
-    known : State or None
-        A state that was found good before; one like it is good too.
+    known : Tried or None
+        What was tried before; a state like it is good too.
 
     Raises
     ------
@@ -67,15 +85,25 @@ def check_map(state: State, known: State | None) -> None:
     """
     if not state.low < state.high:
         raise InputError(f"map: rates from {state.low:g} Hz to {state.high:g} Hz, expected ascending ones")
-    if known is not None and alike(state, known):
-        return
+    if known is not None and alike(state, known.state):
+        return known
     rates = tuple(np.linspace(state.low, state.high, _TRIED).tolist())
-    for rate, train in zip(rates, _trains(state.fired, rates, slots_of(state), state.overlap), strict=True):
+    trains = _trains(state.fired, rates, slots_of(state), state.overlap)
+    runs = [
         try_out(state, train, _end(state), f"a run of the map, at {rate:.4g} Hz,")
+        for rate, train in zip(rates, trains, strict=True)
+    ]
+    # Runs that fail can be very long ones side by side, and are short ones by themselves.
+    return Tried(state, "auto" if all(run.status == "ok" for run in runs) else "plain")
 
 
 def map_frame(
-    state: State, serial: int, size: tuple[int, int], newer: Callable[[], bool], threads: int | None = None
+    state: State,
+    serial: int,
+    size: tuple[int, int],
+    newer: Callable[[], bool],
+    threads: int | None = None,
+    engine: Engine = "auto",
 ) -> bytes:
     """Return the displacement against time and rate, as 16-bit codes between two displacements.
 
@@ -100,7 +128,7 @@ def map_frame(
         fired = rates[first:last].tolist()
         trains = _trains(state.fired, tuple(fired), slots_of(state), state.overlap)
         runs = Ensemble(hammer, trains, end, states=rest, tolerance=DISPLAY_TOLERANCE)
-        ok[first:last] = runs.run(times=times, x=x[first:last], threads=1).ok
+        ok[first:last] = runs.run(times=times, x=x[first:last], threads=1, engine=engine).ok
 
     # While one piece is integrated, another is made ready.
     in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE])

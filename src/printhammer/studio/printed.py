@@ -10,7 +10,7 @@ from printhammer.drive import PulseTrain
 from printhammer.errors import InputError
 from printhammer.studio import bounds
 from printhammer.studio.frames import frame
-from printhammer.studio.work import Patience, try_out
+from printhammer.studio.work import Patience, try_through
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +35,7 @@ def check_line(state: State, pattern: Pattern) -> None:
         It would.
     """
     train = PulseTrain(state.fired, rate=state.rate, pulses=_TRIED, overlap=state.overlap)
-    tried = try_out(state, train, _TRIED / state.rate, f"{_TRIED} slots of the line")
+    tried = try_through(state, train, _TRIED / state.rate, f"the first {_TRIED} slots of the line")
     runs = int(pattern.dots.any(axis=2).sum())
     steps = runs * pattern.slots * tried.steps / _TRIED
     if steps > bounds.MOST_WORK:

@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.drive import PulseTrain
 from printhammer.problem import TOLERANCE
 from printhammer.studio.frames import frame
-from printhammer.studio.work import try_out
+from printhammer.studio.work import try_through
 
 if TYPE_CHECKING:
     from printhammer.studio.state import State
@@ -39,7 +39,13 @@ def check_strobe(state: State) -> None:
         They do.
     """
     train = PulseTrain(state.fired, rate=state.rate, pulses=AT_ONCE[0], overlap=state.overlap)
-    try_out(state, train, AT_ONCE[0] / state.rate, f"{AT_ONCE[0]} points of the strobe section", TOLERANCE)
+    try_through(
+        state,
+        train,
+        AT_ONCE[0] / state.rate,
+        f"the first {AT_ONCE[0]} strobe points",
+        TOLERANCE,
+    )
 
 
 def strobe_frame(

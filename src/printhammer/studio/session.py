@@ -13,7 +13,7 @@ import threading
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
-from printhammer.studio.chart import FULL, PREVIEW, check_map, map_frame, map_key, no_map
+from printhammer.studio.chart import FULL, PREVIEW, Tried, map_frame, map_key, no_map, try_map
 from printhammer.studio.engine import dots_frame, motion_frame
 from printhammer.studio.frames import frame
 from printhammer.studio.printed import line_frame, line_key
@@ -53,7 +53,7 @@ class Session:
     def __init__(self, send: Callable[[bytes], None], shelf: Shelf | None = None) -> None:
         self._send = send
         self._shelf = shelf or Shelf()
-        self._tried: State | None = None
+        self._tried: Tried | None = None
         self._change = threading.Condition()
         self._latest: tuple[int, State] | None = None
         self._answered = 0
@@ -158,11 +158,10 @@ class Session:
 
     def _preview(self, serial: int, state: State) -> None:
         try:
-            check_map(state, self._tried)
-            self._tried = state
+            self._tried = try_map(state, self._tried)
             # Not given up for a newer state: a coarse map is to arrive while a slider moves. The browser
             # draws meanwhile, and has another core for that.
-            self._tell(map_frame(state, serial, PREVIEW, lambda: self._closed, threads=1))
+            self._tell(map_frame(state, serial, PREVIEW, lambda: self._closed, 1, self._tried.engine))
         except InputError as error:
             self._tell(no_map(serial, str(error)))
             self._sent["map"] = map_key(state)
@@ -188,7 +187,8 @@ class Session:
         if "map" not in state.views or self._sent.get("map") == map_key(state):
             return
         try:
-            self._tell(map_frame(state, serial, FULL, newer))
+            engine = self._tried.engine if self._tried is not None else "auto"
+            self._tell(map_frame(state, serial, FULL, newer, engine=engine))
         except InputError as error:
             self._tell(no_map(serial, str(error)))
         self._sent["map"] = map_key(state)

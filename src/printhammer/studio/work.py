@@ -91,6 +91,22 @@ def try_out(
     return found
 
 
+def try_through(
+    state: State, drive: Drive, end: float, what: str, tolerance: float = DISPLAY_TOLERANCE
+) -> Motion:
+    """Do as `try_out`, and refuse a run that does not come to its end as well.
+
+    Raises
+    ------
+    InputError
+        It does not, or takes too many steps.
+    """
+    found = try_out(state, drive, end, what, tolerance)
+    if found.status != "ok":
+        raise InputError(f"{what}: {found.message}")
+    return found
+
+
 def alike(one: State, other: State) -> bool:
     """Whether two states differ by so little that a map of them is about the same work."""
     keys = ("hammer", "text", "pulses", "pattern", "overlap", "low", "high")
