@@ -205,8 +205,8 @@ class _Run:
     def see_flights(self, loops: list[Loop]) -> None:
         """Carry some runs to their next decisions, and estimate the coming touches."""
         starts = np.array([loop.time for loop in loops])
-        touches = np.array([loop.touch for loop in loops])
-        ends = np.maximum(touches - self.controller.lead, starts + _SOON)
+        touches = np.array([loop.touch - self.controller.leads[loop.kind] for loop in loops])
+        ends = np.maximum(touches, starts + _SOON)
         since = np.maximum([loop.since for loop in loops], starts)
         contacts, flights = self._carry(loops, since, ends)
         self.controller.learn(loops, *contacts, self.sensor)

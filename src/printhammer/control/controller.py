@@ -14,11 +14,11 @@ import numpy as np
 
 from printhammer.control.closed_loop import REMEMBERED, Pulse
 from printhammer.control.flight import Expected, FreeForce, flight_from_samples
-from printhammer.control.landing import Landing, landing
+from printhammer.control.fronts import between_fronts, fronts
 from printhammer.control.launch import Launch, launch
 from printhammer.control.learning import Contacts, Touched
 from printhammer.control.policy import Policy, between
-from printhammer.control.swing_table import ALWAYS, FREE, SwingTable, force_map, swing_table
+from printhammer.control.swing_table import ALWAYS, FREE, PUSHED, force_map
 from printhammer.errors import InputError
 from printhammer.printing.limits import Limits
 from printhammer.printing.nominal import nominal
@@ -32,16 +32,17 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
-LEAD: Final = 30e-6
-"""Time before a touch at which the controller decides, s."""
+LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
+"""Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,
+and does not begin before it."""
 
 WINDOW: Final = 120e-6
 """Time over which samples are looked at, s."""
 
 _SPEED_ERROR: Final = 0.03
 _PLACE_ERROR: Final = 0.03
-_LAUNCH_PLACE_ERROR: Final = 0.01
-_LAUNCH_SPEED_ERROR: Final = 0.006
+_LAUNCH_ERRORS: Final = (0.005, 0.003)
+_RELAUNCH_ERRORS: Final = (0.015, 0.012)
 _BEFORE: Final = 0.15
 _CONTACT: Final = 1.1
 _ASTRAY: Final = 0.4
@@ -50,7 +51,7 @@ _CLAMP: Final = 1.0
 _CLAMPED: Final = 0.6
 _LONGEST: Final = 1.2
 _FADED: Final = 3.0
-_CLEAR: Final = 0.35
+_CLEAR: Final = 0.22
 _POLICIES: Final = 8
 
 
@@ -83,16 +84,15 @@ class Controller:
         self.hammer = hammer
         self.driver = driver
         self.limits = Limits() if limits is None else limits
+        self.leads = LEADS
         self.single = nominal(hammer)
         self.front: float = hammer.front
         self.stroke: float = hammer.front - hammer.origin
-        self.lead = LEAD
         forces = force_map(hammer, driver, self.single, threads=threads)
         self.start: Launch = launch(hammer, driver, self.single, forces, threads=threads)
-        self.landing: Landing = landing(hammer, driver, self.single, forces, threads=threads)
-        self.table: SwingTable = swing_table(
-            hammer, driver, self.single, forces, self.start.width, threads=threads
-        )
+        self.fronts = fronts(hammer, driver, self.single, forces, self.start, threads=threads)
+        self.table = self.fronts.table
+        self.landing = self.fronts.landing
         self._policies: dict[float, Policy] = {}
         self._threads = threads
 
@@ -111,7 +111,7 @@ class Controller:
         if period not in self._policies:
             if len(self._policies) >= _POLICIES:
                 self._policies.clear()
-            self._policies[period] = Policy(self.table, period, self.limits, self.landing)
+            self._policies[period] = Policy(self.fronts, period, self.limits)
         return self._policies[period]
 
     def samples(self, sensor: PositionSensor) -> int:
@@ -207,8 +207,10 @@ class Controller:
         if loop.launched:
             start = self.start
             slope = np.array([start.place_slope, start.speed_slope, 1.0])
-            errors = np.array([_LAUNCH_PLACE_ERROR * self.stroke, _LAUNCH_SPEED_ERROR, 0.0])
-            # What a launch differs by is what the scale of the currents makes of it, and little else.
+            # A launch from rest differs by what the scale of the currents makes of it; after a landing
+            # something is left of the motion before.
+            place, speed = _LAUNCH_ERRORS if len(loop.pulses) == 1 else _RELAUNCH_ERRORS
+            errors = np.array([place * self.stroke, speed, 0.0])
             return np.outer(slope, slope) * loop.learned.scale_error**2 + np.diag(errors**2)
         return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
@@ -223,13 +225,17 @@ class Controller:
         )
         rests = wait >= self.landing.settled + self.start.flight
         after = np.array([self._before_rest(loop, dot + 1) for loop, dot in now])
-        way, cost, choice = policy.best(kind, late, speed, np.where(rests, policy.period, wait), after)
+        front = np.array([loop.learned.front for loop, _dot in now])
+        front_error = np.array([loop.learned.front_error for loop, _dot in now])
+        way, cost, choice = policy.best(
+            kind, late, speed, np.where(rests, policy.period, wait), after, front, front_error
+        )
         table = self.table
-        release = choice.at(table.release, way)
-        following = choice.at(table.next_touch, way)
-        following_speed = choice.at(table.next_speed, way)
-        leaves = choice.at(table.leaves, way)
-        landed = self._landings(kind, speed)
+        release = choice.at("release", way)
+        following = choice.at("next_touch", way)
+        following_speed = choice.at("next_speed", way)
+        leaves = choice.at("leaves", way)
+        landed = self._landings(kind, speed, front)
         for k, (loop, dot) in enumerate(now):
             pulse = loop.pulses[-1]
             if loop.kind != FREE:
@@ -273,15 +279,20 @@ class Controller:
                 end = max(end, min(later, brake + width + _LONGEST * single))
             pulse.switch(loop.touch + end, 0.0)
 
-    def _landings(self, kind: Any, speed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _landings(
+        self, kind: Any, speed: FloatArray, front: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return release, begin and width of the brake pulse for some touches."""
         below, share = between(self.table, kind, speed)
-        rows = self.landing
+        nearer, farther = between_fronts(front)
         found = []
-        for values in (rows.release, rows.brake, rows.width):
-            low, high = values[below], values[below + 1]
-            low, high = np.where(np.isnan(low), high, low), np.where(np.isnan(high), low, high)
-            found.append((1.0 - share) * low + share * high)
+        for name in ("release", "brake", "width"):
+            tables = np.array([getattr(one, name) for one in self.fronts.landings])
+            rows = [
+                _known(tables[number, below], tables[number, below + 1], share)
+                for number in (nearer, nearer + 1)
+            ]
+            found.append(_known(rows[0], rows[1], farther))
         return found[0], found[1], found[2]
 
     def _before_rest(self, loop: Loop, dot: int) -> int:
@@ -289,6 +300,12 @@ class Controller:
         enough = self.landing.settled + self.start.flight
         rests = np.flatnonzero(np.diff(loop.due[dot:]) >= enough)
         return int(rests[0]) if rests.size else max(len(loop.due) - dot - 1, 0)
+
+
+def _known(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
+    """Interpolate; where one is not known, take the other."""
+    low, high = np.where(np.isnan(low), high, low), np.where(np.isnan(high), low, high)
+    return (1.0 - share) * low + share * high
 
 
 def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:

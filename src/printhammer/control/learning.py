@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
-FRONT_ERROR: Final = 0.07
+FRONT_ERROR: Final = 0.04
 """Standard deviation of the front before the first contact, in parts of the way from backstop to pack."""
 
 SCALE_ERROR: Final = 0.03
@@ -38,7 +38,7 @@ SCALE_ERROR: Final = 0.03
 
 _FRONT_DRIFT: Final = 0.002
 _SCALE_DRIFT: Final = 0.002
-_FARTHEST: Final = 4.0
+_FARTHEST: Final = 5.0
 _MODEL_ERROR: Final = 0.003
 _GRID: Final = 1.0 / 128.0
 _FRONT_STEP: Final = 0.03

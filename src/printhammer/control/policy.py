@@ -10,12 +10,15 @@ last dot before a rest, then of the one before, and so on.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+import itertools
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.control.fronts import MIDDLE, OFFSETS, between_fronts
+
 if TYPE_CHECKING:
-    from printhammer.control.landing import Landing
+    from printhammer.control.fronts import Fronts
     from printhammer.control.swing_table import IntArray, SwingTable
     from printhammer.printing.limits import Limits
     from printhammer.segments import FloatArray
@@ -31,6 +34,7 @@ _STEEPEST: Final = 2e-3
 _FAST: Final = 0.3
 _STEEP: Final = 8.0
 _EFFORT: Final = 0.1
+_KNOWN: Final = 0.01
 
 
 class Policy:
@@ -38,19 +42,18 @@ class Policy:
 
     Parameters
     ----------
-    table : SwingTable
-        Where they lead.
+    fronts : Fronts
+        Where they lead, and how well the armature comes to rest.
     period : float
         Time from slot to slot, s.
     limits : Limits
         How far dots may be off.
-    landing : Landing
-        How well the armature comes to rest.
     """
 
-    def __init__(self, table: SwingTable, period: float, limits: Limits, landing: Landing) -> None:
-        self.table = table
-        self.landing = landing
+    def __init__(self, fronts: Fronts, period: float, limits: Limits) -> None:
+        self.fronts = fronts
+        self.table = table = fronts.table
+        self.landing = fronts.landing
         self.period = period
         self.limits = limits
         self._late = _LATENESS * limits.arrival
@@ -95,7 +98,14 @@ class Policy:
         return found
 
     def best(
-        self, kind: IntArray, late: FloatArray, speed: FloatArray, wait: FloatArray, after: IntArray
+        self,
+        kind: IntArray,
+        late: FloatArray,
+        speed: FloatArray,
+        wait: FloatArray,
+        after: IntArray,
+        front: FloatArray,
+        front_error: FloatArray,
     ) -> tuple[IntArray, FloatArray, Choice]:
         """Return number and cost of the best way for some touches (M,), and where each leads.
 
@@ -107,11 +117,17 @@ class Policy:
             Time from this dot to the next one, s.
         after : int array, shape (M,)
             Number of dots between the next one and a rest.
+        front, front_error : array, shape (M,)
+            By how much the front of the pack lies farther away, and how well this is known, in parts of the
+            way from backstop to pack.
         """
-        choice = Choice(self.table, kind, speed)
+        choice = Choice(self.fronts, kind, speed, front)
         later = late[:, np.newaxis] + choice.next_touch - wait[:, np.newaxis]
-        cost = self.dot_cost(choice.force, late[:, np.newaxis]) + self.effort(choice.of(self.table.release))
-        cost = cost + choice.of(self._doubt)
+        cost = self.dot_cost(choice.force, late[:, np.newaxis]) + self.effort(choice.of("release"))
+        cost = cost + choice.by_speed(self._doubt)
+        unsure = np.flatnonzero(front_error > _KNOWN)
+        if unsure.size:
+            cost[unsure] += self._front_doubt(choice, unsure, front_error[unsure])
         for number in np.unique(after).tolist():
             own = after == number
             cost[own] += _DISCOUNT * self.ahead(
@@ -133,6 +149,24 @@ class Policy:
             # At the end of what is possible there is no slope to either side.
             found[rows] = np.square(np.nan_to_num(slope, nan=_STEEPEST) * _SPEED_DOUBT / self.limits.arrival)
         return found
+
+    def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
+        """Return what it costs some touches that the front of the pack is known only so well, (M, A)."""
+        fronts = self.fronts
+        below, share = choice.below[rows], choice.share[rows, np.newaxis]
+
+        def of(values: FloatArray) -> FloatArray:
+            found: FloatArray = (1.0 - share) * values[below] + share * values[below + 1]
+            return found
+
+        weaker = error[:, np.newaxis] * of(fronts.front_force)
+        force = choice.force[rows]
+        zero = np.zeros(1)
+        both = 0.5 * (self.dot_cost(force + weaker, zero) + self.dot_cost(force - weaker, zero))
+        ends = fronts.tables[0].next_touch, fronts.tables[-1].next_touch
+        slope = np.nan_to_num((ends[1] - ends[0]) / (OFFSETS[-1] - OFFSETS[0]))
+        late = error[:, np.newaxis] * of(slope) / self.limits.arrival
+        return both - self.dot_cost(force, zero) + np.square(late)
 
     def costs(self, number: int) -> FloatArray:
         """Return the cost of a touch and all that follows, (T, lateness), some dots before a rest."""
@@ -163,25 +197,49 @@ class Policy:
 
 
 class Choice:
-    """Where all ways lead from touches (M,) whose speed lies between those of the table: arrays (M, A)."""
+    """Where all ways lead from touches (M,) whose speed and front lie between those of the tables."""
 
-    def __init__(self, table: SwingTable, kind: IntArray, speed: FloatArray) -> None:
-        self.below, self.share = between(table, kind, speed)
-        self.force = self.of(table.force)
-        self.next_touch = self.of(table.next_touch)
-        self.next_speed = self.of(table.next_speed)
+    def __init__(self, fronts: Fronts, kind: IntArray, speed: FloatArray, front: FloatArray) -> None:
+        self._fronts = fronts
+        self.below, self.share = between(fronts.table, kind, speed)
+        self.nearer, self.farther = between_fronts(front)
+        self.force = self.of("force")
+        self.next_touch = self.of("next_touch")
+        self.next_speed = self.of("next_speed")
 
-    def of(self, values: FloatArray) -> FloatArray:
-        """Interpolate an array (T, A) to (M, A)."""
+    def by_speed(self, values: FloatArray) -> FloatArray:
+        """Interpolate an array (T, A) of the nominal hammer to (M, A)."""
         share = self.share[:, np.newaxis]
         found: FloatArray = (1.0 - share) * values[self.below] + share * values[self.below + 1]
         return found
 
-    def at(self, values: FloatArray, way: IntArray) -> FloatArray:
-        """Interpolate an array (T, A) for one way each, to (M,)."""
-        found: FloatArray = (1.0 - self.share) * values[self.below, way] + self.share * values[
-            self.below + 1, way
-        ]
+    def of(self, name: str) -> FloatArray:
+        """Interpolate arrays (T, A) of all tables to (M, A)."""
+        tables = [getattr(table, name) for table in self._fronts.tables]
+        found = np.empty((len(self.below), tables[MIDDLE].shape[1]))
+        for number, (near, far) in enumerate(itertools.pairwise(tables)):
+            rows = np.flatnonzero(self.nearer == number)
+            if rows.size:
+                found[rows] = self._blend(near, far, rows, slice(None))
+        return found
+
+    def at(self, name: str, way: IntArray) -> FloatArray:
+        """Interpolate arrays (T, A) of all tables for one way each, to (M,)."""
+        tables = [getattr(table, name) for table in self._fronts.tables]
+        found = np.empty(len(self.below))
+        for number, (near, far) in enumerate(itertools.pairwise(tables)):
+            rows = np.flatnonzero(self.nearer == number)
+            if rows.size:
+                found[rows] = self._blend(near, far, rows, way[rows])
+        return found
+
+    def _blend(self, near: FloatArray, far: FloatArray, rows: IntArray, way: Any) -> FloatArray:
+        below, share, farther = self.below[rows], self.share[rows], self.farther[rows]
+        if isinstance(way, slice):
+            share, farther = share[:, np.newaxis], farther[:, np.newaxis]
+        low = (1.0 - share) * near[below, way] + share * near[below + 1, way]
+        high = (1.0 - share) * far[below, way] + share * far[below + 1, way]
+        found: FloatArray = (1.0 - farther) * low + farther * high
         return found
 
 

@@ -85,6 +85,8 @@ class SwingTable:
         Peak force by release.
     driver : Driver
         Of the coil.
+    stroke : float
+        Way from backstop to pack, m.
     """
 
     kind: IntArray
@@ -100,6 +102,7 @@ class SwingTable:
     leaves: FloatArray
     force_map: ForceMap
     driver: Driver
+    stroke: float
 
 
 @dataclass(frozen=True)
@@ -141,6 +144,11 @@ class ForceMap:
                 found[place] = np.interp(force, row, self.release) if row[0] < force else 0.0
         return found
 
+    def force_at(self, row: int, release: float, back: float) -> float:
+        """Return the force of a touch, in parts of the single-pulse force."""
+        number = int(np.argmin(np.abs(self.back - back)))
+        return float(np.interp(release, self.release, self.force[row, number]))
+
 
 def touches(single: Nominal) -> tuple[IntArray, FloatArray]:
     """Return kinds and speeds, m/s, of the touches from which tables begin."""
@@ -172,7 +180,7 @@ def force_map(hammer: Hammer, driver: Driver, single: Nominal, *, threads: int |
     for kind, speed in zip(kinds.tolist(), speeds.tolist(), strict=True):
         for level in back.tolist():
             for release in releases.tolist():
-                drives.append(PulseSequence([_first(kind, release, level, long, driver)], at=[0.0]))
+                drives.append(PulseSequence([first_pulse(kind, release, level, long, driver)], at=[0.0]))
                 states.append((front - AHEAD * speed, speed))
     result = Ensemble(hammer, drives, long, states=np.array(states), tolerance=DISPLAY_TOLERANCE).run(
         dots=True, threads=threads
@@ -229,7 +237,7 @@ def swing_table(
     for row, way in zip(rows.tolist(), ways.tolist(), strict=True):
         key = row, float(every[row, way]), float(back[way]), float(fire[way])
         if key not in firsts:
-            firsts[key] = _first(int(forces.kind[row]), *key[1:], driver)
+            firsts[key] = first_pulse(int(forces.kind[row]), *key[1:], driver)
         drives.append(PulseSequence([firsts[key], pushes[float(width[way])]], at=[0.0, key[3] + AHEAD]))
     speed = forces.speed[rows]
     states = np.stack([forces.front - AHEAD * speed, speed], axis=1)
@@ -266,10 +274,11 @@ def swing_table(
         leaves=spread(dots.contact_time[:, 0]),
         force_map=forces,
         driver=driver,
+        stroke=forces.front - hammer.origin,
     )
 
 
-def _first(kind: int, release: float, back: float, fire: float, driver: Driver) -> Switched:
+def first_pulse(kind: int, release: float, back: float, fire: float, driver: Driver) -> Switched:
     """Return what the coil does from just before the touch up to the next push."""
     at, levels = [0.0], [driver.current if kind == PUSHED else 0.0]
     if release > 0.0:
