@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.control.controller import Controller
+    from printhammer.control.controller import Controller, Printed
     from printhammer.control.sensor import PositionSensor
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 REMEMBERED: Final = 4
 """Number of the latest pulses of which anything can be left."""
 
-_APART: Final = 1e-9
+APART: Final = 1e-9
+"""Least time between two switchings, s."""
+
 _SOON: Final = 1e-6
 _BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
 
@@ -59,7 +61,7 @@ class Pulse:
 
     def switch(self, time: float, level: float) -> None:
         """Add a switching, after those before."""
-        self.at.append(max(time, self.at[-1] + _APART) if self.at else time)
+        self.at.append(max(time, self.at[-1] + APART) if self.at else time)
         self.levels.append(level)
 
     def waveform(self, edge: float) -> Switched:
@@ -99,6 +101,8 @@ class Loop:
         What the controller knows of the hammer by now.
     touched : Touched or None
         The latest touch, from which it learns.
+    printed : Printed or None
+        Likewise, where the throw after it is decided once more when the contact is over.
     seen : list
         What the sensor showed at each decision: times, s, and displacements, m.
     touches : list of tuple
@@ -120,6 +124,7 @@ class Loop:
     rests: bool = False
     learned: Learned = field(default_factory=Learned)
     touched: Touched | None = None
+    printed: Printed | None = None
     seen: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
     touches: list[tuple[float, float]] = field(default_factory=list)
 
@@ -175,10 +180,13 @@ def closed_loops(
         if moving:
             run = _Run(hammer, controller, sensor, tolerance, threads)
             rested = [(loop, dot) for loop, dot in now if loop.alive and loop.rests]
-            if rested:
-                run.see_contacts([loop for loop, _dot in rested])
-                for loop, dot in rested:
-                    controller.launch(loop, dot)
+            thrown = [(loop, dot) for loop, dot in now if loop.alive and loop.printed is not None]
+            if rested or thrown:
+                run.see_contacts([loop for loop, _dot in (*rested, *thrown)])
+            for loop, dot in rested:
+                controller.launch(loop, dot)
+            if thrown:
+                controller.decide_again(thrown, policy)
             run.see_flights(moving)
         controller.decide(now, policy)
     return loops

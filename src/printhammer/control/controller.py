@@ -7,17 +7,18 @@ soon, and brakes it before the backstop where there is time to come to rest.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from printhammer.control.closed_loop import REMEMBERED, Pulse
+from printhammer.control.closed_loop import APART, REMEMBERED, Pulse
 from printhammer.control.flight import Expected, FreeForce, flight_from_samples
 from printhammer.control.fronts import between_fronts, fronts
 from printhammer.control.launch import Launch, launch
 from printhammer.control.learning import Contacts, Touched
-from printhammer.control.policy import Policy, between
+from printhammer.control.policy import KNOWN, Done, Policy, between
 from printhammer.control.swing_table import ALWAYS, FREE, PUSHED, force_map
 from printhammer.errors import InputError
 from printhammer.printing.limits import Limits
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
 
     from printhammer.control.closed_loop import Loop
     from printhammer.control.driver import Driver
+    from printhammer.control.policy import Choice
     from printhammer.control.sensor import PositionSensor
+    from printhammer.control.swing_table import IntArray
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
@@ -52,7 +55,48 @@ _CLAMPED: Final = 0.6
 _LONGEST: Final = 1.2
 _FADED: Final = 3.0
 _CLEAR: Final = 0.22
+_PATIENCE: Final = 40e-6
 _POLICIES: Final = 8
+
+
+class Ahead(NamedTuple):
+    """Where a way leads.
+
+    Times after a touch, s, of the throw, of leaving the pack and of the next touch; width of the push, s; kind
+    and speed, m/s, of that touch.
+    """
+
+    fire: float
+    width: float
+    leaves: float
+    kind: int
+    touch: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A touch as it was when its push was decided, before the contact told where the front is.
+
+    Attributes
+    ----------
+    touch, speed, kind
+        Time, s, speed, m/s, and kind of the touch.
+    front : float
+        By how much the front was thought to be farther away, in parts of the way to the pack.
+    force, slope : float
+        Force in parts of the single-pulse force, and by how much it grows with the distance of the front.
+    back : float
+        Return current, A.
+    """
+
+    touch: float
+    speed: float
+    kind: int
+    front: float
+    force: float
+    slope: float
+    back: float
 
 
 class Controller:
@@ -232,9 +276,9 @@ class Controller:
         )
         table = self.table
         release = choice.at("release", way)
-        following = choice.at("next_touch", way)
-        following_speed = choice.at("next_speed", way)
-        leaves = choice.at("leaves", way)
+        ahead = self._ahead(choice, way)
+        force = choice.at("force", way)
+        slope = choice.of_way(self.fronts.front_force, way)
         landed = self._landings(kind, speed, front)
         for k, (loop, dot) in enumerate(now):
             pulse = loop.pulses[-1]
@@ -245,18 +289,73 @@ class Controller:
                 self._land(loop, dot, *(float(values[k]) for values in landed))
                 loop.rests = dot + 1 < len(loop.due)
                 continue
-            self._push(loop, pulse, float(release[k]), float(table.back[way[k]]))
-            fired = loop.touch + float(table.fire[way[k]])
-            pulse.switch(fired, 0.0)
-            width = float(table.width[way[k]])
-            throw = Pulse(pulse.at[-1], [], [])
-            throw.switch(throw.fired, self.driver.current)
-            throw.switch(throw.fired + width, 0.0)
-            loop.pulses.append(throw)
-            clear = max(float(leaves[k]), float(table.fire[way[k]])) if width != ALWAYS else float(leaves[k])
-            loop.since = loop.touch + clear
-            loop.kind, loop.launched = int(table.next_kind[way[k]]), False
-            loop.touch, loop.speed = loop.touch + float(following[k]), float(following_speed[k])
+            back = float(table.back[way[k]])
+            known = loop.learned
+            printed = Printed(
+                loop.touch, loop.speed, loop.kind, known.front, float(force[k]), float(slope[k]), back
+            )
+            self._push(loop, pulse, float(release[k]), back)
+            pulse.switch(loop.touch + ahead[k].fire, 0.0)
+            self._throw(loop, loop.touch, ahead[k])
+            # What the contact tells of the front comes in time for a throw that is late.
+            told = printed.touch + _CONTACT * self.single.flight_time + _PATIENCE
+            unsure = known.front_error > KNOWN and loop.pulses[-1].fired > told
+            loop.printed = printed if unsure else None
+
+    def decide_again(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
+        """Decide anew how some runs are thrown, each with the number of the dot that is coming."""
+        before = [loop.printed for loop, _dot in now if loop.printed is not None]
+        front = np.array([loop.learned.front for loop, _dot in now])
+        farther = front - np.array([one.front for one in before])
+        speed = np.array([one.speed for one in before])
+        touch = np.array([one.touch for one in before]) + farther * self.stroke / speed
+        due = np.array([loop.due[dot - 1] for loop, dot in now])
+        way, cost, choice = policy.best(
+            np.array([one.kind for one in before]),
+            touch - due,
+            speed,
+            np.array([loop.due[dot] for loop, dot in now]) - due,
+            np.array([self._before_rest(loop, dot) for loop, dot in now]),
+            front,
+            np.array([loop.learned.front_error for loop, _dot in now]),
+            Done(
+                np.array([one.back for one in before]),
+                np.array([one.force + more * one.slope for one, more in zip(before, farther, strict=True)]),
+                np.array([loop.time for loop, _dot in now]) - touch,
+            ),
+        )
+        ahead = self._ahead(choice, way)
+        for k, (loop, _dot) in enumerate(now):
+            loop.printed = None
+            if not np.isfinite(cost[k]):
+                continue
+            loop.pulses.pop()
+            loop.pulses[-1].at[-1] = max(float(touch[k]) + ahead[k].fire, loop.pulses[-1].at[-2] + APART)
+            self._throw(loop, float(touch[k]), ahead[k])
+
+    def _ahead(self, choice: Choice, way: IntArray) -> list[Ahead]:
+        """Return what some ways lead to."""
+        table = self.table
+        columns = (
+            table.fire[way],
+            table.width[way],
+            choice.at("leaves", way),
+            table.next_kind[way],
+            choice.at("next_touch", way),
+            choice.at("next_speed", way),
+        )
+        return [Ahead(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+
+    def _throw(self, loop: Loop, touch: float, ahead: Ahead) -> None:
+        """Throw the armature where the last pulse ends."""
+        throw = Pulse(loop.pulses[-1].at[-1], [], [])
+        throw.switch(throw.fired, self.driver.current)
+        throw.switch(throw.fired + ahead.width, 0.0)
+        loop.pulses.append(throw)
+        clear = max(ahead.leaves, ahead.fire) if ahead.width != ALWAYS else ahead.leaves
+        loop.since = touch + clear
+        loop.kind, loop.launched = int(ahead.kind), False
+        loop.touch, loop.speed = touch + ahead.touch, ahead.speed
 
     def _push(self, loop: Loop, pulse: Pulse, release: float, back: float) -> None:
         """Push into the pack from the touch to the release, if at all, then pull back."""

@@ -11,7 +11,7 @@ last dot before a rest, then of the one before, and so on.
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 NEVER: Final = 50.0
 """Cost of what leads nowhere."""
 
+KNOWN: Final = 0.01
+"""Standard deviation of the front, in parts of the way to the pack, above which it counts as not known."""
+
 _DISCOUNT: Final = 0.9
 _ROUNDS: Final = 8
 _LATENESS: Final = np.linspace(-0.9, 0.9, 13)
@@ -34,7 +37,18 @@ _STEEPEST: Final = 2e-3
 _FAST: Final = 0.3
 _STEEP: Final = 8.0
 _EFFORT: Final = 0.1
-_KNOWN: Final = 0.01
+_ALIKE: Final = 0.005
+
+
+class Done(NamedTuple):
+    """What has been done after some touches (M,).
+
+    Return current, A; force that was printed, in parts of the single-pulse force; time after the touch, s.
+    """
+
+    back: FloatArray
+    force: FloatArray
+    time: FloatArray
 
 
 class Policy:
@@ -106,6 +120,7 @@ class Policy:
         after: IntArray,
         front: FloatArray,
         front_error: FloatArray,
+        done: Done | None = None,
     ) -> tuple[IntArray, FloatArray, Choice]:
         """Return number and cost of the best way for some touches (M,), and where each leads.
 
@@ -120,12 +135,14 @@ class Policy:
         front, front_error : array, shape (M,)
             By how much the front of the pack lies farther away, and how well this is known, in parts of the
             way from backstop to pack.
+        done : Done, optional
+            What has been done by then, where the throw alone is to be decided.
         """
         choice = Choice(self.fronts, kind, speed, front)
         later = late[:, np.newaxis] + choice.next_touch - wait[:, np.newaxis]
         cost = self.dot_cost(choice.force, late[:, np.newaxis]) + self.effort(choice.of("release"))
         cost = cost + choice.by_speed(self._doubt)
-        unsure = np.flatnonzero(front_error > _KNOWN)
+        unsure = np.flatnonzero(front_error > KNOWN)
         if unsure.size:
             cost[unsure] += self._front_doubt(choice, unsure, front_error[unsure])
         for number in np.unique(after).tolist():
@@ -136,6 +153,13 @@ class Policy:
                 choice.next_speed[own],
                 self.costs(number),
             )
+        if done is not None:
+            off = np.abs(choice.force - done.force[:, np.newaxis])
+            open_ways = (self.table.back == done.back[:, np.newaxis]) & (
+                self.table.fire > done.time[:, np.newaxis]
+            )
+            off = np.where(open_ways & np.isfinite(cost), off, np.inf)
+            cost = np.where(off <= off.min(axis=1, keepdims=True) + _ALIKE, cost, np.nan)
         cost = np.where(np.isnan(cost), np.inf, cost)
         way = np.argmin(cost, axis=1)
         return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice
@@ -211,6 +235,13 @@ class Choice:
         """Interpolate an array (T, A) of the nominal hammer to (M, A)."""
         share = self.share[:, np.newaxis]
         found: FloatArray = (1.0 - share) * values[self.below] + share * values[self.below + 1]
+        return found
+
+    def of_way(self, values: FloatArray, way: IntArray) -> FloatArray:
+        """Interpolate an array (T, A) of the nominal hammer for one way each, to (M,)."""
+        found: FloatArray = (1.0 - self.share) * values[self.below, way] + self.share * values[
+            self.below + 1, way
+        ]
         return found
 
     def of(self, name: str) -> FloatArray:
