@@ -140,6 +140,11 @@ def test_the_keyboard_reaches_everything(page: Page) -> None:
     settled(page, "state.rate > 1200")
     page.press("z", "KeyZ", CTRL)
     settled(page, "state.rate === 1200")
+    # A slider leaves letters and numbers to the studio.
+    page.press("p", "KeyP")
+    page.wait("window.studio.studio.ghosts.length === 1")
+    page.press("u", "KeyU")
+    page.wait("window.studio.studio.ghosts.length === 0")
     page.run("document.querySelector('.view-map canvas').focus()")
     page.press("ArrowUp")
     settled(page, "state.rate === 1207.5")
@@ -204,6 +209,8 @@ def test_presets_patterns_shapes_and_units(page: Page) -> None:
     page.run("helpers.type('#control-pattern', '1011')")
     settled(page, "state.pattern === '1011'")
     assert page.run("window.studio.studio.frames.motion.fired") == pytest.approx([0.0, 0.002, 0.003])
+    page.run("window.studio.studio.store.set({ views: ['motion', 'energy', 'map'] }); 1")
+    page.wait("window.studio.studio.frames.map?.pattern === '1011'")
     page.run("helpers.type('#control-pattern', '10x1')")
     assert state(page)["pattern"] == "1011"
     assert page.run("document.querySelector('#control-pattern').getAttribute('aria-invalid')") == "true"
@@ -247,6 +254,13 @@ def test_the_widget_is_the_same_page(opened_browser: Any) -> None:
     data, _ = motion_frame(found, serial)
     page.run(answered(data))
     page.wait("document.querySelector('.status').textContent.includes('steps')")
+    # Keys of the studio are not for the notebook around it, where some of them cut cells.
+    page.run("window.heard = 0; document.addEventListener('keydown', () => { window.heard += 1; }); 1")
+    page.run("document.querySelector('.grid').focus()")
+    page.press("p", "KeyP")
+    page.wait("document.querySelector('.status').textContent.includes('pinned')")
+    assert page.run("window.heard") == 0
+    assert page.run("document.body.dataset.lmSuppressShortcuts") == "true"
     assert page.complaints == []
 
 
@@ -263,6 +277,39 @@ def test_no_serious_finding_about_accessibility(page: Page, dark: bool) -> None:
         if finding["impact"] in ("serious", "critical")
     }
     assert serious == {}
+
+
+@pytest.mark.slow
+def test_strobe_points_arrive_with_an_exponent_and_then_the_verdict(page: Page) -> None:
+    page.run(
+        "window.told = []; document.getElementById('studio').addEventListener('painted', ({ detail }) => {"
+        " const { frames } = window.studio.studio; if (detail.kind === 'strobe') window.told.push("
+        "{ points: frames.strobe.data.x.length, exponent: !!frames.strobe.exponent,"
+        " verdict: !!frames.strobe.verdict }); }); 1"
+    )
+    page.run("window.studio.studio.store.set({ rate: 1310 }); 1")
+    page.wait("window.told.some(({ verdict }) => verdict)")
+    told = page.run("window.told")
+    counts = [each["points"] for each in told]
+    assert counts == sorted(counts)
+    assert len(set(counts)) >= 4
+    assert counts[0] < counts[-1]
+    assert any(each["exponent"] and not each["verdict"] for each in told)
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+def test_a_view_that_would_take_too_long_says_so_and_shows_nothing_old(page: Page) -> None:
+    page.run(HELPERS)
+    hammer = ph.load(CRUDE).replace("backstop.stiffness", 1e20)
+    drop(page, "stiff.toml", hammer.to_toml())
+    page.wait("window.studio.studio.frames.map.reason && window.studio.studio.frames.strobe.reason")
+    assert "steps" in page.run("window.studio.studio.frames.map.reason")
+    assert inked(page, "map") > 1
+    assert page.run("window.studio.studio.views.map.table()") is None
+    page.run("document.querySelector('.undo').click()")
+    page.wait("window.studio.studio.frames.map.detail === 'full'")
+    assert page.complaints == []
 
 
 @pytest.mark.slow

@@ -30,7 +30,13 @@ export function widened(low, high, part = 0.04) {
  */
 export function axes(pen, width, height, x, y, margin = MARGIN) {
   const c = colours();
-  const box = { x: margin.left, y: margin.top, w: width - margin.left - margin.right, h: height - margin.top - margin.bottom };
+  const h = height - margin.top - margin.bottom;
+  const rows = ticks(y.low * y.factor, y.high * y.factor, h, 30).map((tick) => [tick, digits(Number(tick.toPrecision(6)))]);
+  pen.save();
+  pen.font = FONT;
+  const left = Math.max(margin.left, ...rows.map(([, text]) => Math.ceil(pen.measureText(text).width) + 22));
+  pen.restore();
+  const box = { x: left, y: margin.top, w: width - left - margin.right, h };
   const X = (value) => box.x + ((value - x.low) / (x.high - x.low)) * box.w;
   const Y = (value) => box.y + box.h - ((value - y.low) / (y.high - y.low)) * box.h;
   pen.save();
@@ -48,10 +54,10 @@ export function axes(pen, width, height, x, y, margin = MARGIN) {
   }
   pen.textAlign = "right";
   pen.textBaseline = "middle";
-  for (const tick of ticks(y.low * y.factor, y.high * y.factor, box.h, 30)) {
+  for (const [tick, text] of rows) {
     const place = Y(tick / y.factor);
     line(pen, box.x, place, box.x + box.w, place);
-    pen.fillText(digits(Number(tick.toPrecision(6))), box.x - 5, place);
+    pen.fillText(text, box.x - 5, place);
   }
   pen.textAlign = "center";
   pen.textBaseline = "top";

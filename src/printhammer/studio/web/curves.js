@@ -1,10 +1,11 @@
 // Displacement and current, and the forces, against time: drawn by uPlot, and by a pen where they are exported.
 import uPlot from "./vendor/uPlot.js";
-import { axes, before, curve, extent, inside, key, line, widened } from "./axes.js";
+import { axes, before, curve, extent, inside, key, line, ticks, widened } from "./axes.js";
 import { colours, FONT } from "./theme.js";
 import { timeUnit, unitOf } from "./units.js";
 
 const FORCES = ["total", "magnet", "spring", "damping", "backstop", "pack"];
+const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
 const DASHES = { damping: [2, 2] };
 
 /** Displacement against time, with backstop, pack and platen, firings, and the drive on the right axis. */
@@ -121,10 +122,10 @@ function curveView(body, studio, kind) {
     const right = series.find((entry) => entry.scale === "drive");
     const axis = (scale, si, label, side) => ({
       scale, side, font: FONT, labelFont: FONT, stroke: right && side !== 2 ? (side === 3 ? c.x : c.drive) : c.muted, labelSize: 16, labelGap: 0, gap: 3,
-      size: side === 2 ? 18 : 36, label, space: { 1: 14, 2: 60, 3: 30 }[side],
+      size: side === 2 ? 18 : 36, label, space: SPACE[side],
       grid: { stroke: c.faint, width: 1, show: side !== 1 }, ticks: { show: false },
       values: (u, ticks) => ticks.map((tick) => (tick === null ? "" : Number((tick * shownIn(u, si).factor).toPrecision(6)))),
-      splits: (u, _axis, low, high, step) => roundSplits(low, high, step, shownIn(u, si).factor),
+      splits: (u, _axis, low, high) => splitsOf(low, high, (side === 2 ? u.bbox.width : u.bbox.height) / uPlot.pxRatio, SPACE[side], shownIn(u, si).factor),
       ...(side === 1 ? { filter: (u, splits) => splits.map((value) => (value <= 1.01 * (studio.frames.motion?.peak ?? 0) ? value : null)) } : {}),
     });
     const main = series[0];
@@ -205,15 +206,10 @@ function curveView(body, studio, kind) {
   return { update: (what) => what === "motion" && draw(), draw, cursor, paint, table };
 }
 
-function shownIn(u, si) { return si === "s" ? timeUnit(u.scales.t.max - u.scales.t.min) : unitOf(si); }
+/** Return round numbers of the unit that is shown, in SI. */
+function splitsOf(low, high, length, space, factor) { return ticks(low * factor, high * factor, length, space).map((tick) => tick / factor); }
 
-function roundSplits(low, high, step, factor) {
-  const power = 10 ** Math.floor(Math.log10(step * factor));
-  const round = [1, 2, 5, 10].find((part) => part * power >= step * factor * 0.999) * power;
-  const list = [];
-  for (let k = Math.ceil((low * factor) / round - 1e-9); k * round <= high * factor * (1 + 1e-9); k += 1) list.push((k * round) / factor);
-  return list;
-}
+function shownIn(u, si) { return si === "s" ? timeUnit(u.scales.t.max - u.scales.t.min) : unitOf(si); }
 
 /** Return the displacement of a motion at a time, between the points next to it. */
 export function displacementAt(frame, time) {

@@ -8,7 +8,8 @@ export const HELP = [
 
 export function bindKeys(studio) {
   studio.parts.page.addEventListener("keydown", (event) => {
-    const typing = event.target.matches("input, select, textarea");
+    // A slider has no use for letters and numbers.
+    const typing = event.target.matches('input:not([type="range"]), select, textarea');
     if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z") {
       event.preventDefault();
       if (event.shiftKey) studio.store.redo();

@@ -61,7 +61,7 @@ export function mapView(body, studio) {
     plane = null;
     if (frame.reason) { refusal(pen, width, height, frame.reason); return; }
     const time = timeUnit(frame.end);
-    const x = { low: 0, high: frame.end, label: `time, ${time.name}`, factor: time.factor };
+    const x = { low: 0, high: frame.end, label: `time, ${time.name}${frame.pattern ? `, pattern ${frame.pattern.length > 16 ? `${frame.pattern.slice(0, 15)}…` : frame.pattern}` : ""}`, factor: time.factor };
     const y = { low: frame.rates[0], high: frame.rates[1], label: "firing rate, Hz", factor: 1 };
     plane = axes(pen, width, height, x, y, MARGIN);
     const { box } = plane;

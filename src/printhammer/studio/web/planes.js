@@ -4,6 +4,8 @@ import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { digits, unitOf } from "./units.js";
 
+const SETTLING = 100; // firings in which a train settles, drawn apart
+
 function planeView(body, studio, label, kinds, paint, table) {
   const area = surface(body, paint, label);
   return {
@@ -112,8 +114,12 @@ export function strobeView(body, studio) {
     const margin = { left: 46, right: 10, top: 22, bottom: 32 };
     const plane = axes(pen, width, height, displacementAxis(...widened(...xe)), velocityAxis(...widened(...ve)), margin);
     inside(pen, plane);
+    const settled = Math.min(SETTLING, xs.length);
+    pen.fillStyle = c.ghost;
+    dots(pen, plane, xs.slice(0, settled), vs.slice(0, settled), 2);
     pen.fillStyle = c.x;
-    dots(pen, plane, xs, vs, 2);
+    dots(pen, plane, xs.slice(settled), vs.slice(settled), 2);
+    if (x.length > SETTLING) key(pen, plane.box, [{ name: `firings 1 to ${SETTLING}`, colour: c.ghost }, { name: `to ${x.length}`, colour: c.x }]);
     pen.restore();
     pen.save();
     pen.font = FONT;
@@ -143,7 +149,7 @@ export function strobeText(frame) {
 /** Tell an exponent with as many digits as its standard error leaves it. */
 function exponentText(value, error) {
   const sign = value > 0 ? "+" : "";
-  if (error === null || !(error > 0)) return `${sign}${digits(value, 3)}`;
+  if (error === null || !(error >= 5e-4)) return `${sign}${digits(value, 3)}`;
   const places = Math.min(Math.max(1 - Math.floor(Math.log10(error)), 0), 3);
   return `${sign}${value.toFixed(places)} ± ${error.toFixed(places)}`;
 }

@@ -58,9 +58,11 @@ export function sketchView(body, studio) {
     const way = high - low || 1e-4;
     const [left, right] = [0.34 * width, 0.9 * width];
     const X = (x) => left + ((x - low) / way) * (right - left);
-    const [middle, tall] = [0.5 * height, Math.min(0.24 * height, 70)];
+    const [middle, tall] = [0.5 * height, Math.min(0.22 * height, 70)];
     const x = displacementAt(frame, studio.cursor);
-    const current = frame.data.drive[Math.min(Math.round((studio.cursor / (frame.data.t.at(-1) || 1)) * frame.data.t.length), frame.data.t.length - 1)];
+    const driven = frame.data.drive[Math.min(Math.round((studio.cursor / (frame.data.t.at(-1) || 1)) * frame.data.t.length), frame.data.t.length - 1)];
+    // What is left of an exponential decay is told as nothing.
+    const current = Math.abs(driven) < 1e-4 * (frame.peak || 1) ? 0 : driven;
     pen.save();
     pen.font = FONT;
     pen.textAlign = "center";
