@@ -31,9 +31,6 @@ LARGEST_CURRENT: Final = 2.0
 MARGIN: Final = 1e-3
 """Part of the largest current that a single pulse stays below it, for what is left of a brake pulse."""
 
-FADED: Final = 0.02
-"""What is left of a brake pulse when the next dot is fired, in parts of its peak."""
-
 _ROUNDING: Final = 1e-9
 _HALVINGS: Final = 50
 _SAMPLES: Final = 4001
@@ -73,7 +70,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
     return pulse, low
 
 
-def fading(pulse: Waveform, share: float = FADED) -> float:
+def fading(pulse: Waveform, share: float) -> float:
     """Return the time, s, after its width in which a pulse has faded to a share of its peak for good."""
     own: Any = pulse
     times = np.linspace(own.width, max(pulse.support, own.width), _SAMPLES)
@@ -84,11 +81,11 @@ def fading(pulse: Waveform, share: float = FADED) -> float:
 def clearance(pulse: Waveform, widest: float, largest: float) -> float:
     """Return how long after the width of a brake pulse the next pulse may begin, s.
 
-    By then it has faded, and so far that the widest pulses one after another keep to the bound on the
+    By then so much of it has decayed that the widest pulses one after another keep to the bound on the
     current, A.
     """
     wide = of_width(pulse, widest)
-    wait, times = fading(pulse), np.linspace(0.0, wide.support, _SAMPLES)
+    wait, times = 0.0, np.linspace(0.0, wide.support, _SAMPLES)
     rising = np.abs(wide.value(times))
     while wait < wide.support - widest:
         left = np.abs(wide.value(widest + wait + times))

@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.control.histories import REST, number_of, shared_numbers
 from printhammer.control.table import COLUMNS, CompensationTable
 from printhammer.control.table_polish import VALUES, Work, level_of, look_at, polish
-from printhammer.control.table_search import costs, solved, ways_of
+from printhammer.control.table_search import BAD, costs, searched, solved, ways_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,11 +45,11 @@ def table_of(work: Work, largest: float) -> CompensationTable:
     )
 
 
-def refined(work: Work, largest: float, told: Callable[[], None]) -> Work:
+def refined(work: Work, largest: float, told: Callable[[], None], *, brake: bool) -> Work:
     """Put rates between those of a table where it is not good enough halfway between two of them.
 
     Such places are where the way to fire a dot changes. The new entries follow that of the rate below or that
-    of the rate above, whichever is the better one.
+    of the rate above, whichever is the better one; where neither is good, another one is looked for.
 
     Parameters
     ----------
@@ -59,6 +59,8 @@ def refined(work: Work, largest: float, told: Callable[[], None]) -> Work:
         Bound on the current, A.
     told : callable
         Called after each step of the work.
+    brake : bool
+        Whether brake pulses may be used.
 
     Returns
     -------
@@ -80,7 +82,7 @@ def refined(work: Work, largest: float, told: Callable[[], None]) -> Work:
         lower = lower[bad]
         if not lower.size:
             break
-        more = _tuned(work, lower, told)
+        more = _tuned(work, lower, told, brake=brake)
         wanted = {*work.rates[lower].tolist(), *more.rates.tolist()}
         work = _joined(work, more)
     return work
@@ -98,7 +100,7 @@ def _halfway(work: Work, lower: npt.NDArray[np.int64], largest: float) -> Work:
     return found
 
 
-def _tuned(work: Work, lower: npt.NDArray[np.int64], told: Callable[[], None]) -> Work:
+def _tuned(work: Work, lower: npt.NDArray[np.int64], told: Callable[[], None], *, brake: bool) -> Work:
     """Return tuned rows halfway between some rates and those above them."""
     rates = 0.5 * (work.rates[lower] + work.rates[lower + 1])
     values: dict[str, Any] = {name: getattr(work, name)[lower] for name in VALUES}
@@ -120,15 +122,19 @@ def _tuned(work: Work, lower: npt.NDArray[np.int64], told: Callable[[], None]) -
             for row in near.tolist()
             for side in (lower[row], lower[row] + 1)
         ]
-        ways = ways_of(cells)
-        ways = solved(work, ways)
+        ways = solved(work, ways_of(cells))
         cost = costs(work, ways).reshape(-1, 2)
-        best = ways.some(2 * np.arange(near.size) + cost.argmin(axis=1))
         for place, row in enumerate(near.tolist()):
-            found.advance[row, column] = best.period[place] - best.fired[place]
-            found.width[row, column] = best.width[place]
-            found.brake_delay[row, column] = best.delay[place]
-            found.brake_width[row, column] = best.brake[place]
+            best = ways.some([2 * place + int(cost[place].argmin())])
+            if not cost[place].min() <= BAD:
+                # Neither goes on from its rate to here; perhaps there is one more.
+                more = searched(work, float(periods[row]), brake=brake)
+                if more.size and more.cost.min() < cost[place].min():
+                    best = more.some([int(more.cost.argmin())])
+            found.advance[row, column] = best.period[0] - best.fired[0]
+            found.width[row, column] = best.width[0]
+            found.brake_delay[row, column] = best.delay[0]
+            found.brake_width[row, column] = best.brake[0]
     polish(found, told)
     return found
 

@@ -42,6 +42,12 @@ SPACING: Final = 30e-6
 JUMP: Final = 8e-6
 """Difference of neighbouring advances from which on they belong to different ways, s."""
 
+BAD: Final = 0.75
+"""Cost from which on more ways are looked for."""
+
+NOMINAL: Final = 8.0
+"""How often the hammer that a table is made for counts, beside those that differ."""
+
 _ROOM: Final = 100e-6
 _WIDE: Final = 50e-6
 _FIRED: Final = 12
@@ -49,7 +55,7 @@ _LEAST_WIDTH: Final = 0.5
 _WIDTHS: Final = 8
 _FINE: Final = 3
 _DELAY: Final = 45e-6
-_BRAKES: Final = (0.1, 0.15, 0.2, 0.3, 0.45, 0.7)
+_BRAKES: Final = (0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0)
 _APART: Final = 30e-6
 _STARTS: Final = 2
 _FAR: Final = 8.0
@@ -60,9 +66,9 @@ _SOLVED: Final = 1e-3
 _STEPS: Final = (1e-6, 0.5e-6)
 _LONGEST_STEP: Final = 25e-6
 _DAMPING: Final = 0.02
-_NOMINAL: Final = 3.0
+_RIGHT: Final = 0.02
+_WRONG: Final = 1.0
 _HOPELESS: Final = 20.0
-_BAD: Final = 0.75
 _CLOSE: Final = 8e-6
 _LATER: Final = (-22e-6, -8e-6, 8e-6, 22e-6)
 _WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)
@@ -130,7 +136,7 @@ def earliest(work: Work, delay: FloatArray, brake: FloatArray) -> FloatArray:
     """Return how long after the slot of the dot before a dot may be fired first, s.
 
     By then the armature has left the pack, so that no dot draws on what the pack of the one before gives
-    back, and a brake pulse has faded.
+    back, and so much of a brake pulse has decayed that the current keeps to its bound.
     """
     return np.asarray(np.where(brake > 0.0, delay + brake + work.wait, work.single.left))
 
@@ -186,8 +192,7 @@ def chosen(
     groups = _valued(work, tried)
     told()
     if brake:
-        _look_closely(work, periods, groups)
-    told()
+        _look_closely(work, periods, groups, told)
     there = [group for group in groups if group.size]
     every = together([ways_of([]), *there])
     ends = np.cumsum([group.size for group in there])
@@ -213,7 +218,7 @@ def _valued(work: Work, tried: Sequence[Ways]) -> list[Ways]:
     return [group.some(np.isfinite(group.cost)) for group in groups]
 
 
-def _look_closely(work: Work, periods: FloatArray, groups: list[Ways]) -> None:
+def _look_closely(work: Work, periods: FloatArray, groups: list[Ways], told: Callable[[], None]) -> None:
     """Look for more ways, with brake pulses between those tried before, where the best is not good enough.
 
     Parameters
@@ -224,24 +229,34 @@ def _look_closely(work: Work, periods: FloatArray, groups: list[Ways]) -> None:
         Times from slot to slot, s.
     groups : list of Ways
         The ways of each of these that are known; added to.
+    told : callable
+        Called after each step of the work.
     """
-    bad = [row for row, group in enumerate(groups) if not group.cost.min(initial=np.inf) <= _BAD]
+    bad = [row for row, group in enumerate(groups) if not group.cost.min(initial=np.inf) <= BAD]
     # Where not even the neighbours have a way that is any good, there is none.
-    hope = [row for row in bad if groups[row].cost.min(initial=np.inf) <= _HOPELESS]
+    hope = [row for row in bad if groups[row].cost.min(initial=np.inf) <= _FAR]
     nodes = spaced(periods[hope], _CLOSE)
     own: Any = work.pulse
+    begin = brake_from(work)
     found = []
     for node in nodes:
         row = int(np.searchsorted(periods, node))
-        best = groups[row].some(np.argsort(groups[row].cost, kind="stable")[:_KEPT])
-        pairs = {
-            (max(brake_from(work), delay + later), max(brake * wider, _LEAST_BRAKE * own.width))
-            for delay, brake in zip(best.delay.tolist(), best.brake.tolist(), strict=True)
-            if brake
+        best = groups[row].some(groups[row].brake > 0.0)
+        best = best.some(np.argsort(best.cost, kind="stable")[:_KEPT])
+        cells = [
+            (node, max(begin, delay + later), max(brake * wider, _LEAST_BRAKE * own.width), fired, width)
+            for delay, brake, fired, width in zip(
+                best.delay.tolist(),
+                best.brake.tolist(),
+                best.fired.tolist(),
+                best.width.tolist(),
+                strict=True,
+            )
             for later in _LATER
             for wider in _WIDER
-        }
-        found.append(_best(work, _grid(work, node, sorted(pairs))) if pairs else ways_of([]))
+        ]
+        found.append(_kept(work, solved(work, ways_of(cells))))
+        told()
     tried = []
     for row in hope:
         near = [
@@ -307,9 +322,11 @@ def _best(work: Work, cells: Ways, more: int = 1) -> Ways:
         if len(others) < more * _STARTS and all(abs(cells.fired[place] - time) > _APART for time in others):
             others.append(float(cells.fired[place]))
             starts.append(place)
-    found = solved(work, cells.some(np.array(starts, dtype=np.int64)))
-    if not found.size:
-        return found
+    return _kept(work, solved(work, cells.some(np.array(starts, dtype=np.int64))))
+
+
+def _kept(work: Work, found: Ways) -> Ways:
+    """Return the best of some ways that are solved, the best one first."""
     found = _distinct(replace(found, cost=costs(work, found)))
     best = np.argsort(found.cost, kind="stable")[:_KEPT]
     return found.some(best[np.isfinite(found.cost[best])])
@@ -398,8 +415,9 @@ def costs(work: Work, ways: Ways) -> FloatArray:
     """Return how far off rows of dots made in some ways are, in parts of the limits.
 
     That is the largest deviation of any dot of a row of `ROW`, on the hammers that differ a little from the
-    one the table is made for; on that one itself it counts three times. Infinite where a dot is lost,
-    or the pulses do not fit between each other.
+    one the table is made for; what that one itself does counts `NOMINAL` times. A way that cannot make even
+    the second dot right is put behind others. Infinite where a dot is lost, or the pulses do not fit between
+    each other.
     """
     found = np.full(ways.size, np.inf)
     every = np.flatnonzero(fits(work, ways))
@@ -407,10 +425,11 @@ def costs(work: Work, ways: Ways) -> FloatArray:
         some = every[start : start + _PIECE]
         part = ways.some(some)
         drives = rows_of(work, part, ROW)
-        worst = _NOMINAL * _largest(_deviations(work, work.hammers[0], part, drives, ROW))
+        own = _deviations(work, work.hammers[0], part, drives, ROW)
+        worst = NOMINAL * _largest(own)
         for hammer in work.spread:
             worst = np.maximum(worst, _largest(_deviations(work, hammer, part, drives, ROW)))
-        found[some] = worst
+        found[some] = worst + np.where(_largest(own[:, 1]) > _RIGHT, _WRONG, 0.0)
     return found
 
 

@@ -74,7 +74,7 @@ def tune(
     to do it: before a rebound or after it, with one or another brake pulse that takes some of the rebound
     away, or without. The one is taken in which a row of such dots stays nearest to the single pulse on
     hammers with 3 % more and less current and 10 um more and less travel, counting what this hammer itself
-    does three times. No dot is fired before the armature has left the pack of the one before.
+    does eight times. No dot is fired before the armature has left the pack of the one before.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def tune(
     work = _tuned(blank, grid, brake, steps, open_ended=asked is None)
     lost = np.flatnonzero(~np.isfinite(work.deviation.max(axis=1)))
     if asked is None:
-        work = refined(subset(work, np.arange(_kept(work))), largest, steps)
+        work = refined(subset(work, np.arange(_kept(work))), largest, steps, brake=brake)
     elif lost.size:
         speed = float(grid[lost[0]])
         raise InputError(

@@ -1,0 +1,117 @@
+"""Measure how fast hammers print with a compensation table: safe rates beside open loop, also perturbed.
+
+Run it with ``.venv/bin/python docs/measure/tables.py``. For the shipped hammer and five of its family it
+tunes a table over all rates and prints a line, with ``--perturbed`` one for each hammer that differs. It
+takes some ten minutes on two cores, ``--perturbed`` some five more for each hammer.
+
+``--history N`` and ``--robust`` are as for ``printhammer tune``. ``--hammer`` takes a name or a file instead
+of the six, and may be repeated. ``--keep FOLDER`` keeps the tables, and takes those that are there already.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import printhammer as ph
+from printhammer.control.table import CompensationTable
+from printhammer.control.table_report import PERTURBATIONS
+from printhammer.printing.nominal import nominal
+from printhammer.printing.perturbation import Perturbation, perturbed
+from printhammer.printing.safe_rate import SafeRate
+from printhammer.reconstruction.family import family_hammers
+
+OTHERS = (1, 5, 9, 13, 17)
+"""Places of the five hammers in the family."""
+
+TOLERANCE = 5e-7
+"""That for pictures."""
+
+BETWEEN = 2.5
+"""Shift of a grid of rates that lie between those of the table, Hz."""
+
+
+def hammers(names: list[str]) -> Iterator[ph.Hammer]:
+    """Return the hammers of these names, or the six."""
+    if names:
+        yield from (ph.load(name) for name in names)
+        return
+    family = list(family_hammers())
+    yield ph.load("hendriks-1983")
+    yield from (family[place] for place in OTHERS)
+
+
+def tuned(
+    hammer: ph.Hammer, history: int, robust: bool, kept: Path | None
+) -> tuple[CompensationTable, float]:
+    """Return a table over all rates, and the processor time it took, s; 0 for one that was kept."""
+    path = None if kept is None else kept / f"{hammer.fingerprint[:8]}-{history}{'-robust' * robust}.json"
+    if path is not None and path.exists():
+        return ph.load_table(path), 0.0
+    begin = time.process_time()
+    table = ph.tune(hammer, history=history, robust=robust)
+    spent = time.process_time() - begin
+    if path is not None:
+        table.save(path)
+    return table, spent
+
+
+def rates_of(hammer: ph.Hammer, table: CompensationTable, by: Perturbation) -> tuple[SafeRate, SafeRate]:
+    """Return the safe rates of a hammer that differs, open loop and with the table."""
+    driven, single = perturbed(hammer, by), nominal(hammer, tolerance=TOLERANCE)
+    last = float(table.rates[-1])
+    options = {"nominal": single, "tolerance": TOLERANCE}
+    return (
+        ph.safe_rate(driven, **options),
+        ph.safe_rate(driven, table.strategy(hammer), last=last, **options),
+    )
+
+
+def line(*cells: object) -> None:
+    """Print a line of a table."""
+    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--hammer", action="append", default=[])
+    parser.add_argument("--history", type=int, default=1)
+    parser.add_argument("--robust", action="store_true")
+    parser.add_argument("--perturbed", action="store_true")
+    parser.add_argument("--keep", type=Path)
+    asked = parser.parse_args()
+    line(
+        "hammer", "driven", "open loop, Hz", "table, Hz", "ratio", "between, Hz", "rates", "tuned, s", "then"
+    )
+    line(*["---"] * 9)
+    for hammer in hammers(asked.hammer):
+        table, spent = tuned(hammer, asked.history, asked.robust, asked.keep)
+        for by in PERTURBATIONS if asked.perturbed else PERTURBATIONS[:1]:
+            plain, better = rates_of(hammer, table, by)
+            between = "–"
+            if by == Perturbation():
+                # From the first rate on at which a dot does not follow on rest.
+                found = ph.safe_rate(
+                    hammer,
+                    table.strategy(hammer),
+                    first=float(table.rates[1]) + BETWEEN,
+                    last=float(table.rates[-1]),
+                    tolerance=TOLERANCE,
+                )
+                between = f"{found.rate:g}"
+            line(
+                hammer.name.removeprefix("hendriks-1983-"),
+                by.name,
+                f"{plain.rate:g}",
+                f"{better.rate:g}",
+                f"{better.rate / plain.rate:.2f}",
+                between,
+                table.rates.size,
+                f"{spent:.0f}",
+                better.failure.text if better.failure else "the table ends",
+            )
+
+
+if __name__ == "__main__":
+    main()
