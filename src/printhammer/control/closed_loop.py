@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.controller import Controller, Printed
+    from printhammer.control.driver import Driver
     from printhammer.control.sensor import PositionSensor
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
@@ -67,6 +68,18 @@ class Pulse:
     def waveform(self, edge: float) -> Switched:
         """Return the waveform."""
         return Switched(at=tuple(t - self.fired for t in self.at), levels=tuple(self.levels), edge=edge)
+
+
+class _Bounded(PulseSequence):
+    """Pulses of a driver, whose bound is taken for the largest of them, so that it need not be sought."""
+
+    def __init__(self, driver: Driver, waveforms: Sequence[Switched], at: Sequence[float]) -> None:
+        super().__init__(waveforms, at=at)
+        self._bound = driver.current
+
+    @property
+    def largest_pulse(self) -> float:
+        return self._bound
 
 
 @dataclass
@@ -128,10 +141,16 @@ class Loop:
     seen: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
     touches: list[tuple[float, float]] = field(default_factory=list)
 
-    def drive(self, edge: float, last: int | None = None) -> PulseSequence:
-        """Return the drive so far, or that of the last pulses."""
-        pulses = self.pulses if last is None else self.pulses[-last:]
-        return PulseSequence([pulse.waveform(edge) for pulse in pulses], at=[p.fired for p in pulses])
+    def drive(self, edge: float) -> PulseSequence:
+        """Return the drive so far."""
+        return PulseSequence(
+            [pulse.waveform(edge) for pulse in self.pulses], at=[p.fired for p in self.pulses]
+        )
+
+    def recent(self, driver: Driver) -> PulseSequence:
+        """Return the drive of the pulses of which anything can be left."""
+        pulses = self.pulses[-REMEMBERED:]
+        return _Bounded(driver, [pulse.waveform(driver.edge) for pulse in pulses], [p.fired for p in pulses])
 
 
 def closed_loops(
@@ -246,7 +265,7 @@ class _Run:
             width = 4 if inside[group[0]] else 2
             result = Ensemble(
                 self.hammer,
-                [loop.drive(self.controller.driver.edge, REMEMBERED) for loop in own],
+                [loop.recent(self.controller.driver) for loop in own],
                 ends[group],
                 states=np.array([loop.state[:width] for loop in own]),
                 starts=starts[group],

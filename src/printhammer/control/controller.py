@@ -62,8 +62,8 @@ _POLICIES: Final = 8
 class Ahead(NamedTuple):
     """Where a way leads.
 
-    Times after a touch, s, of the throw, of leaving the pack and of the next touch; width of the push, s; kind
-    and speed, m/s, of that touch.
+    Times after a touch, s, of the throw, of leaving the pack and of the next touch; width of the push, s;
+    kind and speed, m/s, of that touch.
     """
 
     fire: float
@@ -148,7 +148,7 @@ class Controller:
     @cached_property
     def contacts(self) -> Contacts:
         """Contacts of the nominal hammer with packs at several places."""
-        return Contacts(self.hammer, self.stroke, self.driver.edge, REMEMBERED)
+        return Contacts(self.hammer, self.stroke, self.driver)
 
     def policy(self, period: float) -> Policy:
         """Return the policy for a period, s."""

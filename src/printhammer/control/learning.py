@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.closed_loop import Loop
+    from printhammer.control.driver import Driver
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
@@ -111,16 +112,13 @@ class Contacts:
         The nominal hammer.
     stroke : float
         Way from backstop to pack, m.
-    edge : float
-        Time constant of the driver, s.
-    remembered : int
-        Number of the latest pulses of which anything can be left.
+    driver : Driver
+        Of the coil.
     """
 
-    def __init__(self, hammer: Hammer, stroke: float, edge: float, remembered: int) -> None:
+    def __init__(self, hammer: Hammer, stroke: float, driver: Driver) -> None:
         self._stroke = stroke
-        self._edge = edge
-        self._remembered = remembered
+        self._driver = driver
         self._shifted = {0: hammer}
         self._nominal = hammer
 
@@ -194,7 +192,7 @@ class Contacts:
         hammers, drives, states, strobes = [], [], [], []
         shift = round(_FRONT_STEP / _GRID)
         steps[2] = shift * _GRID
-        plain = [loop.drive(self._edge, self._remembered) for loop in loops]
+        plain = [loop.recent(self._driver) for loop in loops]
         stronger = [drive.scaled(1.0 + _SCALE_STEP) for drive in plain]
         for number in range(5):
             for k, (touched, place) in enumerate(zip(touches, places, strict=True)):
