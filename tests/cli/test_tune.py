@@ -72,6 +72,7 @@ def test_the_example_is_a_command_line_of_this_verb() -> None:
     assert words[:2] == ["printhammer", "tune"]
 
 
+@pytest.mark.slow
 def test_a_page_is_printed_with_a_table(cli: Callable, quick: Path, tmp_path: Path) -> None:
     table, dots = tmp_path / "table.json", tmp_path / "dots.csv"
     ph.tune(ph.load(quick), rate=1850.0, history=1).save(table)

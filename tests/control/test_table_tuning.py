@@ -62,6 +62,7 @@ def test_the_table_does_not_depend_on_threads(table: CompensationTable) -> None:
     assert all(np.array_equal(getattr(again, name), getattr(table, name)) for name in (*COLUMNS, "deviation"))
 
 
+@pytest.mark.slow
 def test_longer_histories_begin_with_shorter_ones(table: CompensationTable) -> None:
     longer = ph.tune(quick(), rate=RATE, history=2)
     # 1-rest of the longer one is 1 of the shorter, tuned in the same pattern.
