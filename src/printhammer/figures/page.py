@@ -336,8 +336,8 @@ def _zoom_alone(page: Page) -> Figure:
     place = zoomed_sheet(page)
     wide = _WIDTH - 2.0 * _SIDE
     height = wide * place.height / place.width
-    figure = _figure(height + 2 * _LABEL + _FOOT)
-    title = f"{_printed_title(page)}. {_zoom_title(page)}"
+    figure = _figure(height + 2.5 * _LABEL + _FOOT)
+    title = f"{_printed_title(page)}\n{_zoom_title(page)}"
     _zoom(_panel(figure, place, _FOOT + height, height, title), place, page)
     _tell(figure, page)
     return figure
