@@ -33,10 +33,12 @@ from printhammer.studio.work import GivenUp, Patience
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from printhammer.motion import Motion
+
 logger = logging.getLogger(__name__)
 
-REST: Final = 0.15
-"""Seconds without a newer state after which the verdict on a train is worked out."""
+REST: Final = 0.3
+"""Seconds without a newer state after which more strobe points and the verdict on a train follow."""
 
 
 class Session:
@@ -57,7 +59,7 @@ class Session:
         self._change = threading.Condition()
         self._latest: tuple[int, State] | None = None
         self._answered = 0
-        self._detail: tuple[int, State] | None = None
+        self._detail: tuple[int, State, Motion | None] | None = None
         self._questions: list[tuple[str, int, Any]] = []
         self._closed = False
         self._sent: dict[str, Any] = {}
@@ -151,10 +153,13 @@ class Session:
         self._tell(data)
         if "map" in state.views and self._sent.get("preview") != map_key(state):
             self._preview(serial, state)
+        # Where no view shows the dots, they wait for the map.
+        shown = not {"energy", "line"}.isdisjoint(state.views)
         with self._change:
-            self._detail = (serial, state)
+            self._detail = (serial, state, None if shown else motion)
             self._change.notify_all()
-        self._tell(dots_frame(serial, motion))
+        if shown:
+            self._tell(dots_frame(serial, motion))
 
     def _preview(self, serial: int, state: State) -> None:
         try:
@@ -175,11 +180,13 @@ class Session:
             return
         self._sure(self._second, *taken)
 
-    def _second(self, serial: int, state: State) -> None:
+    def _second(self, serial: int, state: State, motion: Motion | None) -> None:
         def newer() -> bool:
             return self._closed or self._latest is None or self._latest[0] != serial
 
         self._map(serial, state, newer)
+        if motion is not None:
+            self._tell(dots_frame(serial, motion))
         self._line(serial, state, newer)
         self._section(serial, state, newer)
 

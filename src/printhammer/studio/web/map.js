@@ -134,8 +134,10 @@ export function mapView(body, studio) {
     tip.textContent = code === GAP ? "" : `${shown(rate, "Hz")}, ${shown(time, "s")}: ${shown(x, "m")}`;
   }
 
+  let told = null;
   function refresh() {
     const { rate } = studio.store.state;
+    told = rate;
     const [low, high] = studio.frames.map?.rates ?? [rate, rate];
     canvas.setAttribute("aria-valuemin", low);
     canvas.setAttribute("aria-valuemax", high);
@@ -145,7 +147,8 @@ export function mapView(body, studio) {
   return {
     update: (what) => {
       if (what === "map" && !studio.frames.map.reason) render(studio.frames.map);
-      if (what === "map" || what === "state") refresh();
+      // Of the state only the rate is seen here; the map itself follows.
+      if (what === "map" || (what === "state" && studio.store.state.rate !== told)) refresh();
     },
     draw: () => { if (studio.frames.map && !studio.frames.map.reason) render(studio.frames.map); refresh(); },
     cursor: area.draw,
