@@ -244,7 +244,13 @@ def _look_closely(work: Work, periods: FloatArray, groups: list[Ways], told: Cal
         best = groups[row].some(groups[row].brake > 0.0)
         best = best.some(np.argsort(best.cost, kind="stable")[:_KEPT])
         cells = [
-            (node, max(begin, delay + later), max(brake * wider, _LEAST_BRAKE * own.width), fired, width)
+            (
+                node,
+                max(begin, delay + later),
+                min(max(brake * wider, _LEAST_BRAKE * own.width), work.widest),
+                fired,
+                width,
+            )
             for delay, brake, fired, width in zip(
                 best.delay.tolist(),
                 best.brake.tolist(),
