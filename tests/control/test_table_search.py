@@ -148,3 +148,23 @@ def test_a_way_is_left_where_it_is_no_good() -> None:
     assert chosen[1] == 3
     assert chosen[2] == 4
     assert table_search._path(every, []).size == 0
+
+
+def test_pulses_keep_to_their_bounds_also_where_it_is_looked_closely(
+    work: Work, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table_search, "BAD", 0.0)
+    monkeypatch.setattr(table_search, "_WIDER", (1.0, 50.0))
+    kept: list[Ways] = []
+    known = table_search._kept
+
+    def watched(work: Work, found: Ways) -> Ways:
+        kept.append(found)
+        return known(work, found)
+
+    monkeypatch.setattr(table_search, "_kept", watched)
+    table_search.chosen(work, np.array([PERIOD]), brake=True, told=lambda: None)
+    assert max(some.brake.max(initial=0.0) for some in kept) == work.widest
+    assert max(some.width.max(initial=0.0) for some in kept) <= work.widest
+    brakes = np.concatenate([some.delay[some.brake > 0.0] for some in kept])
+    assert brakes.min() >= table_search.brake_from(work)
