@@ -12,7 +12,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import printhammer as ph
-from printhammer.waveforms import Chain
 
 hammer = ph.load("hendriks-1983")
 pulse = hammer.waveform
@@ -26,7 +25,7 @@ touch = alone.dots[0].flight_time
 
 delays = np.linspace(touch, 4.0 * touch, 121)
 widths = np.linspace(0.02, 1.0, 50) * pulse.width
-brakes = [pulse.model_copy(update={"width": float(width)}) for width in widths]
+brakes = [hammer.replace("waveform.width", width).waveform for width in widths]
 drives = [ph.PulseSequence([pulse, b], at=[0, t]) for b in brakes for t in delays]
 
 times = np.linspace(0.0, 4e-3, 2001)
@@ -64,7 +63,7 @@ axes.set(
 # The best brake and the print pulse in one firing are a chain, which is a waveform
 # like any other: for trains, bursts, and drive files.
 
-chain = Chain(parts=((0.0, pulse), (float(delay), best)))
+chain = ph.Chain(parts=((0.0, pulse), (float(delay), best)))
 braked = ph.simulate(hammer, ph.PulseTrain(chain), duration="4 ms")
 
 figure, (above, below) = plt.subplots(2, 1, sharex=True, height_ratios=(2, 1))

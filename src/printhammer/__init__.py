@@ -53,12 +53,13 @@ if TYPE_CHECKING:
     from printhammer.printing.tolerance import tolerance_yield
     from printhammer.simulate import simulate
     from printhammer.sweep import sweep
-    from printhammer.waveforms import Waveform
+    from printhammer.waveforms import Chain, Waveform
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Burst",
+    "Chain",
     "CompensationTable",
     "Ensemble",
     "EnsembleResult",
@@ -114,6 +115,7 @@ __all__ = [
 
 _HOME = {
     "Burst": "drive",
+    "Chain": "waveforms",
     "CompensationTable": "control.table",
     "Ensemble": "ensemble",
     "EnsembleResult": "ensemble",

@@ -39,7 +39,9 @@ def shown(value: float | None, kind: str, units: Units) -> str:
         return "–"
     si, *systems = _SHOWN[kind]
     name, digits = systems[0 if units is Units.SI else 1]
-    return format(from_si(value, si, name), digits)
+    text = format(from_si(value, si, name), digits)
+    # No minus before what is rounded to zero.
+    return text if any(digit in text for digit in "123456789") else text.removeprefix("-")
 
 
 def with_unit(value: float | None, kind: str, units: Units) -> str:
