@@ -117,6 +117,10 @@ def test_a_visit(page: Page, running: Studio) -> None:
         kept["constants"]["pack.thickness"]
     )
     assert "[train]" in saved(page, "select.out", "drive, TOML")
+    page.wait("window.studio.studio.frames.strobe?.data.x && window.studio.studio.frames.line?.data.x")
+    assert saved(page, ".view-line .leave", "CSV").startswith(
+        "wanted_x [m],wanted_y [m],x [m],y [m],darkness"
+    )
     for view in VIEWS:
         page.wait(f"window.studio.studio.views['{view}'].table()")
         leave = f".view-{view} .leave"

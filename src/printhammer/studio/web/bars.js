@@ -43,7 +43,7 @@ export function energyView(body, studio) {
     }
     pen.restore();
   };
-  return barsOf(body, studio, "Energy of each dot", paint, ["loading_work", "net_loss"], "J");
+  return barsOf(body, studio, "Energy of each dot", paint, () => dotTable(studio, { loading_work: "J", net_loss: "J" }));
 }
 
 /** The dots as they come out on paper that moves past the hammer: place by arrival, size by force. */
@@ -100,7 +100,7 @@ export function lineView(body, studio) {
     told.forEach((text, k) => pen.fillText(text, width / 2, 0.42 * height + 44 + 16 * k));
     pen.restore();
   };
-  return barsOf(body, studio, "The line as it is printed", paint, ["flight_time", "peak_force"], "SI");
+  return barsOf(body, studio, "The line as it is printed", paint, () => (studio.store.state.line.trim() ? lineTable(studio.frames.line) : dotTable(studio, { flight_time: "s", peak_force: "N" })));
 }
 
 /** Draw a printed text: where dots are wanted, and how they came out. */
@@ -150,15 +150,24 @@ function printed(pen, width, height, frame) {
   pen.restore();
 }
 
-function barsOf(body, studio, label, paint, columns, unit) {
+function barsOf(body, studio, label, paint, table) {
   const area = surface(body, paint, label);
-  return {
-    update: (what) => (what === "dots" || what === "line") && area.draw(), draw: area.draw, cursor: () => {}, paint,
-    table: () => {
-      const dots = studio.frames.dots?.dots;
-      return dots && { firing: dots.map((dot) => dot.index), "fired_at [s]": dots.map((dot) => dot.fired_at), struck: dots.map((dot) => Number(dot.struck)), ...Object.fromEntries(columns.map((name) => [`${name} [${unit}]`, dots.map((dot) => dot[name] ?? NaN)])), extra_contacts: dots.map((dot) => dot.extra_contacts) };
-    },
-  };
+  return { update: (what) => (what === "dots" || what === "line") && area.draw(), draw: area.draw, cursor: () => {}, paint, table };
+}
+
+/** What each firing did, with some quantities of its dot and their units. */
+function dotTable(studio, units) {
+  const dots = studio.frames.dots?.dots;
+  if (!dots) return null;
+  const quantities = Object.entries(units).map(([name, unit]) => [`${name} [${unit}]`, dots.map((dot) => dot[name] ?? NaN)]);
+  return { firing: dots.map((dot) => dot.index), "fired_at [s]": dots.map((dot) => dot.fired_at), struck: dots.map((dot) => Number(dot.struck)), ...Object.fromEntries(quantities), extra_contacts: dots.map((dot) => dot.extra_contacts) };
+}
+
+/** The dots of a printed text: where they are wanted and where they are, and how dark. */
+function lineTable(frame) {
+  if (!frame || frame.reason) return null;
+  const { data } = frame;
+  return { "wanted_x [m]": data["wanted x"], "wanted_y [m]": data["wanted y"], "x [m]": data.x, "y [m]": data.y, darkness: data.darkness, fault: data.fault };
 }
 
 function bar(pen, plane, x, w, value, colour) {

@@ -1,6 +1,6 @@
 // Displacement and current, and the forces, against time: drawn by uPlot, and by a pen where they are exported.
 import uPlot from "./vendor/uPlot.js";
-import { axes, before, curve, extent, inside, key, line, ticks, widened } from "./axes.js";
+import { axes, before, curve, extent, inside, key, line, MARGIN, ticks, widened } from "./axes.js";
 import { colours, FONT } from "./theme.js";
 import { timeUnit, unitOf } from "./units.js";
 
@@ -183,7 +183,9 @@ function curveView(body, studio, kind) {
     const main = unitOf(series[0].si);
     const x = { low, high, label: `time, ${time.name}`, factor: time.factor };
     const y = { low: scales.x[0], high: scales.x[1], label: `${series.length > 2 ? "force" : series[0].name}, ${main.name}`, factor: main.factor };
-    const plane = axes(pen, width, height, x, y);
+    const driven = series.find((entry) => entry.scale === "drive");
+    const plane = axes(pen, width, height, x, y, driven ? { ...MARGIN, right: 44 } : MARGIN);
+    if (driven) rightAxis(pen, plane.box, scales.drive, frame.peak, driven);
     inside(pen, plane);
     kind.under(pen, plane, plane.box);
     for (const entry of series) {
@@ -204,6 +206,25 @@ function curveView(body, studio, kind) {
     return frame && { "time [s]": frame.data.t, ...Object.fromEntries(kind.series().map((entry) => [`${entry.name} [${entry.si}]`, entry.values(frame)])) };
   };
   return { update: (what) => what === "motion" && draw(), draw, cursor, paint, table };
+}
+
+/** Write the scale of the drive on the right, up to its peak. */
+function rightAxis(pen, box, [low, high], peak, { name, si, colour }) {
+  const unit = unitOf(si);
+  pen.save();
+  pen.font = FONT;
+  pen.fillStyle = colour;
+  pen.textAlign = "left";
+  pen.textBaseline = "middle";
+  for (const tick of ticks(low * unit.factor, high * unit.factor, box.h, 14)) {
+    const value = tick / unit.factor;
+    if (value <= 1.01 * peak) pen.fillText(Number(tick.toPrecision(6)), box.x + box.w + 5, box.y + box.h * (1 - (value - low) / (high - low)));
+  }
+  pen.textAlign = "center";
+  pen.translate(box.x + box.w + 36, box.y + box.h / 2);
+  pen.rotate(-Math.PI / 2);
+  pen.fillText(`${name}, ${unit.name}`, 0, 0);
+  pen.restore();
 }
 
 /** Return round numbers of the unit that is shown, in SI. */

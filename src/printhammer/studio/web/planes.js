@@ -132,7 +132,7 @@ export function strobeView(body, studio) {
     pen.restore();
   }, () => {
     const frame = studio.frames.strobe;
-    return frame && !frame.reason && { "displacement [m]": frame.data.x, "velocity [m/s]": frame.data.v };
+    return frame && !frame.reason && { firing: [...frame.data.x.keys()].map((k) => k + 1), "displacement [m]": frame.data.x, "velocity [m/s]": frame.data.v };
   });
 }
 
