@@ -42,7 +42,7 @@ def main() -> None:
         for view in VIEWS:
             page.picture(IMAGES / f"{view}.png", f".view-{view}")
     for path in IMAGES.glob("*.png"):
-        Image.open(path).convert("RGB").quantize(256).save(path, optimize=True)
+        Image.open(path).convert("RGB").save(path, optimize=True)
 
 
 if __name__ == "__main__":
