@@ -13,6 +13,7 @@ from printhammer.control.closed_loop import closed_loops
 from printhammer.control.controller import Controller
 from printhammer.control.driver import driver_of
 from printhammer.control.feedback import Feedback, FeedbackStrategy
+from printhammer.control.learning import FRONT_ERROR, SCALE_ERROR
 from printhammer.control.sensor import PositionSensor
 from printhammer.printing.limits import Limits
 from printhammer.printing.perturbation import Perturbation, perturbed
@@ -43,6 +44,37 @@ def test_a_perfect_sensor_tells_when_and_how_fast_the_pack_is_touched(controller
     for contact, (time, speed) in zip(touches, loop.touches, strict=True):
         assert contact.t_in == pytest.approx(time, abs=1e-6)
         assert contact.v_in == pytest.approx(speed, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("current", "travel"), [(0.0, 8e-6), (0.0, -8e-6), (-0.03, 0.0), (0.03, 0.0), (-0.02, 8e-6), (0.02, 8e-6)]
+)
+def test_front_and_supply_are_learned_and_not_taken_for_each_other(
+    controller: Controller, current: float, travel: float
+) -> None:
+    other = perturbed(controller.hammer, Perturbation(current=current, travel=travel))
+    loop = closed_loops(other, controller, PositionSensor(), [(0, 1, 2, 3, 6)], 1300.0)[0]
+    known = loop.learned
+    assert known.front * controller.stroke == pytest.approx(travel, abs=1e-6)
+    assert known.scale == pytest.approx(current, abs=0.012)
+    # Far better known than before the first dot, and told so.
+    assert known.front_error < 0.1 * FRONT_ERROR
+    assert known.scale_error < 0.5 * SCALE_ERROR
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("travel", [-10e-6, 10e-6])
+def test_a_pack_that_lies_elsewhere_is_printed_on(controller: Controller, travel: float) -> None:
+    other = perturbed(controller.hammer, Perturbation(travel=travel))
+    case, patterns = Case(other, controller.single, 1300.0), [*PATTERNS, (0, 1), (0, 5), (2, 3, 7)]
+    strategy = FeedbackStrategy(controller, PositionSensor(seed=4))
+    trial = attempt([case], patterns, strategy, limits=Limits(), tolerance=5e-7)
+    assert trial.passed.all()
+    # Only the first dot comes before the front is known.
+    late = np.abs(trial.judgement.force_deviation)
+    assert np.nanmax(late[:, 1:]) < 0.08
+    assert max(drive.peak for drive in trial.drives) <= CURRENT * (1.0 + 1e-12)
 
 
 @pytest.mark.slow
@@ -127,6 +159,37 @@ def test_bad_input_is_one_sentence(
     error = capsys.readouterr().err
     assert told in error.replace("\n", " ")
     assert "Traceback" not in error
+
+
+@pytest.mark.parametrize("arguments", [["print", "HAMMER"], ["quality", str(hammers.CRUDE)]])
+def test_feedback_and_a_table_at_once_are_refused(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([*arguments, "--rate", "1 kHz", "--feedback", "--table", "table.csv"])
+    assert end.value.code == 2
+    assert "--table table.csv and --feedback: expected one of them" in capsys.readouterr().err.replace(
+        "\n", " "
+    )
+
+
+@pytest.mark.slow
+def test_feedback_drives_a_page_and_a_report(
+    controller: Controller, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("printhammer.control.controller.Controller", lambda *_args, **_options: controller)
+    monkeypatch.chdir(tmp_path)
+    own = ["--rate", "1.6 kHz", "--feedback"]
+    for arguments in (
+        ["print", "HH", *own, "--hammer", str(HAMMER), "--out", "page.csv"],
+        ["quality", str(HAMMER), *own, "--pattern", "1101", "--out", "found.nc"],
+    ):
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        assert end.value.code == 0
+    assert (tmp_path / "page.csv").exists()
+    with xr.open_dataset(tmp_path / "found.nc", engine="scipy") as read:
+        assert read.attrs["strategy"] == "feedback"
 
 
 def test_hammers_that_cannot_be_driven_are_refused() -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from printhammer.control.feedback import Feedback
+    from printhammer.control.feedback import Feedback, FeedbackStrategy
     from printhammer.hammer import Hammer
 
 EXAMPLE: Final = "Example: printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png"
@@ -192,6 +192,18 @@ def _table(path: Path, hammer: Hammer) -> Any:
     from printhammer.control.table_files import load_table
 
     return TableStrategy(load_table(path), hammer)
+
+
+def feedback_strategy(hammer: Hammer) -> FeedbackStrategy:
+    """Return feedback as a way to drive a hammer, with its usual driver and sensor."""
+    from rich.console import Console
+
+    from printhammer.control.controller import Controller
+    from printhammer.control.driver import driver_of
+    from printhammer.control.feedback import FeedbackStrategy
+
+    with Console(stderr=True).status("tables of the controller"):
+        return FeedbackStrategy(Controller(hammer, driver_of(hammer)))
 
 
 def _computed(compute: Callable[[], Feedback]) -> Feedback:

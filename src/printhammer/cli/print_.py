@@ -87,6 +87,10 @@ def print_(
         Path | None,
         typer.Option("--table", metavar="FILE", help="Compensation table of the hammer (.csv, .json)."),
     ] = None,
+    feedback: Annotated[
+        bool,
+        typer.Option("--feedback", help="Drive with feedback, see `printhammer feedback`; takes a while."),
+    ] = False,
     tolerance: Annotated[str | None, typer.Option(metavar="X", help="Error allowed in one step.")] = None,
     threads: Annotated[str | None, typer.Option(metavar="N", help="Threads (all cores).")] = None,
     units: UnitsOption = Units.SI,
@@ -118,6 +122,7 @@ def print_(
     """
     from rich.markup import escape
 
+    from printhammer.cli.feedback import feedback_strategy
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
@@ -129,6 +134,8 @@ def print_(
     if rate is None:
         raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'")
     often = rate_of(rate, "--rate")
+    if feedback and table is not None:
+        raise InputError(f"--table {table} and --feedback: expected one of them")
     wanted = list(out or [])
     views = [(path, "zoom") for path in (zoom,) if path] + [(path, "sheet") for path in (sheet,) if path]
     if not wanted and not views and save is None:
@@ -154,6 +161,8 @@ def print_(
 
         options["strategy"] = load_table(table).strategy(loaded)
     announce_compiling()
+    if feedback:
+        options["strategy"] = feedback_strategy(loaded)
     screen = console()
     begin = perf_counter()
     page = print_page(

@@ -55,6 +55,10 @@ def quality(
             metavar="FILE", help="Drive by a compensation table (.csv, .json), not in an open loop."
         ),
     ] = None,
+    feedback: Annotated[
+        bool,
+        typer.Option("--feedback", help="Drive with feedback, see `printhammer feedback`; takes a while."),
+    ] = False,
     safe_rate: Annotated[
         bool, _more("--safe-rate", "Find the rate up to which all patterns of eight slots print well.")
     ] = False,
@@ -102,6 +106,7 @@ def quality(
     from rich.markup import escape
 
     from printhammer.cli import quality_screen, run_files
+    from printhammer.cli.feedback import feedback_strategy
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.drive import PulseTrain
     from printhammer.errors import InputError
@@ -129,6 +134,7 @@ def quality(
         "step": step,
         "threads": threads,
         "table": table,
+        "feedback": feedback or None,
     }
     task = _task(safe_rate=safe_rate, yield_=yield_, damping=damping)
     _only(task, {key for key, value in options.items() if value is not None})
@@ -136,6 +142,8 @@ def quality(
         raise InputError("--rate: expected slots per second, such as --rate 900Hz, or --safe-rate")
     if pattern is not None and pulses is not None:
         raise InputError("--pattern and --pulses: expected one of them")
+    if feedback and table is not None:
+        raise InputError(f"--table {table} and --feedback: expected one of them")
     common: dict[str, Any] = {"limits": _limits(limits, force_limit, arrival_limit)}
     if tolerance is not None:
         common["tolerance"] = number(tolerance, "tolerance")
@@ -155,6 +163,8 @@ def quality(
         # It says nothing of other rates.
         many = {"first": float(loaded_table.rates[0]), "last": float(loaded_table.rates[-1]), **many}
     announce_compiling()
+    if feedback:
+        common["strategy"] = many["strategy"] = feedback_strategy(loaded)
     screen = console()
     begin = perf_counter()
     bad = ""
@@ -205,8 +215,8 @@ def quality(
 
 
 _TAKES: Final = {
-    "report": {"rate", "pattern", "pulses", "pitch", "table"},
-    "safe-rate": {"table", "first", "last", "step", "threads"},
+    "report": {"rate", "pattern", "pulses", "pitch", "table", "feedback"},
+    "safe-rate": {"table", "feedback", "first", "last", "step", "threads"},
     "yield": {"table", "rate", "spread", "judged-by", "seed", "first", "last", "step", "threads"},
     "damping": {"current", "first", "last", "step", "threads"},
 }

@@ -13,7 +13,7 @@ import numpy as np
 
 from printhammer.control.learning import Learned, Touched
 from printhammer.control.sensor import run_key
-from printhammer.control.switched import Switched
+from printhammer.control.switched import BoundedSequence, Switched
 from printhammer.drive_sequence import PulseSequence
 from printhammer.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 from printhammer.equilibrium import rest_state
@@ -68,18 +68,6 @@ class Pulse:
     def waveform(self, edge: float) -> Switched:
         """Return the waveform."""
         return Switched(at=tuple(t - self.fired for t in self.at), levels=tuple(self.levels), edge=edge)
-
-
-class _Bounded(PulseSequence):
-    """Pulses of a driver, whose bound is taken for the largest of them, so that it need not be sought."""
-
-    def __init__(self, driver: Driver, waveforms: Sequence[Switched], at: Sequence[float]) -> None:
-        super().__init__(waveforms, at=at)
-        self._bound = driver.current
-
-    @property
-    def largest_pulse(self) -> float:
-        return self._bound
 
 
 @dataclass
@@ -150,7 +138,9 @@ class Loop:
     def recent(self, driver: Driver) -> PulseSequence:
         """Return the drive of the pulses of which anything can be left."""
         pulses = self.pulses[-REMEMBERED:]
-        return _Bounded(driver, [pulse.waveform(driver.edge) for pulse in pulses], [p.fired for p in pulses])
+        return BoundedSequence(
+            [pulse.waveform(driver.edge) for pulse in pulses], [p.fired for p in pulses], driver.current
+        )
 
 
 def closed_loops(

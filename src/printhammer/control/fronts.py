@@ -13,7 +13,7 @@ import numpy as np
 
 from printhammer.control.landing import landing
 from printhammer.control.swing_table import AHEAD, first_pulse, force_map, swing_table
-from printhammer.drive_sequence import PulseSequence
+from printhammer.control.switched import BoundedSequence
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.printing.perturbation import Perturbation, perturbed
 
@@ -129,7 +129,7 @@ def front_force(
     drives, states = [], []
     for row, release, back in keys:
         first = first_pulse(int(table.kind[row]), release, back, long, table.driver)
-        drives.append(PulseSequence([first], at=[0.0]))
+        drives.append(BoundedSequence([first], [0.0], table.driver.current))
         states.append((forces.front - AHEAD * table.speed[row], table.speed[row]))
     result = Ensemble(farther, drives, long, states=np.array(states), tolerance=DISPLAY_TOLERANCE).run(
         dots=True, threads=threads

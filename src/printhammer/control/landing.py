@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.swing_table import AHEAD, PUSHED
-from printhammer.control.switched import Switched
-from printhammer.drive_sequence import PulseSequence
+from printhammer.control.switched import BoundedSequence, Switched
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.equilibrium import rest_state
 
@@ -132,7 +131,7 @@ def _left(
                 edge=driver.edge,
                 initial=initial,
             )
-            drives.append(PulseSequence([pulse], at=[0.0]))
+            drives.append(BoundedSequence([pulse], [0.0], driver.current))
             states.append(state)
     watched = AHEAD + _WATCHED * scale
     result = Ensemble(

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.switched import Switched
-from printhammer.drive_sequence import PulseSequence
+from printhammer.control.switched import BoundedSequence, Switched
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
@@ -180,7 +179,9 @@ def force_map(hammer: Hammer, driver: Driver, single: Nominal, *, threads: int |
     for kind, speed in zip(kinds.tolist(), speeds.tolist(), strict=True):
         for level in back.tolist():
             for release in releases.tolist():
-                drives.append(PulseSequence([first_pulse(kind, release, level, long, driver)], at=[0.0]))
+                drives.append(
+                    BoundedSequence([first_pulse(kind, release, level, long, driver)], [0.0], driver.current)
+                )
                 states.append((front - AHEAD * speed, speed))
     result = Ensemble(hammer, drives, long, states=np.array(states), tolerance=DISPLAY_TOLERANCE).run(
         dots=True, threads=threads
@@ -238,7 +239,8 @@ def swing_table(
         key = row, float(every[row, way]), float(back[way]), float(fire[way])
         if key not in firsts:
             firsts[key] = first_pulse(int(forces.kind[row]), *key[1:], driver)
-        drives.append(PulseSequence([firsts[key], pushes[float(width[way])]], at=[0.0, key[3] + AHEAD]))
+        both = [firsts[key], pushes[float(width[way])]]
+        drives.append(BoundedSequence(both, [0.0, key[3] + AHEAD], driver.current))
     speed = forces.speed[rows]
     states = np.stack([forces.front - AHEAD * speed, speed], axis=1)
     ends = fire[ways] + _WAIT * scale

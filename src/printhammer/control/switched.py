@@ -8,14 +8,18 @@ never beyond the largest of the values, since every piece is a mean of where it 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, Self
+from functools import lru_cache
+from typing import TYPE_CHECKING, ClassVar, Final, Self
 
+from printhammer.drive_sequence import PulseSequence
 from printhammer.segments import EXPONENTIAL, FloatArray, table
 from printhammer.waveform_base import Waveform
 from printhammer.waveforms import DECAY_TIMES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+_KEPT: Final = 256
 
 
 class Switched(Waveform):
@@ -49,8 +53,32 @@ class Switched(Waveform):
         return self.model_copy(update={"levels": levels, "initial": factor * self.initial})
 
 
+class BoundedSequence(PulseSequence):
+    """Pulses of a driver; its bound is taken for the largest of them, so that this need not be sought.
+
+    Parameters
+    ----------
+    waveforms : sequence of Switched
+        What each firing does.
+    at : sequence of float
+        Firing times, s.
+    bound : float
+        Largest current of the driver, A.
+    """
+
+    def __init__(self, waveforms: Sequence[Switched], at: Sequence[float], bound: float) -> None:
+        super().__init__(waveforms, at=at)
+        self._bound = bound
+
+    @property
+    def largest_pulse(self) -> float:
+        """The bound, A."""
+        return self._bound
+
+
+@lru_cache(maxsize=_KEPT)
 def switched_table(
-    at: Sequence[float], levels: Sequence[float], edge: float, initial: float = 0.0
+    at: tuple[float, ...], levels: tuple[float, ...], edge: float, initial: float = 0.0
 ) -> FloatArray:
     """Return the segment table of a switched current, see `Switched`."""
     rows = []
@@ -61,4 +89,6 @@ def switched_table(
         current = level + (current - level) * math.exp(-(start - now) / edge)
         rows.append((start, EXPONENTIAL, following, current - following, 1.0 / edge, 0.0))
         now, level = start, following
-    return table(rows, now + DECAY_TIMES * edge)
+    found = table(rows, now + DECAY_TIMES * edge)
+    found.setflags(write=False)
+    return found
