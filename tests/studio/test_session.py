@@ -120,6 +120,14 @@ def test_questions_are_answered() -> None:
     assert "hendriks-1983" in told["offered"]
 
 
+def test_a_reason_is_no_longer_than_it_can_be_read() -> None:
+    question = {"kind": "drop", "serial": 1, "name": "a.csv", "text": "x" * 100_000}
+    with opened() as (made, page):
+        made.receive(json.dumps(question))
+        (told,) = page.until("refusal")
+    assert len(told["reason"]) == bounds.LONGEST_REASON
+
+
 def test_nothing_is_sent_after_the_end_and_both_threads_end() -> None:
     page = Page()
     made = Session(page.take)

@@ -132,6 +132,10 @@ def test_a_hammer_is_offered_by_name_and_never_read_from_a_path() -> None:
             'format = 1\nname = "a"\n[magnet]\nlaw = "table"\nfile = "t.csv"\n',
             r"magnet\.file names another file",
         ),
+        # These would take minutes to read.
+        ("a." * 150_000 + "b = 1", "without keys of more than 200 dots"),
+        ("x = {" + "a." * 150_000 + "b = 1}", "without keys of more than 200 dots"),
+        ("[" + "a." * 150_000 + "b]", "without keys of more than 200 dots"),
     ],
 )
 def test_a_dropped_file_is_a_hammer_that_names_no_other_file(text: str, reason: str) -> None:

@@ -10,6 +10,12 @@ LARGEST_MESSAGE: Final = 1_000_000
 LARGEST_FILE: Final = 400_000
 """Characters of a dropped file."""
 
+MOST_DOTS: Final = 200
+"""Dots in a key of a dropped file."""
+
+LONGEST_REASON: Final = 500
+"""Characters of the reason why something is refused."""
+
 MOST_PULSES: Final = 64
 """Firings of a drive, and slots of a pattern."""
 

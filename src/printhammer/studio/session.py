@@ -13,6 +13,7 @@ import threading
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
+from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE, LONGEST_REASON
 from printhammer.studio.chart import FULL, PREVIEW, Tried, map_frame, map_key, no_map, try_map
 from printhammer.studio.engine import dots_frame, motion_frame
 from printhammer.studio.frames import frame
@@ -136,7 +137,7 @@ class Session:
         except Exception as error:
             logger.exception("%s, message %d", work.__name__, serial)
             reason = f"this could not be computed, {type(error).__name__}: {error}"
-            self._tell(frame("refusal", serial, reason=reason[:500]))
+            self._tell(refusal(serial, reason))
 
     def _answer(self, serial: int, kind: str, content: Any) -> None:
         self._tell(answer(kind, serial, content, self._shelf))
@@ -148,7 +149,7 @@ class Session:
         try:
             data, motion = motion_frame(state, serial)
         except InputError as error:
-            self._tell(frame("refusal", serial, reason=str(error)))
+            self._tell(refusal(serial, str(error)))
             return
         self._tell(data)
         if "map" in state.views and self._sent.get("preview") != map_key(state):
@@ -229,6 +230,11 @@ class Session:
         self._sent["strobe"] = strobe_key(state)
 
 
+def refusal(serial: int, reason: str) -> bytes:
+    """Return that something is refused, and why."""
+    return frame("refusal", serial, reason=reason[:LONGEST_REASON])
+
+
 def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
     """Read a message: its kind, the serial number of the page, and its content.
 
@@ -237,8 +243,6 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
     ProtocolError
         It is none that the page would send.
     """
-    from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE
-
     if len(text) > LARGEST_MESSAGE:
         raise ProtocolError(f"the message has {len(text)} characters, expected at most {LARGEST_MESSAGE}")
     try:
@@ -282,4 +286,4 @@ def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
             return dropped(serial, *content)
         return frame("texts", serial, texts=texts_of(content))
     except InputError as error:
-        return frame("refusal", serial, reason=str(error))
+        return refusal(serial, str(error))
