@@ -335,14 +335,14 @@ class Controller:
 
     def _ahead(self, choice: Choice, way: IntArray) -> list[Ahead]:
         """Return what some ways lead to."""
-        table = self.table
+        table, rows = self.table, np.arange(len(way))
         columns = (
             table.fire[way],
             table.width[way],
             choice.at("leaves", way),
             table.next_kind[way],
-            choice.at("next_touch", way),
-            choice.at("next_speed", way),
+            choice.next_touch[rows, way],
+            choice.next_speed[rows, way],
         )
         return [Ahead(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 

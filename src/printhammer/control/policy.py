@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from printhammer.control.fronts import MIDDLE, OFFSETS, between_fronts
+from printhammer.control.swing_table import FORCES
 
 if TYPE_CHECKING:
     from printhammer.control.fronts import Fronts
@@ -37,7 +38,6 @@ _STEEPEST: Final = 2e-3
 _FAST: Final = 0.3
 _STEEP: Final = 8.0
 _EFFORT: Final = 0.1
-_ALIKE: Final = 0.005
 
 
 class Done(NamedTuple):
@@ -139,6 +139,8 @@ class Policy:
             What has been done by then, where the throw alone is to be decided.
         """
         choice = Choice(self.fronts, kind, speed, front)
+        if done is not None:
+            choice.settle(done.force)
         later = late[:, np.newaxis] + choice.next_touch - wait[:, np.newaxis]
         cost = self.dot_cost(choice.force, late[:, np.newaxis]) + self.effort(choice.of("release"))
         cost = cost + choice.by_speed(self._doubt)
@@ -154,12 +156,9 @@ class Policy:
                 self.costs(number),
             )
         if done is not None:
-            off = np.abs(choice.force - done.force[:, np.newaxis])
-            open_ways = (self.table.back == done.back[:, np.newaxis]) & (
-                self.table.fire > done.time[:, np.newaxis]
-            )
-            off = np.where(open_ways & np.isfinite(cost), off, np.inf)
-            cost = np.where(off <= off.min(axis=1, keepdims=True) + _ALIKE, cost, np.nan)
+            open_ways = self.table.back == done.back[:, np.newaxis]
+            open_ways &= self.table.fire > done.time[:, np.newaxis]
+            cost = np.where(open_ways, cost, np.inf)
         cost = np.where(np.isnan(cost), np.inf, cost)
         way = np.argmin(cost, axis=1)
         return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice
@@ -230,6 +229,23 @@ class Choice:
         self.force = self.of("force")
         self.next_touch = self.of("next_touch")
         self.next_speed = self.of("next_speed")
+
+    def settle(self, force: FloatArray) -> None:
+        """Replace where the ways lead by where they do after dots (M,) of some force, in parts.
+
+        What belongs to the middle one of the forces of the tables is shifted; the others lead nowhere.
+        """
+        table = self._fronts.table
+        shape = len(self.below), len(np.unique(table.back)), FORCES, -1
+        own = self.force.reshape(shape)
+        apart = own[:, :, -1] - own[:, :, 0]
+        away = force[:, np.newaxis, np.newaxis] - own[:, :, FORCES // 2]
+        for name in ("next_touch", "next_speed"):
+            values = getattr(self, name).reshape(shape)
+            shift = (values[:, :, -1] - values[:, :, 0]) / apart * away
+            settled = np.full_like(values, np.nan)
+            settled[:, :, FORCES // 2] = values[:, :, FORCES // 2] + np.nan_to_num(shift)
+            setattr(self, name, settled.reshape(self.force.shape))
 
     def by_speed(self, values: FloatArray) -> FloatArray:
         """Interpolate an array (T, A) of the nominal hammer to (M, A)."""

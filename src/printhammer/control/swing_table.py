@@ -36,6 +36,9 @@ PUSHED, FREE = 0, 1
 ALWAYS: Final = 2e-3
 """Width of a push that is still on at the next touch, s."""
 
+FORCES: Final = 3
+"""Number of forces for which ways are computed; only the return currents vary more slowly over the ways."""
+
 _PUSHED_SPEEDS: Final = np.linspace(0.3, 1.1, 17)
 _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)
 _RETURNS: Final = (0.0, -0.4, -1.0)
