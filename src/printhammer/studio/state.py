@@ -146,9 +146,8 @@ def dropped_hammer(text: str) -> Hammer:
     """
     # The time to read a key of many dots grows with the square of their number.
     if any(part.count(".") > bounds.MOST_DOTS for part in re.split(r"[\n,=\[\]{}]", text)):
-        raise InputError(
-            f"dropped file: expected a TOML file, without keys of {bounds.MOST_DOTS} dots and more"
-        )
+        most = bounds.MOST_DOTS
+        raise InputError(f"dropped file: expected a TOML file, without keys of more than {most} dots")
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
