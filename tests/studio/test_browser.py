@@ -317,6 +317,18 @@ def test_a_view_that_would_take_too_long_says_so_and_shows_nothing_old(page: Pag
 
 
 @pytest.mark.slow
+def test_rates_that_failed_are_counted_in_the_map(page: Page) -> None:
+    page.run(HELPERS)
+    # So strong a current drives the armature away from where the law of the magnet holds.
+    pulse = {"shape": "half-sine", "amplitude": -90.0, "width": 4e-4, "quantity": "current"}
+    page.run(f"window.studio.studio.store.set({{ waveform: {json.dumps(pulse)} }}); 1")
+    page.wait("window.studio.studio.frames.map.failed === 512")
+    assert "512 of 512 runs failed" in saved(page, ".view-map .leave", "SVG")
+    page.wait("document.querySelector('.status').classList.contains('bad')")
+    assert page.complaints == []
+
+
+@pytest.mark.slow
 def test_two_tabs_are_independent(page: Page, running: Studio, opened_browser: Any) -> None:
     other = opened_browser()
     other.open(running.address + "#rate=700&pulses=2")

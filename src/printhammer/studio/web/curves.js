@@ -2,7 +2,7 @@
 import uPlot from "./vendor/uPlot.js";
 import { axes, before, curve, extent, inside, key, line, MARGIN, ticks, widened } from "./axes.js";
 import { colours, FONT } from "./theme.js";
-import { timeUnit, unitOf } from "./units.js";
+import { digits, timeUnit, unitOf } from "./units.js";
 
 const FORCES = ["total", "magnet", "spring", "damping", "backstop", "pack"];
 const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
@@ -124,7 +124,7 @@ function curveView(body, studio, kind) {
       scale, side, font: FONT, labelFont: FONT, stroke: right && side !== 2 ? (side === 3 ? c.x : c.drive) : c.muted, labelSize: 16, labelGap: 0, gap: 3,
       size: side === 2 ? 18 : 36, label, space: SPACE[side],
       grid: { stroke: c.faint, width: 1, show: side !== 1 }, ticks: { show: false },
-      values: (u, ticks) => ticks.map((tick) => (tick === null ? "" : Number((tick * shownIn(u, si).factor).toPrecision(6)))),
+      values: (u, ticks) => ticks.map((tick) => (tick === null ? "" : digits(Number((tick * shownIn(u, si).factor).toPrecision(6))))),
       splits: (u, _axis, low, high) => splitsOf(low, high, (side === 2 ? u.bbox.width : u.bbox.height) / uPlot.pxRatio, SPACE[side], shownIn(u, si).factor),
       ...(side === 1 ? { filter: (u, splits) => splits.map((value) => (value <= 1.01 * (studio.frames.motion?.peak ?? 0) ? value : null)) } : {}),
     });
@@ -218,7 +218,7 @@ function rightAxis(pen, box, [low, high], peak, { name, si, colour }) {
   pen.textBaseline = "middle";
   for (const tick of ticks(low * unit.factor, high * unit.factor, box.h, 14)) {
     const value = tick / unit.factor;
-    if (value <= 1.01 * peak) pen.fillText(Number(tick.toPrecision(6)), box.x + box.w + 5, box.y + box.h * (1 - (value - low) / (high - low)));
+    if (value <= 1.01 * peak) pen.fillText(digits(Number(tick.toPrecision(6))), box.x + box.w + 5, box.y + box.h * (1 - (value - low) / (high - low)));
   }
   pen.textAlign = "center";
   pen.translate(box.x + box.w + 36, box.y + box.h / 2);

@@ -1,7 +1,7 @@
 // The frequency-time map: colours of displacement, and a cursor that sets the rate.
 import { axes, line, refusal } from "./axes.js";
 import { surface } from "./pen.js";
-import { colours } from "./theme.js";
+import { colours, FONT } from "./theme.js";
 import { shown, timeUnit } from "./units.js";
 
 // Cividis (J. R. Nunez, C. R. Anderton, R. S. Renslow, PLoS ONE 13 (2018) e0199239), every fourth colour.
@@ -87,7 +87,20 @@ export function mapView(body, studio) {
     pen.setLineDash([]);
     pen.strokeStyle = c.muted;
     pen.strokeRect(box.x, box.y, box.w, box.h);
+    if (frame.failed) failures(pen, box, c, frame);
     pen.restore();
+  }
+
+  /** Tell how many rates are grey from somewhere on, and why. */
+  function failures(pen, box, c, { failed, data: { codes } }) {
+    const text = `${failed} of ${codes.shape[0]} runs failed: grey from there`;
+    pen.font = FONT;
+    pen.textAlign = "left";
+    pen.textBaseline = "middle";
+    pen.fillStyle = c.panel;
+    pen.fillRect(box.x + 4, box.y + 4, Math.min(pen.measureText(text).width + 8, box.w - 8), 16);
+    pen.fillStyle = c.ink;
+    pen.fillText(text, box.x + 8, box.y + 12);
   }
 
   const area = surface(body, paint, "Frequency-time map");
