@@ -16,11 +16,13 @@ from tests import hammers
 import printhammer as ph
 from printhammer.control import least_work as module
 from printhammer.control import least_work_search as search
+from printhammer.control.coil_force import CoilForce
 from printhammer.control.least_work import LeastWork, NoBurstError, steepest_rise
 from printhammer.control.least_work_bound import bound
 from printhammer.control.least_work_pulses import PulsePlan, widest
 from printhammer.control.least_work_rates import least_work_rates
-from printhammer.control.least_work_slot import NodeCurrent, SlotState, node_times, outcomes
+from printhammer.control.least_work_search import Task, printing_current
+from printhammer.control.least_work_slot import NodeCurrent, Outcomes, SlotState, node_times, outcomes
 from printhammer.control.least_work_tables import save_least_work
 from printhammer.printing.nominal import nominal
 from printhammer.waveforms import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
@@ -259,6 +261,24 @@ def test_pulses_of_the_hammer_swing_too() -> None:
     assert found.positive_ratio >= found.bound_ratio
     with pytest.raises(ph.InputError, match="no nodes"):
         _ = found.nodes
+
+
+@pytest.mark.parametrize(("lag", "allowed"), [(0.0, True), (1e-10, True), (1e-7, False)])
+def test_a_current_that_lags_in_the_pack_is_none(
+    monkeypatch: pytest.MonkeyPatch, lag: float, allowed: bool
+) -> None:
+    """Also where it costs least: reloaded, the law as printed jumps, and gives back too much."""
+
+    def as_asked(_self: Task, _begin: SlotState, currents: Any, *_rest: float) -> Outcomes:
+        same = np.ones(len(currents))
+        none = np.zeros(len(currents), dtype=np.int64)
+        return Outcomes(same, same, same, 20.0 * same, 5e-4 * same, none, lag * same, none == 0)
+
+    monkeypatch.setattr(Task, "run", as_asked)
+    task = Task(hammers.crude(), CoilForce(hammers.crude(), 2.0), 2.0, 1e4, 20.0, 1e-3, False, 1e-9)
+    begin = SlotState(1e-4, 0.0, -1, 0.0, 0.0)
+    found = printing_current(task, begin, 1e-3, 5e-4, 8)
+    assert (found is not None) == allowed
 
 
 def test_the_widest_pulse_in_closed_form() -> None:

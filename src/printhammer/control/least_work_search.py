@@ -26,6 +26,7 @@ _DIFFERENCE: Final = 1e-5
 _ARRIVAL: Final = 20e-6
 _FORCE: Final = 0.05
 _RELOADING: Final = 1e-6
+_LAGS: Final = 1e-3
 _SLACK: Final = 8e-3
 _LOST: Final = 25.0
 _WRONG: Final = 10.0
@@ -132,9 +133,8 @@ def printing_current(
     def meets(currents: FloatArray) -> bool:
         found = task.run(begin, currents[np.newaxis], duration, task.tolerance)
         missed, above = asked(found)
-        return bool(
-            found.ok[0] and found.extra_contacts[0] == 0 and abs(missed[0]) < 0.05 and above[0] > -_SLACK
-        )
+        clean = found.ok[0] and found.extra_contacts[0] == 0 and found.reloading[0] < _LAGS * _RELOADING
+        return bool(clean and abs(missed[0]) < 0.05 and above[0] > -_SLACK)
 
     if before is not None:
         currents, cost = _descend(task, measured, begin.current, before, duration, _ROUNDS_AGAIN, 2)
