@@ -45,7 +45,6 @@ WINDOW: Final = 120e-6
 _SPEED_ERROR: Final = 0.03
 _PLACE_ERROR: Final = 0.03
 _LAUNCH_ERRORS: Final = (0.005, 0.003)
-_RELAUNCH_ERRORS: Final = (0.015, 0.012)
 _BEFORE: Final = 0.15
 _CONTACT: Final = 1.1
 _ASTRAY: Final = 0.4
@@ -248,13 +247,13 @@ class Controller:
 
     def _expected(self, loop: Loop) -> FloatArray:
         """Return the covariance of displacement, speed and scale that are expected at a touch."""
-        if loop.launched:
+        # Later launches begin with what a landing has left of the motion before.
+        if loop.launched and len(loop.pulses) == 1:
             start = self.start
             slope = np.array([start.place_slope, start.speed_slope, 1.0])
-            # A launch from rest differs by what the scale of the currents makes of it; after a landing
-            # something is left of the motion before.
-            place, speed = _LAUNCH_ERRORS if len(loop.pulses) == 1 else _RELAUNCH_ERRORS
+            place, speed = _LAUNCH_ERRORS
             errors = np.array([place * self.stroke, speed, 0.0])
+            # The first one differs by what the scale of the currents makes of it.
             return np.outer(slope, slope) * loop.learned.scale_error**2 + np.diag(errors**2)
         return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
