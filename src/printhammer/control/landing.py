@@ -143,4 +143,4 @@ def _left(
     # An armature that hovers between backstop and pack is slow too, but not at rest.
     away = np.abs(result.strobes.x - rest_state(hammer)) / (_FALL * scale)
     found = np.maximum(np.abs(result.strobes.v), away).max(axis=1)
-    return np.where(good & np.isfinite(found), found, np.inf).reshape(tried.shape[:2])
+    return np.where(good, found, np.inf).reshape(tried.shape[:2])
