@@ -228,3 +228,19 @@ def test_forces_as_drives() -> None:
     drives = [drive for name, drive in hammers.drives("force").items() if name != "sine"]
     drives += [ph.SineForce(12.0, rate, 0.4) for rate in np.linspace(400.0, 2000.0, 20)]
     agree(*both(Ensemble(hammers.shelf(), drives, 1e-3, states=(STOP + 2e-5, 0.0))))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"magnet.Bm": 9.4e7}, {"magnet.Bm": 5.9, "pack.stiffness": 3.5e10}, {"waveform.amplitude": "-330 A"}],
+    ids=["magnet", "magnet and pack", "current"],
+)
+def test_where_a_law_runs_away_the_plain_kernel_tells(hammer: ph.Hammer, change: dict[str, Any]) -> None:
+    """Its steps become short without end: such a member leaves the lanes instead of taking fifty million."""
+    mad = hammer.replace(change)
+    trains = [ph.PulseTrain(one.waveform, rate=500.0, pulses=9) for one in (hammer, mad)]
+    mine, plain = both(Ensemble([hammer, mad], trains, 20e-3, tolerance=1e-6))
+    assert mine.ok[0]
+    assert not mine.ok[1]
+    np.testing.assert_array_equal(mine.status, plain.status)
+    np.testing.assert_array_equal(mine.steps[1], plain.steps[1])

@@ -13,6 +13,13 @@ BLOCK = 16
 MOST_STEPS = 5e7
 """Steps after which a member leaves the lanes."""
 
+MANY_STEPS, SHORT = 2e4, 1e-9
+"""Steps after which a member leaves the lanes whose steps have become short, in parts of the time since 0.
+
+Where a law runs away, steps become shorter and shorter without ever becoming too short; the plain kernel
+knows what becomes of it.
+"""
+
 STILL = 1e-8
 """Acceleration, in typical speeds over typical times, at which a member about to rest leaves the lanes."""
 
