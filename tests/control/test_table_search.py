@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from tests.control.test_table_tuning import RATE, SLOTS, quick
 
 import printhammer as ph
-from printhammer.control import table_search, table_tuning
+from printhammer.control import table_search, table_tuning, table_ways
 from printhammer.control.table_polish import Work
-from printhammer.control.table_search import Ways
+from printhammer.control.table_ways import Ways
 from printhammer.printing.nominal import nominal
 from printhammer.printing.perturbation import perturbed
 
@@ -65,10 +65,10 @@ def test_the_cost_is_that_of_the_worst_dot_of_a_row(work: Work, found: Ways) -> 
     plain = found.some(found.brake == 0.0)
     best = int(np.argmin(plain.cost))
     single = nominal(quick(), tolerance=TOLERANCE)
-    drive = row_of(plain, best, table_search.ROW)
+    drive = row_of(plain, best, table_ways.ROW)
     worst = 0.0
     for factor, hammer in [
-        (table_search.NOMINAL, quick()),
+        (table_ways.NOMINAL, quick()),
         *((1.0, perturbed(quick(), by)) for by in table_tuning.SPREAD),
     ]:
         for number, dot in enumerate(ph.simulate(hammer, drive, tolerance=TOLERANCE).dots):
@@ -100,9 +100,9 @@ def test_nothing_is_fired_while_the_armature_is_in_the_pack() -> None:
 
 def test_pulses_that_do_not_fit_are_never_run(work: Work) -> None:
     early = work.single.left - 1e-6
-    ways = table_search.ways_of([(PERIOD, 0.0, 0.0, early, 150e-6)])
-    assert not table_search.fits(work, ways).any()
-    assert np.isinf(table_search.costs(work, ways)).all()
+    ways = table_ways.ways_of([(PERIOD, 0.0, 0.0, early, 150e-6)])
+    assert not table_ways.fits(work, ways).any()
+    assert np.isinf(table_ways.costs(work, ways)).all()
 
 
 @given(st.tuples(number, number, number, number), number, number)
@@ -113,7 +113,7 @@ def test_a_step_solves_two_equations_or_keeps_to_the_bounds(
     matrix = np.array(slopes).reshape(1, 2, 2) * 1e4 + np.diag([2e4, 2e4])
     off = 0.1 * np.array([[force, arrival]])
     bound = np.array([3e-6])
-    later, wider = table_search._changes(matrix, off, -bound, bound)[0]
+    later, wider = table_ways._changes(matrix, off, -bound, bound)[0]
     assert abs(wider) <= bound[0]
     exact = -np.linalg.solve(matrix[0], off[0])
     if abs(exact[1]) < 0.9 * bound[0]:
@@ -167,4 +167,4 @@ def test_pulses_keep_to_their_bounds_also_where_it_is_looked_closely(
     assert max(some.brake.max(initial=0.0) for some in kept) == work.widest
     assert max(some.width.max(initial=0.0) for some in kept) <= work.widest
     brakes = np.concatenate([some.delay[some.brake > 0.0] for some in kept])
-    assert brakes.min() >= table_search.brake_from(work)
+    assert brakes.min() >= table_ways.brake_from(work)

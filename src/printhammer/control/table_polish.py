@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.control.histories import REST, History, histories, histories_of, number_of, pattern_of, plain
 from printhammer.control.table import COLUMNS, Settings
 from printhammer.control.table_drive import pulses_of, sequence
-from printhammer.control.table_search import earliest, latest
+from printhammer.control.table_ways import earliest, latest
 from printhammer.ensemble import Ensemble
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ import numpy as np
 from printhammer.control.histories import REST, number_of, shared_numbers
 from printhammer.control.table import COLUMNS, CompensationTable
 from printhammer.control.table_polish import VALUES, Work, level_of, look_at, polish
-from printhammer.control.table_search import BAD, costs, searched, solved, ways_of
+from printhammer.control.table_search import BAD, searched
+from printhammer.control.table_ways import costs, solved, ways_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
