@@ -65,12 +65,12 @@ def plot(found: LeastWork) -> Figure:
         current.axhline(bound, color=MUTED, lw=HAIR, ls=(0, (4, 3)))
     span = 1.15 * found.largest
     current.set_ylim(min(1.15 * float(run.current.min()), -0.2 * span), span)
-    current.set_ylabel("Current (A)")
+    current.set_ylabel("Current  [A]")
     watts = coil_power(found.hammer, run.x, run.v, run.force["magnet"])
     power.fill_between(time, np.maximum(watts, 0.0), 0.0, color=ORANGE, lw=0.0, gid="given")
     power.fill_between(time, np.minimum(watts, 0.0), 0.0, color=GREEN, lw=0.0, gid="taken back")
-    power.set_ylabel("Coil power (W)")
-    power.set_xlabel("Time (ms)")
+    power.set_ylabel("Coil power  [W]")
+    power.set_xlabel("Time  [ms]")
     last = min((1.0 + _AFTER) * found.rest_time, run.end)
     motion.set_xlim(0.0, float(_ms(np.array([last]))[0]))
     for ax in (motion, current):
@@ -104,7 +104,7 @@ def _motion(ax: Axes, found: LeastWork) -> None:
             color=MUTED,
         )
     ax.set_ylim(low - room, top)
-    ax.set_ylabel("Displacement (µm)")
+    ax.set_ylabel("Displacement  [µm]")
     ax.set_title(
         f"{len(found.contacts)} dots at {found.rate:.6g} Hz, force over that of a single pulse",
         loc="left",

@@ -55,7 +55,7 @@ def plot(found: Feedback) -> Figure:
     grid = figure.add_gridspec(2, 2)
     above = [figure.add_subplot(grid[0, column]) for column in range(2)]
     below = [figure.add_subplot(grid[1, column]) for column in range(2)]
-    units = (("Force off (%)", 100.0), ("Arrival off (µs)", from_si(1.0, "s", "us")))
+    units = (("Force off  [%]", 100.0), ("Arrival off  [µs]", from_si(1.0, "s", "us")))
     limits = (found.limits.force, found.limits.arrival)
     for column, ((name, factor), limit) in enumerate(zip(units, limits, strict=True)):
         values = (found.force, found.arrival)[column] * factor
@@ -64,11 +64,12 @@ def plot(found: Feedback) -> Figure:
         above[column].set_xlabel(name)
         _by_gap(below[column], found, pairs, limit * factor)
         below[column].set_ylabel(name)
-        below[column].set_xlabel("Time between two slots (ms)")
+        below[column].set_xlabel("Time between two slots  [ms]")
     above[0].set_ylabel("Share of the dots")
     above[0].set_title(
         f"All dots of the patterns of eight slots at {found.rate:.6g} Hz", loc="left", fontsize=SMALL
     )
+    above[1].set_title("what is farther off: at the ends", loc="right", fontsize=SMALL)
     below[0].set_title("The second of two dots", loc="left", fontsize=SMALL)
     # Room for the legend above the bars.
     above[1].set_ylim(0.0, (1.1 + 0.14 * len(found.strategies)) * above[1].get_ylim()[1])

@@ -76,7 +76,7 @@ def plot(found: Feedback) -> Figure:
         gid="due",
     )
     panel.set_ylim(low - room, high + 2.0 * room)
-    panel.set_ylabel("Displacement (µm)")
+    panel.set_ylabel("Displacement  [µm]")
     panel.set_title(
         f"Slots {found.seen.pattern} at {found.rate:.6g} Hz with feedback", loc="left", fontsize=SMALL
     )
@@ -86,8 +86,8 @@ def plot(found: Feedback) -> Figure:
     for bound in (-found.driver.current, found.driver.current):
         strip.axhline(bound, color=MUTED, lw=HAIR, ls=(0, (4, 3)))
     strip.set_ylim(-1.2 * found.driver.current, 1.2 * found.driver.current)
-    strip.set_ylabel("Current (A)")
-    strip.set_xlabel("Time (ms)")
+    strip.set_ylabel("Current  [A]")
+    strip.set_xlabel("Time  [ms]")
     first, last = float(found.seen.due[0]), float(found.seen.due[-1])
     span = found.single.flight_time
     panel.set_xlim(ms * (first - 1.3 * span), ms * min(last + 3.0 * span, float(np.max(run.t))))

@@ -190,6 +190,7 @@ def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
     for row, colour, style in zip(values, (ORANGE, BLUE), ("--", "-"), strict=True):
         known = np.clip(row[~np.isnan(row)], edges[0], edges[-1])
         ax.hist(known, bins=edges.tolist(), histtype="step", color=colour, ls=style, lw=THIN)
+    ax.set_title("what is farther off: at the ends", loc="right", fontsize=TINY)
     ax.set_yscale("log")
     ax.set_xlabel(name)
     ax.set_ylabel("Dots of the cycle")
