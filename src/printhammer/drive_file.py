@@ -29,7 +29,7 @@ waveforms of a sequence are the tables ``[waveforms.print]``, ``[waveforms.soft]
 waveform are ``shape`` and the constants of the shape; a sampled one names a CSV file (``file``, relative to
 the drive file) or holds the samples as ``time`` and ``current`` or ``force``, each ``{ values = [...], unit =
 "us" }``; one of the shape "chain" has ``parts``, a list of waveforms, each with its offset ``at`` from the
-firing.
+firing; one of the shape "switched" lists times ``at``, ``levels``, and the time constant of its ``edge``.
 Every quantity is written with its unit, as a string or as ``{ value = 1.2, unit = "kHz" }``.
 """
 
@@ -47,7 +47,7 @@ from printhammer.drive_sequence import PulseSequence
 from printhammer.drive_text import FORMAT
 from printhammer.errors import InputError
 from printhammer.waveform_base import QUANTITY_UNITS, Waveform
-from printhammer.waveforms import SHAPES, Chain, Sampled
+from printhammer.waveforms import SHAPES, Chain, Sampled, Switched
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -273,13 +273,15 @@ def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]
 
 def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
     shape = table.get("shape")
-    known: dict[str, type[Waveform]] = {**SHAPES, Chain.shape: Chain}
+    known: dict[str, type[Waveform]] = {**SHAPES, Chain.shape: Chain, Switched.shape: Switched}
     if not isinstance(shape, str) or shape not in known:
         raise InputError(f"{where}.shape = {shown(shape)} is expected to be one of {', '.join(known)}")
     model = known[shape]
     data = {key: value for key, value in table.items() if key != "shape"}
     if model is Chain:
         return _chain(data, folder, where)
+    if model is Switched:
+        return _switched(data, where)
     if model is Sampled and "file" not in data:
         return _samples(data, where)
     notes = quantities(model)
@@ -314,6 +316,35 @@ def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
         return Chain(parts=parts)
     except InputError as error:
         raise InputError(f"{where}.{error}") from None
+
+
+def _switched(data: dict[str, Any], where: str) -> Switched:
+    """Read a switched waveform; the unit of its levels decides what is driven."""
+    _known(data, {"at", "levels", "edge", "initial"}, where)
+    _required(data, ("at", "levels", "edge"), where)
+    levels, refused = None, None
+    for si, driven in QUANTITY_UNITS.items():
+        try:
+            levels, unit, quantity = _column(data["levels"], si, f"{where}.levels"), si, driven
+            break
+        except InputError as error:
+            refused = refused or error
+    if levels is None:
+        assert refused is not None
+        raise refused
+    fields: dict[str, Any] = {
+        "at": tuple(_column(data["at"], "s", f"{where}.at")),
+        "levels": tuple(levels),
+        "edge": _quantity(data["edge"], ("s",), f"{where}.edge")[0],
+        "quantity": quantity,
+    }
+    if "initial" in data:
+        fields["initial"] = _quantity(data["initial"], (unit,), f"{where}.initial")[0]
+    try:
+        return Switched.model_validate(fields)
+    except ValidationError as error:
+        told = sentence(error, Switched, f"{where}.")
+        raise InputError(told if told.startswith(where) else f"{where}.{told}") from None
 
 
 def _samples(data: dict[str, Any], where: str) -> Waveform:

@@ -10,7 +10,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from printhammer.constants import quantities
-from printhammer.waveforms import Chain, Sampled
+from printhammer.waveforms import Chain, Sampled, Switched
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -46,6 +46,9 @@ def waveform_text(waveform: Waveform) -> dict[str, Any]:
         result["time"] = column_text(waveform.times, "s")
         result[waveform.quantity] = column_text(waveform.values, waveform.unit)
         return result
+    if isinstance(waveform, Switched):
+        result["at"] = column_text(waveform.at, "s")
+        result["levels"] = column_text(waveform.levels, waveform.unit)
     for name, note in quantities(type(waveform)).items():
         result[name] = quantity_text(getattr(waveform, name), waveform.unit if note.also else note.si)
     return result

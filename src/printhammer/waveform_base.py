@@ -18,6 +18,9 @@ QuantityName = Literal["current", "force"]
 QUANTITY_UNITS: Final[dict[str, QuantityName]] = {"A": "current", "N": "force"}
 """What a waveform drives, by the SI unit of its amplitude."""
 
+DECAY_TIMES: Final = 27.6310211159
+"""Number of decay time constants after which a decaying current is zero by definition: 1e-12 is left then."""
+
 
 class Waveform(BaseModel):
     """What one fired pulse does, as a function of tau, the time since its firing.

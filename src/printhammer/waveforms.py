@@ -12,9 +12,10 @@ from typing import ClassVar, Final, Self
 
 from printhammer.constants import quantity
 from printhammer.segments import EXPONENTIAL, POLYNOMIAL, SINE, FloatArray, table
-from printhammer.waveform_base import QUANTITY_UNITS, QuantityName, Waveform
+from printhammer.waveform_base import DECAY_TIMES, QUANTITY_UNITS, QuantityName, Waveform
 from printhammer.waveform_chain import Chain
 from printhammer.waveform_sampled import Sampled
+from printhammer.waveform_switched import Switched
 
 __all__ = [
     "DECAY_TIMES",
@@ -26,12 +27,10 @@ __all__ = [
     "Rectangle",
     "Sampled",
     "Sine",
+    "Switched",
     "Trapezoid",
     "Waveform",
 ]
-
-DECAY_TIMES: Final = 27.6310211159
-"""Number of decay time constants after which a decaying current is zero by definition: 1e-12 is left then."""
 
 
 def _rate(time_constant: float) -> float:

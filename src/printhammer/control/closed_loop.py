@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.control.bounded import BoundedSequence
 from printhammer.control.learning import Learned, Touched
 from printhammer.control.sensor import run_key
-from printhammer.control.switched import BoundedSequence, Switched
 from printhammer.drive_sequence import PulseSequence
 from printhammer.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 from printhammer.equilibrium import rest_state
 from printhammer.printing.slots import slot_times
+from printhammer.waveforms import Switched
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

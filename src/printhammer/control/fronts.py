@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.control.bounded import BoundedSequence
 from printhammer.control.landing import landing
 from printhammer.control.swing_table import AHEAD, first_pulse, force_map, swing_table
-from printhammer.control.switched import BoundedSequence
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.printing.perturbation import Perturbation, perturbed
 

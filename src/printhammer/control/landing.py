@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.control.bounded import BoundedSequence
 from printhammer.control.swing_table import AHEAD, PUSHED
-from printhammer.control.switched import BoundedSequence, Switched
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.equilibrium import rest_state
+from printhammer.waveforms import Switched
 
 if TYPE_CHECKING:
     from printhammer.control.driver import Driver

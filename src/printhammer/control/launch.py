@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.swing_table import AHEAD, FREE
-from printhammer.control.switched import Switched
 from printhammer.drive_sequence import PulseSequence
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.errors import InputError
+from printhammer.waveforms import Switched
 
 if TYPE_CHECKING:
     from printhammer.control.driver import Driver

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.switched import BoundedSequence, Switched
+from printhammer.control.bounded import BoundedSequence
 from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.waveforms import Switched
 
 if TYPE_CHECKING:
     import numpy.typing as npt
