@@ -15,6 +15,7 @@ from printhammer.control.driver import driver_of
 from printhammer.control.feedback import Feedback, FeedbackStrategy
 from printhammer.control.learning import FRONT_ERROR, SCALE_ERROR
 from printhammer.control.sensor import PositionSensor
+from printhammer.drive_file import read_drive
 from printhammer.printing.limits import Limits
 from printhammer.printing.perturbation import Perturbation, perturbed
 from printhammer.printing.trial import Case, attempt
@@ -130,6 +131,10 @@ def test_the_comparison(controller: Controller, monkeypatch: pytest.MonkeyPatch,
         assert np.array_equal(read["arrival"].values, found.arrival, equal_nan=True)
     with pytest.raises(ph.InputError, match=r"ends in \.nc"):
         save_feedback(found, tmp_path / "found.csv")
+    again = read_drive(found.seen.motion.drive.to_toml())
+    assert again == found.seen.motion.drive
+    forces = [dot.peak_force for dot in ph.simulate(found.driven, again).dots]
+    assert forces == pytest.approx([dot.peak_force for dot in found.seen.motion.dots], rel=1e-3)
     figure = found.plot()
     assert [line.get_gid() for line in figure.axes[2].get_lines()][:2] == ["open loop", "feedback"]
     run = found.plot_run()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 EXAMPLE: Final = "Example: printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png"
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
+_DOTS: Final = 200.0
 _RUN: Final = "The run that is shown"
 
 
@@ -70,7 +70,7 @@ def feedback(
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="Picture of one run (.svg, .png, .pdf); may be given repeatedly.",
+            help="Picture of one run (.svg, .png, .pdf), or its drive (.toml); may be given repeatedly.",
             rich_help_panel=_RUN,
         ),
     ] = None,
@@ -81,18 +81,17 @@ def feedback(
     """
     from rich.markup import escape
 
+    from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.control.feedback import feedback as compared
     from printhammer.control.feedback_tables import save_feedback
+    from printhammer.drive_file import save_drive
     from printhammer.drive_input import read_number, read_positive
-    from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
 
     wanted, shown = out or [], run or []
-    for name, paths, known in (("--out", wanted, (".nc", *_PICTURES)), ("--run", shown, _PICTURES)):
-        for path in paths:
-            if path.suffix.lower() not in known:
-                raise InputError(f"{name} {path}: expected a name that ends in one of {', '.join(known)}")
+    check_endings(wanted, (".nc", *PICTURES))
+    check_endings(shown, (".toml", *PICTURES), "--run")
     check_outputs([*wanted, *shown], [Path(hammer)] if table is None else [Path(hammer), table])
     sensor = {
         "noise": number(noise, "noise"),
@@ -124,15 +123,8 @@ def feedback(
     screen = console()
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}\n")
     screen.print(told(found, units))
-    for path in wanted:
-        if path.suffix.lower() in _PICTURES:
-            _draw(found.plot(), path)
-        else:
-            save_feedback(found, path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
-    for path in shown:
-        _draw(found.plot_run(), path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    write_found(screen, wanted, found.plot, partial(save_feedback, found), dpi=_DOTS)
+    write_found(screen, shown, found.plot_run, partial(save_drive, found.seen.motion.drive), dpi=_DOTS)
     bad = int((~found.passed[-1]).sum())
     if bad:
         complain(f"{bad} of {found.passed.shape[1]} patterns are not printed within limits with feedback")
@@ -212,11 +204,3 @@ def _computed(compute: Callable[[], Feedback]) -> Feedback:
 
     with Console(stderr=True).status("tables, closed loops, comparisons"):
         return compute()
-
-
-def _draw(figure: Any, path: Path) -> None:
-    from printhammer.outputs import write_file
-
-    buffer = BytesIO()
-    figure.savefig(buffer, format=path.suffix[1:].lower(), dpi=200.0)
-    write_file(path, buffer.getvalue())

@@ -1,0 +1,105 @@
+"""Set three ways to drive a hammer side by side: open loop, a compensation table, feedback.
+
+Run it with ``.venv/bin/python docs/measure/ways.py [HAMMER] [--rate RATE] [--picture FILE]``. It prints how
+good a page of several lines is at each rate, and how far the second of two dots is off at all distances, and
+draws the first line of the page, printed in each way at the last rate. It takes a few minutes.
+"""
+
+import argparse
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+import printhammer as ph
+from printhammer.control.controller import Controller
+from printhammer.control.driver import driver_of
+from printhammer.control.feedback import Feedback, FeedbackStrategy
+from printhammer.printing.page import Page
+from printhammer.printing.strategy import Strategy, open_loop
+
+RATES = ("1 kHz", "1.3 kHz", "1.6 kHz")
+TEXT = "The quick brown fox\njumps over the lazy dog\n0123456789 !?"
+LINE = "Bounce and chaos 1983"
+
+
+def ways_at(hammer: ph.Hammer, rate: str, controller: Controller) -> list[Strategy]:
+    """Return the three ways to drive; the table is tuned for the rate."""
+    table = ph.tune(hammer, rate=rate, history=2)
+    return [open_loop, table.strategy(hammer), FeedbackStrategy(controller)]
+
+
+def page_row(page: Page) -> str:
+    """Return how good a page is, a row of a table."""
+    on = page.printed
+    force, place = 100.0 * (page.force_ratio[on] - 1.0), 1e6 * page.placement_error[on]
+    return (
+        f"| {page.rate:.0f} | {page.strategy} | {page.line.size} | {int(page.lost.sum())} |"
+        f" {int(page.good.sum())} | {force.min():+.1f} to {force.max():+.1f} |"
+        f" {np.std(place):.1f}, worst {np.abs(place).max():.1f} |"
+    )
+
+
+def pair_rows(found: Feedback) -> list[str]:
+    """Return how far the second of two dots is off, a row for each way."""
+    rows = []
+    for number, name in enumerate(found.strategies):
+        force, arrival = found.gap_force[number], found.gap_arrival[number]
+        known = np.isfinite(force)
+        good = (np.abs(force) <= found.limits.force) & (np.abs(arrival) <= found.limits.arrival)
+        off, late = 100.0 * force[known], 1e6 * arrival[known]
+        rows.append(
+            f"| {name} | {good.sum()} of {good.size} | {off.min():+.1f} to {off.max():+.1f} |"
+            f" {late.min():+.0f} to {late.max():+.0f} |"
+        )
+    return rows
+
+
+def picture(pages: list[Page], path: Path) -> None:
+    """Draw the same line printed in each way, one below the other."""
+    from matplotlib.figure import Figure
+    from matplotlib.image import imread
+
+    figure = Figure(figsize=(7.6, 1.0 * len(pages)), layout="constrained")
+    for ax, page in zip(figure.subplots(len(pages)), pages, strict=True):
+        sheet = BytesIO()
+        page.plot(view="sheet").savefig(sheet, format="png", dpi=300)
+        sheet.seek(0)
+        ax.imshow(imread(sheet), interpolation="antialiased")
+        ax.axis("off")
+        told = f"{page.strategy}: {int(page.good.sum())} of {page.line.size} dots within limits"
+        ax.set_title(f"{page.rate:.0f} Hz, {told}", loc="left", fontsize=8)
+    figure.savefig(path, dpi=160)
+
+
+def main() -> None:
+    """Read the arguments, print the tables, draw the picture."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("hammer", nargs="?", default="hendriks-1983")
+    parser.add_argument("--rate", action="append", dest="rates")
+    parser.add_argument("--picture", type=Path)
+    given = parser.parse_args()
+    hammer = ph.load(given.hammer)
+    controller = Controller(hammer, driver_of(hammer))
+    print("| rate, Hz | | dots | lost | within limits | force, % | placement, µm |")
+    print("|---|---|---|---|---|---|---|")
+    for rate in given.rates or RATES:
+        ways = ways_at(hammer, rate, controller)
+        for way in ways:
+            print(page_row(ph.print_page(hammer, TEXT, rate, strategy=way)), flush=True)
+    if given.picture is not None:
+        picture([ph.print_page(hammer, LINE, rate, strategy=way) for way in ways], given.picture)
+    table = ph.tune(hammer, history=1)
+    found = ph.feedback(
+        hammer,
+        table.rates[-1],
+        beside=[table.strategy(hammer)],
+        gaps=np.arange(1.0 / table.rates[-1], 3e-3, 40e-6),
+    )
+    print(f"\nTwo dots, {1e3 * found.gaps[0]:.2f} to {1e3 * found.gaps[-1]:.2f} ms from slot to slot\n")
+    print("| | within limits | force, % | arrival, µs |\n|---|---|---|---|")
+    print("\n".join(pair_rows(found)))
+
+
+if __name__ == "__main__":
+    main()
