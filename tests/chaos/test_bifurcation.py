@@ -94,7 +94,9 @@ def test_strands_lead_where_a_strict_carrying_does(
 ) -> None:
     # In the middle rising and falling values lead to different orbits of period 1.
     periods = [859, 860, 861, 864, 865, 866, 867, 868, 871, 872, 873, 874]
-    options = {"periods": 1e-6 * np.array(periods), "direction": "both", "refine": 0}
+    # Some of them settle slowly.
+    settled = {"firings": 500, "transient": 300}
+    options = {"periods": 1e-6 * np.array(periods), "direction": "both", "refine": 0, **settled}
     monkeypatch.setattr(bifurcation_carry, "STRAND", 1000)
     strict = ph.bifurcation(hammer, **options)
     assert strict.carried == 0

@@ -13,7 +13,7 @@ BLOCK = 16
 MOST_STEPS = 5e7
 """Steps after which a member leaves the lanes."""
 
-MANY_STEPS, SHORT = 2e4, 1e-9
+MANY_STEPS, SHORT = 2e4, 1e-12
 """Steps after which a member leaves the lanes whose steps have become short, in parts of the time since 0.
 
 Where a law runs away, steps become shorter and shorter without ever becoming too short; the plain kernel
