@@ -18,6 +18,8 @@ PAGES = sorted(path for path in DOCS.rglob("*.md") if "gallery" not in path.part
 NAMED = re.compile(r"`((?:src|tests|docs|examples|benchmarks)/[\w./*-]+?)(?:::(\w+))?`")
 LINKED = re.compile(r"\]\((?!https?:|#)([^)#]+)(?:#[^)]*)?\)")
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+# Scripts of the gallery that are run here; each is run on its own by another test.
+SHOWN = r"(single_pulse|printed_line|brake_pulse)\.py$"
 EXTERNAL = re.compile(r"(?:https?:)?//")
 
 
@@ -120,6 +122,8 @@ def test_the_documentation_builds_and_fetches_nothing_from_elsewhere(tmp_path: P
         "html",
         "-d",
         str(tmp_path / "doctrees"),
+        "-D",
+        f"sphinx_gallery_conf.filename_pattern={SHOWN}",
         str(DOCS),
         str(out),
     ]

@@ -175,8 +175,8 @@ def test_there_are_no_gaps(members: Members, engine: Any, tolerance: float) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10, 30))
-def test_ten_thousand_members(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(10, 18))
+def test_thousands_of_members(seed: int) -> None:
     """Other members, more hammers, more that leave the lanes: halves in any order, in two threads."""
     some = Members(seed, 500, kinds=12, strange=seed % 4)
     for tolerance in (2e-11, DISPLAY_TOLERANCE):

@@ -114,13 +114,13 @@ def test_the_space_is_told(judged: list[tuple[float, tuple[str, ...], bool]]) ->
 
 
 @pytest.mark.slow
-def test_random_hammers_judged() -> None:
-    table = base_rates(3, 1, slow=0)
+def test_a_random_hammer_judged() -> None:
+    table = base_rates(1, 1, slow=0)
     BaseRates.model_validate(table)
     for name, entry in table["claims"].items():
         assert 0 <= entry["holds"] <= entry["measured"]
-        assert entry["measured"] == (0 if name in SLOW else 3)
+        assert entry["measured"] == (0 if name in SLOW else 1)
     # By choice of the space: the paper's geometry, and its print force.
-    assert table["claims"]["geometry"]["holds"] == 3
-    assert table["claims"]["print_force"]["holds"] == 3
-    assert table == base_rates(3, 1, slow=0)
+    assert table["claims"]["geometry"]["holds"] == 1
+    assert table["claims"]["print_force"]["holds"] == 1
+    assert table == base_rates(1, 1, slow=0)
