@@ -87,6 +87,7 @@ def test_the_best_way_comes_first_of_those_without_and_of_those_with_a_brake_pul
     assert np.isfinite(found.cost).all()
 
 
+@pytest.mark.slow
 def test_nothing_is_fired_while_the_armature_is_in_the_pack() -> None:
     hammer = quick()
     table = ph.tune(hammer, rate=2100.0, history=1)

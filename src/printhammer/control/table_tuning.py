@@ -48,6 +48,8 @@ SPREAD: Final = (
 """By how much the hammers differ that a robust table is tuned on, beside the hammer itself."""
 
 _USABLE: Final = 0.9
+_POOR: Final = 0.5
+_AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)
 
 
 def tune(
@@ -146,6 +148,8 @@ def tune(
         threads=threads,
     )
     work = _tuned(blank, grid, brake, steps, open_ended=asked is None)
+    if asked is not None:
+        _tune_again(work, blank, brake, steps)
     lost = np.flatnonzero(~np.isfinite(work.deviation.max(axis=1)))
     if asked is None:
         work = refined(subset(work, np.arange(_kept(work))), largest, steps, brake=brake)
@@ -194,8 +198,25 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
     return found
 
 
+def _tune_again(work: Work, blank: Work, brake: bool, steps: Callable[[], None]) -> None:
+    """Tune rates once more that are not good enough, with ways from times around theirs; changes the rows."""
+    poor = np.flatnonzero(~(work.deviation.max(axis=1) <= _POOR))
+    if not poor.size:
+        return
+    again = _tuned(blank, work.rates[poor], brake, steps, open_ended=False, around=_AROUND)
+    better = again.deviation.max(axis=1) < work.deviation[poor].max(axis=1)
+    for name in VALUES:
+        getattr(work, name)[poor[better]] = getattr(again, name)[better]
+
+
 def _tuned(
-    blank: Work, rates: FloatArray, brake: bool, steps: Callable[[], None], *, open_ended: bool
+    blank: Work,
+    rates: FloatArray,
+    brake: bool,
+    steps: Callable[[], None],
+    *,
+    open_ended: bool,
+    around: FloatArray | None = None,
 ) -> Work:
     """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
 
@@ -211,6 +232,8 @@ def _tuned(
         Called after each step of the work.
     open_ended : bool
         Whether rates at which nothing comes near are left out.
+    around : array, optional
+        How far from the times between dots ways are looked for as well, s.
     """
     own: Any = blank.pulse
     shape = rates.size, entries_of(blank.gaps, blank.reach)
@@ -219,6 +242,10 @@ def _tuned(
     work.width[:] = own.width
     every = np.arange(1, work.reach + 1) / rates[:, np.newaxis]
     periods = _periods(rates, work.reach, work.single)
+    if around is not None:
+        others = (periods[:, np.newaxis] + around).ravel()
+        longest, shortest = work.single.settled, periods.min(initial=np.inf) + around.min()
+        periods = np.unique([*periods, *others[(others <= longest) & (others > max(shortest, 0.0))]])
     there, ways = chosen(work, periods, brake=brake, told=steps)
     for gap, columns in _columns(work).items():
         for row, period in enumerate(every[:, gap - 1].tolist()):
