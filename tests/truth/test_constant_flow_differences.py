@@ -113,7 +113,6 @@ def test_quantities_with_firing_times_of_their_own() -> None:
 
 
 PARTS = [
-    ("inverse-root", "linear", "dashpot", "hertz", "half-sine"),
     ("", "preload", "dashpot-pull", "elastomer", "trapezoid"),
     ("inverse-root", "linear", "power", "rigid", "single"),
     ("", "linear", "power", "hertz-no-pull", "half-sine"),
