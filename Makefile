@@ -33,7 +33,7 @@ test-fast: $(INSTALLED) ## the fast tests alone
 	$(BIN)/python -m pytest -n $(WORKERS)
 
 test-slow: $(INSTALLED) ## the slow tests alone
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup -m slow
+	$(BIN)/python -m pytest -n $(WORKERS) -m slow
 
 test-all: test test-slow ## everything
 

@@ -25,9 +25,6 @@ RATE = 1600.0
 HAMMER = Path(__file__).parent.parent / "data" / "bucked.toml"
 """A hammer of its own, since what a controller can do depends on the hammer."""
 
-# Making the controller takes longer than all tests: one worker runs them.
-pytestmark = pytest.mark.xdist_group("feedback")
-
 PATTERNS = [(0, 1, 2, 3), (0, 2, 3), (0, 1, 4)]
 PERFECT = PositionSensor(noise=0.0, step=0.0)
 
