@@ -42,7 +42,7 @@ _SCALE_DRIFT: Final = 0.002
 _FARTHEST: Final = 5.0
 _MODEL_ERROR: Final = 0.003
 _GRID: Final = 1.0 / 128.0
-_FRONT_STEP: Final = 0.03
+_FRONT_STEPS: Final = 4
 _SCALE_STEP: Final = 0.03
 _PLACE_STEP: Final = 0.005
 _SPEED_STEP: Final = 0.02
@@ -147,7 +147,7 @@ class Contacts:
         touches = [loop.touched for loop in loops if loop.touched is not None]
         places = [round(loop.learned.front / _GRID) for loop in loops]
         base = np.array([touched.state for touched in touches])
-        steps = np.array([_PLACE_STEP * self._stroke, _SPEED_STEP, _FRONT_STEP, _SCALE_STEP])
+        steps = np.array([_PLACE_STEP * self._stroke, _SPEED_STEP, _FRONT_STEPS * _GRID, _SCALE_STEP])
         runs = self._runs(loops, touches, places, steps, times, used, threads)
         counts = (used > 0.0) & np.isfinite(runs).all(axis=0)
         runs = np.where(counts, runs, 0.0)
@@ -190,13 +190,11 @@ class Contacts:
     ) -> FloatArray:
         """Return the displacements of the nominal hammer, and of those that differ, (5, M, N), m."""
         hammers, drives, states, strobes = [], [], [], []
-        shift = round(_FRONT_STEP / _GRID)
-        steps[2] = shift * _GRID
         plain = [loop.recent(self._driver) for loop in loops]
         stronger = [drive.scaled(1.0 + _SCALE_STEP) for drive in plain]
         for number in range(5):
             for k, (touched, place) in enumerate(zip(touches, places, strict=True)):
-                moved = place + shift if number == 3 else place
+                moved = place + _FRONT_STEPS if number == 3 else place
                 hammers.append(self._with_front(moved))
                 drives.append(stronger[k] if number == 4 else plain[k])
                 x, v = touched.state[:2].tolist()

@@ -36,7 +36,9 @@ COLUMNS: Final = ("advance", "width", "brake_delay", "brake_width")
 """What a table says of a dot."""
 
 _NEAR: Final = 1e-9
-_JUMP: Final = 8e-6
+
+JUMP: Final = 8e-6
+"""Difference of neighbouring advances from which on they belong to different ways to fire a dot, s."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +193,7 @@ class CompensationTable:
         periods = 1.0 / self.rates[[first, second]]
         share = 0.0 if first == second else float((periods[0] - 1.0 / asked) / (periods[0] - periods[1]))
         share = min(max(share, 0.0), 1.0)
-        mixed = np.abs(self.advance[first] - self.advance[second]) > _JUMP
+        mixed = np.abs(self.advance[first] - self.advance[second]) > JUMP
         for values in (self.brake_delay, self.brake_width):
             mixed |= values[first] != values[second]
         part = np.where(mixed, float(share > 0.5), share)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.control.table import JUMP
 from printhammer.control.table_ways import (
     LEAST_WIDTH,
     Ways,
@@ -40,9 +41,6 @@ if TYPE_CHECKING:
 
 SPACING: Final = 30e-6
 """Between the times at which all ways are looked for; between them those of the neighbours are tried, s."""
-
-JUMP: Final = 8e-6
-"""Difference of neighbouring advances from which on they belong to different ways, s."""
 
 BAD: Final = 0.75
 """Cost from which on more ways are looked for."""

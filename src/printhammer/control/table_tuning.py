@@ -45,7 +45,7 @@ SPREAD: Final = (
     Perturbation(travel=10e-6),
     Perturbation(travel=-10e-6),
 )
-"""By how much the hammers differ that a robust table is tuned on, beside the hammer itself."""
+"""By how much the hammers differ on which ways to fire a dot are compared, and a robust table is tuned."""
 
 _USABLE: Final = 0.9
 _POOR: Final = 0.5
