@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from copy import copy
-from typing import TYPE_CHECKING, Any, Final, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args
 
 import numpy as np
 
@@ -31,6 +31,9 @@ class Drive:
 
     Two drives are equal if they do the same: equal segment tables, firing times, overlap rule and quantity.
     """
+
+    bounded: ClassVar[bool] = False
+    """Whether `largest_pulse` is a bound that is stated, and does not follow from the pieces."""
 
     def __init__(
         self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap = "add", period: float | None = None

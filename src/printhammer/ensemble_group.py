@@ -81,7 +81,8 @@ class Group:
         self.states = states
         self.ends = ends
         rows: dict[tuple[Any, ...], int] = {}
-        waves: dict[bytes, tuple[int, float]] = {}
+        waves: dict[bytes, int] = {}
+        peaks: dict[bytes, float] = {}
         problems: list[Problem] = []
         tables: list[FloatArray] = []
         self.hammer_of = np.zeros(len(members), np.int64)
@@ -93,9 +94,14 @@ class Group:
                 pieces = np.asarray(drive.kernel_arrays()[2], dtype=np.float64)
                 form = pieces.tobytes()
                 if form not in waves:
-                    waves[form] = len(tables), drive.largest_pulse
+                    waves[form] = len(tables)
                     tables.append(pieces)
-                forms_of[id(drive)] = waves[form]
+                if drive.bounded:
+                    forms_of[id(drive)] = waves[form], drive.largest_pulse
+                else:
+                    if form not in peaks:
+                        peaks[form] = drive.largest_pulse
+                    forms_of[id(drive)] = waves[form], peaks[form]
             self.waveform_of[i], peak = forms_of[id(drive)]
             x, v = float(states[i, 1]), float(states[i, 2])
             key: tuple[Any, ...] = (id(hammer), peak, drive.quantity)

@@ -25,6 +25,8 @@ class BoundedSequence(PulseSequence):
         Largest current of the driver, A.
     """
 
+    bounded = True
+
     def __init__(self, waveforms: Sequence[Switched], at: Sequence[float], bound: float) -> None:
         super().__init__(waveforms, at=at)
         self._bound = bound

@@ -91,6 +91,8 @@ class NodeCurrent(Waveform):
 class _NodeDrive(Drive):
     """One such current, fired once."""
 
+    bounded = True
+
     @property
     def largest_pulse(self) -> float:
         """Largest value allowed; one for all currents of a search, so that all runs have the same scales."""
