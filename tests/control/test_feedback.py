@@ -18,6 +18,7 @@ from printhammer.control.sensor import PositionSensor
 from printhammer.drive_file import read_drive
 from printhammer.printing.limits import Limits
 from printhammer.printing.perturbation import Perturbation, perturbed
+from printhammer.printing.slots import eight_slot_patterns, slots_of
 from printhammer.printing.trial import Case, attempt
 
 CURRENT = 2.0
@@ -96,6 +97,26 @@ def test_a_hammer_far_from_the_nominal_one_spoils_dots_but_not_the_loop(controll
     assert [len(drive.times) for drive in drives] == [len(pattern) for pattern in PATTERNS]
     assert all((np.diff(drive.times) > 0.0).all() for drive in drives)
     assert max(drive.peak for drive in drives) <= CURRENT * (1.0 + 1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "by",
+    [Perturbation(), Perturbation(current=0.1), Perturbation(travel=-25e-6, current=0.05)],
+    ids=lambda by: by.name,
+)
+def test_what_the_sensor_showed_is_what_the_whole_drive_does(
+    controller: Controller, by: Perturbation
+) -> None:
+    """No decision changes what has been by then, also where it comes late."""
+    driven = perturbed(controller.hammer, by) if by.name != "nominal" else controller.hammer
+    patterns = [slots_of(pattern) for pattern in eight_slot_patterns()[128:255:9]]
+    for loop in closed_loops(driven, controller, PERFECT, patterns, RATE):
+        drive = loop.drive(controller.driver.edge)
+        motion = ph.simulate(driven, drive, duration=float(loop.due[-1]) + 2e-3)
+        for times, shown in loop.seen:
+            # The closed loop runs at the tolerance for pictures.
+            assert motion.at(times)[0] == pytest.approx(shown, abs=1e-7)
 
 
 @pytest.mark.slow

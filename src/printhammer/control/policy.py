@@ -242,7 +242,9 @@ class Choice:
         away = force[:, np.newaxis, np.newaxis] - own[:, :, FORCES // 2]
         for name in ("next_touch", "next_speed"):
             values = getattr(self, name).reshape(shape)
-            shift = (values[:, :, -1] - values[:, :, 0]) / apart * away
+            change = values[:, :, -1] - values[:, :, 0]
+            # Where no push is needed the forces are the same, and so is all that follows.
+            shift = np.divide(change, apart, out=np.zeros_like(change), where=apart != 0.0) * away
             settled = np.full_like(values, np.nan)
             settled[:, :, FORCES // 2] = values[:, :, FORCES // 2] + np.nan_to_num(shift)
             setattr(self, name, settled.reshape(self.force.shape))
