@@ -10,6 +10,7 @@ import numpy as np
 from printhammer.control.histories import REST, History, histories, histories_of, number_of, pattern_of, plain
 from printhammer.control.table import COLUMNS, Settings
 from printhammer.control.table_drive import pulses_of, sequence
+from printhammer.control.table_newton import changes
 from printhammer.control.table_ways import earliest, latest
 from printhammer.ensemble import Ensemble
 
@@ -31,7 +32,7 @@ ROUNDS: Final = 7
 GOOD: Final = 1e-4
 """Deviation, in parts of the limits, from which on an entry is left as it is."""
 
-LEAST_WIDTH: Final = 0.3
+LEAST_OF_WIDEST: Final = 0.3
 """Least width, in parts of the largest one."""
 
 ROUGH: Final = 0.2
@@ -39,8 +40,6 @@ ROUGH: Final = 0.2
 
 _DENSE: Final = 6
 _STEP: Final = 0.5e-6
-_LONGEST_STEP: Final = 25e-6
-_DAMPING: Final = 0.02
 _TAIL: Final = 1e-3
 _PIECE: Final = 4096
 
@@ -216,47 +215,19 @@ def _newton(
         best_off[active[better]] = size[better]
         if turn == ROUNDS:
             break
-        for place, k in enumerate(active.tolist()):
-            if not better[place]:
-                # Half the way back to the best that is known.
-                now[k] = 0.5 * (now[k] + best[k])
-                continue
-            slopes = np.stack(
-                [
-                    (off[place, number + 1] - here[place]).ravel() / sum(shifts[number + 1])
-                    for number in range(2)
-                ],
-                axis=1,
-            )
-            if not np.isfinite(slopes).all():
-                continue
-            least = LEAST_WIDTH * work.widest - now[k, 1]
-            change = _step(slopes, here[place].ravel(), least, work.widest - now[k, 1])
-            now[k] = now[k] + change
-            now[k, 0] = min(max(now[k, 0], -float(latest(work, now[k, 1]))), gap[k] - first[k])
+        # Half the way back to the best that is known.
+        back = active[~better]
+        now[back] = 0.5 * (now[back] + best[back])
+        slopes = np.stack([(off[:, 1] - here) / _STEP, (off[:, 2] - here) / -_STEP], axis=-1)
+        slopes = slopes.reshape(active.size, -1, 2)
+        known = better & np.isfinite(slopes).all(axis=(1, 2))
+        on = active[known]
+        wide = now[on, 1]
+        least = LEAST_OF_WIDEST * work.widest - wide
+        wrong = here[known].reshape(on.size, slopes.shape[1])
+        now[on] += changes(slopes[known], wrong, least, work.widest - wide)
+        now[on, 0] = np.clip(now[on, 0], -latest(work, now[on, 1]), gap[on] - first[on])
     work.advance[rows, columns], work.width[rows, columns] = best.T
-
-
-def _step(slopes: FloatArray, off: FloatArray, least: float, most: float) -> FloatArray:
-    """Return changes of advance and width, s, after which deviations are least in the mean square.
-
-    Parameters
-    ----------
-    slopes : array, shape (deviations, 2)
-        Their derivatives, 1/s.
-    off : array, shape (deviations,)
-        What they are now.
-    least, most : float
-        Bounds on the change of the width, s.
-    """
-    # A little of what Levenberg and Marquardt do: a direction in which nothing changes is left alone.
-    damped = np.vstack([slopes, _DAMPING / _LONGEST_STEP * np.eye(2)])
-    change = -np.linalg.lstsq(damped, np.concatenate([off, np.zeros(2)]), rcond=None)[0]
-    wider = min(max(float(change[1]), least), most)
-    if wider != change[1]:
-        rest = off + slopes[:, 1] * wider
-        change = np.array([-float(slopes[:, 0] @ rest) / float(slopes[:, 0] @ slopes[:, 0]), wider])
-    return np.asarray(np.clip(change, -_LONGEST_STEP, _LONGEST_STEP))
 
 
 def last_dots(

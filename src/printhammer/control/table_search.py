@@ -19,7 +19,7 @@ import numpy as np
 
 from printhammer.control.table import JUMP
 from printhammer.control.table_ways import (
-    LEAST_WIDTH,
+    LEAST_OF_OWN,
     Ways,
     brake_from,
     costs,
@@ -211,7 +211,7 @@ def _grid(work: Work, period: float, brakes: Sequence[tuple[float, float]], fine
     """Return cells of firing times and widths for each of some brake pulses."""
     own: Any = work.pulse
     fired = np.linspace(max(period - _ROOM, work.single.left), period + _ROOM, fine * _FIRED).tolist()
-    widths = np.linspace(LEAST_WIDTH * own.width, work.widest, fine * _WIDTHS).tolist()
+    widths = np.linspace(LEAST_OF_OWN * own.width, work.widest, fine * _WIDTHS).tolist()
     cells = ways_of([(period, *pair, time, width) for pair in brakes for time in fired for width in widths])
     return cells.some(fits(work, cells))
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.control.table_drive import fading, of_width, with_brake
+from printhammer.control.table_newton import changes
 from printhammer.drive_sequence import PulseSequence
 from printhammer.ensemble import Ensemble
 from printhammer.waveform_chain import TAIL
@@ -29,15 +30,13 @@ ROW: Final = 8
 NOMINAL: Final = 8.0
 """How often the hammer that a table is made for counts, beside those that differ."""
 
-LEAST_WIDTH: Final = 0.5
+LEAST_OF_OWN: Final = 0.5
 """Least width, in parts of that of the pulse of the hammer."""
 
 _WIDE: Final = 50e-6
 _ROUNDS: Final = 7
 _SOLVED: Final = 1e-3
 _STEPS: Final = (1e-6, 0.5e-6)
-_LONGEST_STEP: Final = 25e-6
-_DAMPING: Final = 0.02
 _RIGHT: Final = 0.02
 _WRONG: Final = 1.0
 _TAIL: Final = 1e-3
@@ -138,7 +137,7 @@ def solved(work: Work, ways: Ways) -> Ways:
     first = earliest(work, ways.delay, ways.brake)
     now = np.column_stack([ways.fired, ways.width])
     best, best_off = now.copy(), np.full(ways.size, np.inf)
-    least = LEAST_WIDTH * getattr(work.pulse, "width", 0.0)
+    least = LEAST_OF_OWN * getattr(work.pulse, "width", 0.0)
     for turn in range(_ROUNDS + 1):
         last = ways.period + latest(work, now[:, 1])
         now[:, 0] = np.maximum(np.minimum(now[:, 0], last), first)
@@ -159,36 +158,11 @@ def solved(work: Work, ways: Ways) -> Ways:
         slopes = np.stack([(off[:, 1] - here) / _STEPS[0], (off[:, 2] - here) / -_STEPS[1]], axis=2)
         known = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(here).all(axis=1)
         wide = now[active[known], 1]
-        change = _changes(slopes[known], here[known], least - wide, work.widest - wide)
+        change = changes(slopes[known], here[known], least - wide, work.widest - wide)
         back = 0.5 * (best[active] - now[active])
         back[known] = np.where(better[known, np.newaxis], change, back[known])
         now[active] += back
     return replace(ways, fired=best[:, 0], width=best[:, 1])
-
-
-def _changes(slopes: FloatArray, off: FloatArray, least: FloatArray, most: FloatArray) -> FloatArray:
-    """Return changes of firing time and width, s, of Newton's method with bounds on the width.
-
-    Parameters
-    ----------
-    slopes : array, shape (ways, 2, 2)
-        Derivatives of force and arrival after firing time and width, 1/s.
-    off : array, shape (ways, 2)
-        What they are now.
-    least, most : array, shape (ways,)
-        Bounds on the change of the width, s.
-    """
-    turned = slopes.transpose(0, 2, 1)
-    # A little of what Levenberg and Marquardt do: a direction in which nothing changes is left alone.
-    square = turned @ slopes + (_DAMPING / _LONGEST_STEP) ** 2 * np.eye(2)
-    change = -np.linalg.solve(square, turned @ off[:, :, np.newaxis])[:, :, 0]
-    wider = np.clip(change[:, 1], least, most)
-    along = slopes[:, :, 0]
-    rest = off + slopes[:, :, 1] * wider[:, np.newaxis]
-    length = np.maximum((along * along).sum(axis=1), np.finfo(np.float64).tiny)
-    later = np.where(wider == change[:, 1], change[:, 0], -(along * rest).sum(axis=1) / length)
-    change = np.column_stack([later, wider])
-    return np.asarray(np.clip(change, -_LONGEST_STEP, _LONGEST_STEP))
 
 
 def costs(work: Work, ways: Ways) -> FloatArray:

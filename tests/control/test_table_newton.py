@@ -1,0 +1,55 @@
+"""A step of Newton's method for a dot, against a search for the least mean square."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
+
+from printhammer.control.table_newton import LONGEST_STEP, changes
+
+FREE = np.array([1.0])
+
+slope = st.floats(-2e5, 2e5)
+deviation = st.floats(-1.0, 1.0)
+
+
+def test_two_deviations_vanish() -> None:
+    slopes = np.array([[[3e4, 1e4], [-2e4, 5e4]]])
+    wanted = np.array([[4e-6, -7e-6]])
+    found = changes(slopes, -(slopes @ wanted[:, :, np.newaxis])[:, :, 0], -FREE, FREE)
+    assert found == pytest.approx(wanted, rel=0.001)
+
+
+def test_a_direction_in_which_nothing_changes_is_left_alone() -> None:
+    slopes = np.array([[[3e4, 0.0], [-2e4, 0.0]]])
+    found = changes(slopes, np.array([[0.1, 0.2]]), -FREE, FREE)
+    assert np.isfinite(found).all()
+    assert found[0, 1] == 0.0
+
+
+@given(
+    st.lists(st.tuples(slope, slope, deviation), min_size=2, max_size=8),
+    st.floats(0.0, LONGEST_STEP),
+)
+def test_no_other_change_is_better(rows: list[tuple[float, float, float]], room: float) -> None:
+    *slopes, off = np.array(rows).T
+    square = np.stack(slopes, axis=1)
+    bound = np.array([room])
+    found = changes(square[np.newaxis], off[np.newaxis], -bound, bound)[0]
+    assert np.abs(found).max() <= LONGEST_STEP
+    assert abs(found[1]) <= room * (1.0 + 1e-12)
+    # Scaled to a step of 1; a little damping as in the source, which is part of what is least.
+    scaled = np.vstack([square * LONGEST_STEP, 0.02 * np.eye(2)])
+    right = -np.concatenate([off, np.zeros(2)])
+    far = 1e6
+    limits = ([-far, -max(room / LONGEST_STEP, 1e-9)], [far, max(room / LONGEST_STEP, 1e-9)])
+    least = lsq_linear(scaled, right, bounds=limits, tol=1e-14)
+    if np.abs(least.x).max() > 1.0:
+        return
+
+    def size(change: np.ndarray) -> float:
+        return float(np.sum((scaled @ change - right) ** 2))
+
+    # On its bound the step leaves the damping out.
+    assert size(found / LONGEST_STEP) <= size(least.x) + 1e-3
