@@ -35,10 +35,10 @@ MOST_STEPS: Final = 50_000
 """Steps after which a run is given up."""
 
 MOST_MAP_STEPS: Final = 20_000
-"""Steps of one run of the map."""
+"""Steps of one run, for a view that takes many runs or long ones."""
 
 MOST_WORK: Final = 20_000_000
-"""Steps of all runs of a printed line, and of the first points of a strobe section."""
+"""Steps of all runs of a printed line."""
 
 ALIKE: Final = 1.25
 """Factor by which a constant may move before the work of a map is tried out anew."""

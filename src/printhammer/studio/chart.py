@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.drive_base import Overlap
-    from printhammer.ensemble import Engine
     from printhammer.studio.state import State
     from printhammer.waveforms import Waveform
 
@@ -52,30 +50,14 @@ def map_key(state: State) -> tuple[Any, ...]:
     )
 
 
-@dataclass(frozen=True)
-class Tried:
-    """A state, a map of which is known not to take too long.
-
-    Attributes
-    ----------
-    state : State
-        The state.
-    engine : str
-        By which it is computed, see `printhammer.Ensemble.run`.
-    """
-
-    state: State
-    engine: Engine
-
-
-def try_map(state: State, known: Tried | None) -> Tried:
-    """Refuse a map that would take too long, by runs at some of its rates.
+def try_map(state: State, known: State | None) -> State:
+    """Refuse a map that would take too long, by runs at some of its rates; return what it was tried on.
 
     Parameters
     ----------
     state : State
         What the map is of.
-    known : Tried or None
+    known : State or None
         What was tried before; a state like it is good too.
 
     Raises
@@ -85,16 +67,13 @@ def try_map(state: State, known: Tried | None) -> Tried:
     """
     if not state.low < state.high:
         raise InputError(f"map: rates from {state.low:g} Hz to {state.high:g} Hz, expected ascending ones")
-    if known is not None and alike(state, known.state):
+    if known is not None and alike(state, known):
         return known
     rates = tuple(np.linspace(state.low, state.high, _TRIED).tolist())
     trains = _trains(state.fired, rates, slots_of(state), state.overlap)
-    runs = [
+    for rate, train in zip(rates, trains, strict=True):
         try_out(state, train, _end(state), f"a run of the map, at {rate:.4g} Hz,")
-        for rate, train in zip(rates, trains, strict=True)
-    ]
-    # Runs that fail can be very long ones side by side, and are short ones by themselves.
-    return Tried(state, "auto" if all(run.status == "ok" for run in runs) else "plain")
+    return state
 
 
 def map_frame(
@@ -103,7 +82,6 @@ def map_frame(
     size: tuple[int, int],
     newer: Callable[[], bool],
     threads: int | None = None,
-    engine: Engine = "auto",
 ) -> bytes:
     """Return the displacement against time and rate, as 16-bit codes between two displacements.
 
@@ -128,7 +106,7 @@ def map_frame(
         fired = rates[first:last].tolist()
         trains = _trains(state.fired, tuple(fired), slots_of(state), state.overlap)
         runs = Ensemble(hammer, trains, end, states=rest, tolerance=DISPLAY_TOLERANCE)
-        ok[first:last] = runs.run(times=times, x=x[first:last], threads=1, engine=engine).ok
+        ok[first:last] = runs.run(times=times, x=x[first:last], threads=1).ok
 
     # While one piece is integrated, another is made ready.
     in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
 from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE, LONGEST_REASON
-from printhammer.studio.chart import FULL, PREVIEW, Tried, map_frame, map_key, no_map, try_map
+from printhammer.studio.chart import FULL, PREVIEW, map_frame, map_key, no_map, try_map
 from printhammer.studio.engine import dots_frame, motion_frame
 from printhammer.studio.frames import frame
 from printhammer.studio.printed import line_frame, line_key
@@ -56,7 +56,7 @@ class Session:
     def __init__(self, send: Callable[[bytes], None], shelf: Shelf | None = None) -> None:
         self._send = send
         self._shelf = shelf or Shelf()
-        self._tried: Tried | None = None
+        self._tried: State | None = None
         self._change = threading.Condition()
         self._latest: tuple[int, State] | None = None
         self._answered = 0
@@ -167,7 +167,7 @@ class Session:
             self._tried = try_map(state, self._tried)
             # Not given up for a newer state: a coarse map is to arrive while a slider moves. The browser
             # draws meanwhile, and has another core for that.
-            self._tell(map_frame(state, serial, PREVIEW, lambda: self._closed, 1, self._tried.engine))
+            self._tell(map_frame(state, serial, PREVIEW, lambda: self._closed, 1))
         except InputError as error:
             self._tell(no_map(serial, str(error)))
             self._sent["map"] = map_key(state)
@@ -195,8 +195,7 @@ class Session:
         if "map" not in state.views or self._sent.get("map") == map_key(state):
             return
         try:
-            engine = self._tried.engine if self._tried is not None else "auto"
-            self._tell(map_frame(state, serial, FULL, newer, engine=engine))
+            self._tell(map_frame(state, serial, FULL, newer))
         except InputError as error:
             self._tell(no_map(serial, str(error)))
         self._sent["map"] = map_key(state)
