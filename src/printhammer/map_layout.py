@@ -18,7 +18,7 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -149,9 +149,7 @@ def save_map(chart: xr.Dataset, path: str | Path) -> None:
     if target.suffix.lower() == ZARR:
         _save_zarr(chart, target)
     elif target.suffix.lower() == ".nc":
-        # SciPy writes the classic format, which everything reads.
-        content = chart.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-        write_file(target, bytes(content))
+        write_dataset(target, chart)
     else:
         raise InputError(f"{target}: expected a name that ends in {' or '.join(FILES)}")
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.bifurcation_tables import provenance_of, save_dataset
+from printhammer.chaos.bifurcation_tables import provenance_of
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -107,7 +107,7 @@ def save_basins(found: Basins, path: str | Path) -> None:
     """
     target = Path(path)
     if target.suffix.lower() == ".nc":
-        save_dataset(basins_dataset(found), target)
+        write_dataset(target, basins_dataset(found))
     elif target.suffix.lower() == ".csv":
         write_file(target, basins_table(found).to_csv(index=False, float_format="%.17g"))
     else:

@@ -12,7 +12,7 @@ from printhammer.constants import quantities
 from printhammer.drive_text import inline, waveform_text
 from printhammer.ensemble import MODE_NAMES
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,18 +145,6 @@ def bifurcation_table(diagram: Bifurcation) -> pd.DataFrame:
     return table
 
 
-def save_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset as NetCDF, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written; what was there stays.
-    """
-    # SciPy writes the classic format, which everything reads.
-    write_file(path, bytes(dataset.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")))
-
-
 def save_bifurcation(diagram: Bifurcation, path: str | Path) -> None:
     """Write a diagram: the states as NetCDF (.nc), or the verdicts as CSV (.csv); whole or not at all.
 
@@ -167,7 +155,7 @@ def save_bifurcation(diagram: Bifurcation, path: str | Path) -> None:
     """
     target = Path(path)
     if target.suffix.lower() == ".nc":
-        save_dataset(bifurcation_dataset(diagram), target)
+        write_dataset(target, bifurcation_dataset(diagram))
     elif target.suffix.lower() == ".csv":
         write_file(target, bifurcation_table(diagram).to_csv(index=False, float_format="%.17g"))
     else:

@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.chaos.continuation_events import KINDS
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -159,8 +159,7 @@ def save_branches(branches: Sequence[Branch], path: str | Path) -> None:
     if kind == ".csv":
         write_file(target, branches_table(branches).to_csv(index=False, float_format="%.17g"))
     elif kind == ".nc":
-        content = branches_dataset(branches).to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-        write_file(target, bytes(content))
+        write_dataset(target, branches_dataset(branches))
     elif kind == ".json":
         write_file(target, json.dumps([_as_dict(branch) for branch in branches], indent=2) + "\n")
     else:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -211,9 +211,7 @@ def save_lyapunov(chart: LyapunovChart, path: str | Path) -> None:
     if kind == ".csv":
         write_file(target, chart_table(chart).to_csv(index=False, float_format="%.17g"))
     elif kind == ".nc":
-        # SciPy writes the classic format, which everything reads.
-        content = chart_dataset(chart).to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-        write_file(target, bytes(content))
+        write_dataset(target, chart_dataset(chart))
     elif kind == ".json":
         trains = [
             {name: _plain(value) for name, value in row.items()}

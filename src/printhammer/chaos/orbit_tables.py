@@ -12,7 +12,7 @@ import numpy as np
 from printhammer.chaos.orbit_result import KINDS
 from printhammer.ensemble import MODE_NAMES
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -206,9 +206,7 @@ def save_orbits(orbits: Orbits, path: str | Path) -> None:
     if kind == ".csv":
         write_file(target, orbits_table(orbits.found).to_csv(index=False, float_format="%.17g"))
     elif kind == ".nc":
-        # SciPy writes the classic format, which everything reads.
-        content = orbits_dataset(orbits).to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-        write_file(target, bytes(content))
+        write_dataset(target, orbits_dataset(orbits))
     elif kind == ".json":
         columns = orbits_table(orbits.found).astype(object).where(lambda table: table.notna(), None)
         found = {**orbits.provenance, "orbits": columns.to_dict(orient="records")}

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.chaos.bifurcation_tables import save_dataset
 from printhammer.drive_text import inline, waveform_text
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,7 +100,7 @@ def save_quench(found: QuenchMap, path: str | Path) -> None:
     if target.suffix.lower() == ".nc":
         chart = quench_dataset(found)
         # The classic NetCDF format has no truth values.
-        save_dataset(chart.assign(struck=chart["struck"].astype(np.int8)), target)
+        write_dataset(target, chart.assign(struck=chart["struck"].astype(np.int8)))
     elif target.suffix.lower() == ".csv":
         write_file(target, quench_table(found).to_csv(index=False, float_format="%.17g"))
     else:

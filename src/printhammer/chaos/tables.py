@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.ensemble import MODE_NAMES
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,9 +89,7 @@ def save_strobe(strobe: Strobe, path: str | Path) -> None:
     if kind == ".csv":
         write_file(target, strobe_table(strobe).to_csv(index=False, float_format="%.17g"))
     elif kind == ".nc":
-        # SciPy writes the classic format, which everything reads.
-        content = strobe_dataset(strobe).to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-        write_file(target, bytes(content))
+        write_dataset(target, strobe_dataset(strobe))
     elif kind == ".json":
         columns = strobe_table(strobe).astype(object).where(lambda table: table.notna(), None)
         found = {**strobe.provenance, "points": columns.to_dict(orient="list")}

@@ -14,8 +14,6 @@ from printhammer.cli.run import HAMMER, HammerArgument, Overlap, UnitsOption
 from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.table import Table
 
     from printhammer.chaos.basins import Basins
@@ -27,7 +25,6 @@ EXAMPLE: Final = (
 )
 
 _SUFFIXES: Final = (".nc", ".csv")
-_DOTS: Final = 200.0
 _TRAIN: Final = "Basins (one of --period and --rate)"
 _QUENCH: Final = "Quench map"
 _ROWS: Final = 12
@@ -88,6 +85,7 @@ def basins(
     """
     from rich.markup import escape
 
+    from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.outputs import check_outputs
@@ -120,7 +118,8 @@ def basins(
         from printhammer.chaos.quench import quench_map
         from printhammer.chaos.quench_tables import save_quench
 
-        found = mapped = _computed("cells", lambda tell: quench_map(loaded, progress=tell, **options))
+        with counting("cells") as tell:
+            found = mapped = quench_map(loaded, progress=tell, **options)
         lines = quenched(mapped, units)
         failed = mapped.status[mapped.status != "ok"]
         save = partial(save_quench, mapped)
@@ -130,7 +129,8 @@ def basins(
         from printhammer.chaos.basins import basins as computed
         from printhammer.chaos.basins_tables import save_basins
 
-        found = planes = _computed("cells", lambda tell: computed(loaded, progress=tell, **options))
+        with counting("cells") as tell:
+            found = planes = computed(loaded, progress=tell, **options)
         lines = told(planes, side, units)
         failed = planes.status[(planes.status != "ok") & (planes.status != NO_STATE_STATUS)]
         save = partial(save_basins, planes)
@@ -138,7 +138,7 @@ def basins(
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     screen.print(f"[dim]{found.status.size} cells, computed in {perf_counter() - begin:.2g} s[/dim]\n")
     screen.print(lines)
-    write_found(screen, wanted, found.plot, save, dpi=_DOTS)
+    write_found(screen, wanted, found.plot, save)
     if failed.size:
         kinds = ", ".join(sorted(set(failed.tolist())))
         complain(f"{failed.size} of {found.status.size} runs ended early: {kinds}")
@@ -168,23 +168,6 @@ def _one_kind(quench: bool, of_basins: dict[str, Any], of_quench: dict[str, Any]
         raise InputError(f"--{odd[0]} is given, expected {expected}")
     if not quench and (of_basins["period"] is None) == (of_basins["rate"] is None):
         raise InputError("--period and --rate: expected one of them, such as --period '1.05 ms', or --quench")
-
-
-def _computed(name: str, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:
-    """Compute, and show how far it is."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    with Progress(
-        TextColumn(name),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as shown:
-        task = shown.add_task(name, total=None)
-        return compute(lambda done, total: shown.update(task, completed=done, total=total))
 
 
 def told(found: Basins, box: int | None, units: Units) -> Table:

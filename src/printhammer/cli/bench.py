@@ -30,9 +30,9 @@ def bench(
     ] = None,
 ) -> None:
     """Measure speed and error against other solvers, one run at a time and in ensembles."""
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
     from printhammer import bench as benchmark
+    from printhammer.cli.progress import telling
+    from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.outputs import check_outputs, write_file
 
@@ -41,20 +41,15 @@ def bench(
     check_outputs(wanted)
     announce_compiling()
     screen = console()
-    with Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=screen, transient=True
-    ) as progress:
-        task = progress.add_task("…", total=None)
-        report = benchmark.run(
-            quick=quick, threads=count, say=lambda line: progress.update(task, description=line)
-        )
+    with telling() as say:
+        report = benchmark.run(quick=quick, threads=count, say=say)
     _show(report, screen)
     if json is not None:
         write_file(json, report.to_json())
     if markdown is not None:
         write_file(markdown, report.to_markdown())
     for path in wanted:
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+        say_written(screen, path)
 
 
 def _show(report: Report, screen: Console) -> None:

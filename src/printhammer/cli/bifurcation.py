@@ -26,7 +26,6 @@ EXAMPLE: Final = (
 
 _RANGE: Final = ("0.8 ms", "1.35 ms")
 _VALUES: Final = 500
-_DOTS: Final = 200.0
 _PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
 _ROWS: Final = 12
 
@@ -93,7 +92,9 @@ def bifurcation(
     from rich.markup import escape
 
     from printhammer.chaos.bifurcation import InterruptedDiagram
+    from printhammer.chaos.bifurcation import bifurcation as computed
     from printhammer.chaos.bifurcation_tables import save_bifurcation
+    from printhammer.cli.progress import counting
     from printhammer.cli.saving import load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.outputs import check_outputs
@@ -119,7 +120,8 @@ def bifurcation(
     begin = perf_counter()
     stopped = None
     try:
-        found = _computed(loaded, options)
+        with counting("trains") as tell:
+            found = computed(loaded, progress=tell, **options)
     except InterruptedDiagram as interrupt:
         stopped, found = interrupt, interrupt.diagram
     done = int((found.status != "not run").sum())
@@ -134,9 +136,7 @@ def bifurcation(
             screen.print(summary(found, name))
         for line in sentences(found):
             screen.print(escape(line), soft_wrap=True)
-        write_found(
-            screen, wanted, partial(found.plot, show=show), partial(save_bifurcation, found), dpi=_DOTS
-        )
+        write_found(screen, wanted, partial(found.plot, show=show), partial(save_bifurcation, found))
     if stopped is not None:
         raise KeyboardInterrupt from stopped
     failed = found.status[found.status != "ok"]
@@ -193,29 +193,6 @@ def _values(
     if timed:
         return {f"{parameter}s": grid}
     return {"parameter": parameter, "values": grid, "period": period, "rate": rate}
-
-
-def _computed(hammer: Hammer, options: dict[str, Any]) -> Bifurcation:
-    """Compute the diagram and show how far it is."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    from printhammer.chaos.bifurcation import bifurcation as computed
-
-    with Progress(
-        TextColumn("trains"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as shown:
-        task = shown.add_task("trains", total=None)
-        return computed(
-            hammer,
-            progress=lambda done, total: shown.update(task, completed=done, total=total),
-            **options,
-        )
 
 
 def summary(found: Bifurcation, direction: str) -> Table:

@@ -12,8 +12,6 @@ from printhammer.cli.numbers import number, whole
 from printhammer.cli.run import HAMMER, HammerArgument, Overlap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.console import Console
     from rich.table import Table
 
@@ -108,7 +106,7 @@ def continue_(
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs
+    from printhammer.outputs import check_outputs, write_dataset
 
     wanted = out or []
     endings = (".nc", *PICTURES) if second is not None else (*SUFFIXES, *PICTURES)
@@ -163,7 +161,8 @@ def continue_(
         chart = _charted(found[0], second, (second_from or "", second_to or ""), whole(grid, "grid") or 0)
         screen.print(f"\n{escape(chart.message)}", soft_wrap=True)
     if chart is not None:
-        write_found(screen, wanted, chart.plot, partial(_save_chart, chart))
+        data = chart.to_dataset()
+        write_found(screen, wanted, chart.plot, lambda path: write_dataset(path, data))
     elif second is None and len(found):
         write_found(screen, wanted, partial(found.plot, show=show), partial(save_branches, list(found)))
     if stopped is not None:
@@ -190,47 +189,35 @@ def _state(text: str | None) -> tuple[float, float] | None:
     return read_number(parts[0], "m", "--state"), read_number(parts[1], "m/s", "--state")
 
 
-def _progress(name: str, work: Callable[[Callable[[int, int], None]], Any]) -> Any:
-    """Do some work and show how far it is."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    with Progress(
-        TextColumn(name), BarColumn(), TimeElapsedColumn(), console=Console(stderr=True), transient=True
-    ) as shown:
-        task = shown.add_task(name, total=None)
-        return work(lambda done, total: shown.update(task, completed=done, total=total))
-
-
 def _followed(
     hammer: Hammer, parameter: str, bounds: tuple[str, str], levels: int, **options: Any
 ) -> Branches:
     from printhammer.chaos.continuation import continuation
     from printhammer.chaos.continuation_regimes import follow_doublings
+    from printhammer.cli.progress import counting
     from printhammer.errors import InputError
 
     if levels < 0:
         raise InputError(f"doublings = {levels}, expected a whole number from 0 on")
-    branch = _progress(
-        "orbits", lambda tell: continuation(hammer, parameter, bounds, progress=tell, **options)
-    )
+    with counting("orbits", remaining=False) as told:
+        branch = continuation(hammer, parameter, bounds, progress=told, **options)
     return follow_doublings(branch, levels, most=options["most"])
 
 
 def _regimes(hammer: Hammer, rates: tuple[str, str], **options: Any) -> Branches:
     from printhammer.chaos.continuation_regimes import regimes
+    from printhammer.cli.progress import counting
 
-    found: Branches = _progress("regimes", lambda tell: regimes(hammer, rates, progress=tell, **options))
-    return found
+    with counting("regimes", remaining=False) as told:
+        return regimes(hammer, rates, progress=told, **options)
 
 
 def _charted(branch: Branch, second: str, bounds: tuple[str, str], grid: int) -> StabilityChart:
     from printhammer.chaos.stability_chart import stability_chart
+    from printhammer.cli.progress import counting
 
-    found: StabilityChart = _progress(
-        "curves", lambda tell: stability_chart(branch, second, bounds, grid=(grid, grid), progress=tell)
-    )
-    return found
+    with counting("curves", remaining=False) as told:
+        return stability_chart(branch, second, bounds, grid=(grid, grid), progress=told)
 
 
 def tell(screen: Console, found: Branches) -> None:
@@ -271,9 +258,3 @@ def events(branch: Branch) -> Table:
 def _number(multiplier: complex) -> str:
     real = f"{multiplier.real:+.4g}"
     return real if multiplier.imag == 0.0 else f"{real}{multiplier.imag:+.4g}i"
-
-
-def _save_chart(chart: StabilityChart, path: Path) -> None:
-    from printhammer.outputs import write_file
-
-    write_file(path, bytes(chart.to_dataset().to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")))

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from printhammer.cli.numbers import number, whole
+from printhammer.cli.numbers import number, rates_between, whole
 from printhammer.cli.run import HAMMER, HammerArgument, UnitsOption
 from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.table import Table
 
     from printhammer.control.least_work import LeastWork
-    from printhammer.control.least_work_rates import LeastWorkRates
     from printhammer.control.least_work_supply import SupplyCheck
     from printhammer.hammer import Hammer
 
 EXAMPLE: Final = "Example: printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png"
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
 _SUFFIXES: Final = (".nc", ".csv")
 _MOST_RATES: Final = 200
 
@@ -84,6 +80,8 @@ def energy(
     """
     from rich.markup import escape
 
+    from printhammer.cli.progress import counting
+    from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.control.least_work import least_work
     from printhammer.control.least_work_tables import save_least_work
@@ -91,10 +89,7 @@ def energy(
     from printhammer.outputs import check_outputs
 
     wanted = out or []
-    for path in wanted:
-        if path.suffix.lower() not in (*_SUFFIXES, *_PICTURES):
-            known = ", ".join((*_SUFFIXES, *_PICTURES))
-            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    check_endings(wanted, (*_SUFFIXES, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     given: dict[str, Any] = {
         "force": number(force, "force"),
@@ -109,7 +104,7 @@ def energy(
     options["shape"] = "pulses" if pulses else "free"
     if pulses and any(path.suffix.lower() == ".csv" for path in wanted):
         raise InputError("--pulses is given, expected no current (.csv) beside it")
-    many = None if rates is None else _rates(rates)
+    many = None if rates is None else rates_between(rates, "--rates", most=_MOST_RATES)
     if many is not None and (supply or any(path.suffix.lower() == ".csv" for path in wanted)):
         raise InputError("--rates is given, expected neither --supply nor a current (.csv) beside it")
     loaded = load_checked(hammer)
@@ -118,18 +113,14 @@ def energy(
     if many is not None:
         _at_rates(loaded, many, options, wanted)
         return
-    found = _planned("dots planned", lambda tell: least_work(loaded, rate, progress=tell, **options))
+    with counting("dots planned") as tell:
+        found = least_work(loaded, rate, progress=tell, **options)
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}\n")
     screen.print(told(found, units))
     if supply:
         screen.print()
         screen.print(supplied(found.under_supply(), found.count, units))
-    for path in wanted:
-        if path.suffix.lower() in _PICTURES:
-            _draw(found, path)
-        else:
-            save_least_work(found, path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    write_found(screen, wanted, found.plot, partial(save_least_work, found))
     if found.adequate < found.count:
         complain(f"{found.adequate} of {found.count} dots are adequate")
         raise typer.Exit(1)
@@ -196,32 +187,17 @@ def supplied(found: SupplyCheck, count: int, units: Units) -> Table:
     return table
 
 
-def _rates(text: str) -> list[float]:
-    """Read two rates with their units and a number of values."""
-    import numpy as np
-
-    from printhammer.errors import InputError
-    from printhammer.printing.nominal import rate_of
-
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 3:
-        raise InputError(f"--rates {text!r}: expected two rates and a number, such as '600 Hz, 1.8 kHz, 7'")
-    low, high, count = rate_of(parts[0], "--rates"), rate_of(parts[1], "--rates"), whole(parts[2], "--rates")
-    if not low < high or count is None or not 2 <= count <= _MOST_RATES:
-        raise InputError(
-            f"--rates {text!r}: expected the lower rate first, and a number from 2 to {_MOST_RATES}"
-        )
-    return [float(rate) for rate in np.linspace(low, high, count)]
-
-
 def _at_rates(hammer: Hammer, rates: list[float], options: dict[str, Any], wanted: list[Path]) -> None:
     from rich.markup import escape
 
-    from printhammer.chaos.bifurcation_tables import save_dataset
+    from printhammer.cli.progress import counting
+    from printhammer.cli.saving import write_found
     from printhammer.cli.terminal import complain, console, honesty, plain_table
     from printhammer.control.least_work_rates import FOUND, least_work_rates
+    from printhammer.outputs import write_dataset
 
-    found = _planned("rates", lambda tell: least_work_rates(hammer, rates, progress=tell, **options))
+    with counting("rates") as tell:
+        found = least_work_rates(hammer, rates, progress=tell, **options)
     screen = console()
     screen.print(f"[bold]{escape(hammer.name)}[/bold]  {honesty(hammer)}\n")
     headings = ("rate [Hz]", "adequate dots", "W", "W+", "least W+", "")
@@ -232,32 +208,9 @@ def _at_rates(hammer: Hammer, rates: list[float], options: dict[str, Any], wante
         said = "" if status == FOUND else status
         table.add_row(f"{found.rates[row]:.6g}", f"{found.adequate[row]} of {found.count}", *known, said)
     screen.print(table)
-    for path in wanted:
-        if path.suffix.lower() in _PICTURES:
-            _draw(found, path)
-        else:
-            save_dataset(found.to_dataset(), path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    data = found.to_dataset()
+    write_found(screen, wanted, found.plot, lambda path: write_dataset(path, data))
     missing = int((found.status != FOUND).sum())
     if missing:
         complain(f"no current was found at {missing} of {found.status.size} rates")
         raise typer.Exit(1)
-
-
-def _planned(name: str, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:
-    """Compute, and show how far it is."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns, console = (TextColumn(name), BarColumn(), MofNCompleteColumn()), Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
-        task = shown.add_task(name, total=None)
-        return compute(lambda done, total: shown.update(task, completed=done, total=total))
-
-
-def _draw(found: LeastWork | LeastWorkRates, path: Path) -> None:
-    from printhammer.outputs import write_file
-
-    buffer = BytesIO()
-    found.plot().savefig(buffer, format=path.suffix[1:].lower(), dpi=200.0)
-    write_file(path, buffer.getvalue())

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 EXAMPLE: Final = "Example: printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png"
 
-_DOTS: Final = 200.0
 _RUN: Final = "The run that is shown"
 
 
@@ -123,8 +122,8 @@ def feedback(
     screen = console()
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}\n")
     screen.print(told(found, units))
-    write_found(screen, wanted, found.plot, partial(save_feedback, found), dpi=_DOTS)
-    write_found(screen, shown, found.plot_run, partial(save_drive, found.seen.motion.drive), dpi=_DOTS)
+    write_found(screen, wanted, found.plot, partial(save_feedback, found))
+    write_found(screen, shown, found.plot_run, partial(save_drive, found.seen.motion.drive))
     bad = int((~found.passed[-1]).sum())
     if bad:
         complain(f"{bad} of {found.passed.shape[1]} patterns are not printed within limits with feedback")

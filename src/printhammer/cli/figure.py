@@ -20,6 +20,7 @@ def figure(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write it.")] = Path("build/figures"),
 ) -> None:
     """Draw a figure of the paper as SVG, PNG and PDF."""
+    from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, console, load_checked
     from printhammer.errors import InputError
     from printhammer.figures import FIGURES, save
@@ -40,4 +41,4 @@ def figure(
 
         options["printed"] = printed_verdicts()
     for path in save(entry.draw(loaded, **options), out, f"figure{entry.number:02d}"):
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+        say_written(screen, path)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 EXAMPLE: Final = "Example: printhammer fit magnet magnet.csv --spring spring.csv --hammer hendriks-1983"
 
 _RESULTS: Final = "Results"
-_PICTURES: Final = (".svg", ".png", ".pdf")
 
 app = typer.Typer(
     help="Find constants from measurements: CSV tables whose heading gives every column its unit.",
@@ -289,6 +288,7 @@ class _Results:
     def make(self, found: Callable[[Hammer | None], Fit], *, strict: bool) -> None:
         """Fit, write and tell."""
         from printhammer.cli.fit_screen import show
+        from printhammer.cli.saving import PICTURES, check_endings, say_written
         from printhammer.cli.terminal import console
         from printhammer.errors import InputError
         from printhammer.hammer import load
@@ -296,10 +296,7 @@ class _Results:
 
         if self.into is not None and self.hammer is None:
             raise InputError(f"--into {self.into}: expected --hammer too, in which constants are replaced")
-        if self.plot is not None and self.plot.suffix.lower() not in _PICTURES:
-            raise InputError(
-                f"--plot {self.plot}: expected a name that ends in one of {', '.join(_PICTURES)}"
-            )
+        check_endings([] if self.plot is None else [self.plot], PICTURES, "--plot")
         wanted = [path for path in (self.out, self.into, self.plot, self.covariance) if path is not None]
         read = [*self.tables, *([Path(self.hammer)] if self.hammer is not None else [])]
         check_outputs(wanted, read)
@@ -309,26 +306,20 @@ class _Results:
         screen = console()
         show(fit, screen)
         for path in self._write(fit, made):
-            screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+            say_written(screen, path)
         if strict and fit.rejected:
             raise typer.Exit(1)
 
     def _write(self, fit: Fit, made: Hammer | None) -> list[Path]:
-        from io import BytesIO
-
+        from printhammer.cli.saving import write_picture
         from printhammer.identify.fragment import covariance_table
         from printhammer.outputs import write_file
 
         written = []
         if self.plot is not None:
             from printhammer.figures.fit import plot
-            from printhammer.figures.style import in_style
 
-            buffer = BytesIO()
-            figure = plot(fit)
-            with in_style():
-                figure.savefig(buffer, format=self.plot.suffix[1:].lower(), dpi=200.0)
-            write_file(self.plot, buffer.getvalue())
+            write_picture(self.plot, plot(fit))
             written.append(self.plot)
         if self.out is not None:
             write_file(self.out, fit.fragment())

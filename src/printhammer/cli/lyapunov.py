@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from printhammer.chaos import Lyapunov, LyapunovChart
-    from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
 EXAMPLE: Final = "Example: printhammer lyapunov hendriks-1983 --period '1.10 ms, 1.30 ms' --firings 300"
@@ -64,9 +63,10 @@ def lyapunov(
     """
     from rich.markup import escape
 
-    from printhammer.chaos import LyapunovChart
+    from printhammer.chaos import LyapunovChart, lyapunovs
     from printhammer.chaos import lyapunov as exponents_of
     from printhammer.chaos.lyapunov_tables import SUFFIXES, save_lyapunov
+    from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.outputs import check_outputs
@@ -89,7 +89,8 @@ def lyapunov(
         single = exponents_of(loaded, period=float(periods[0]), **options)
         chart = LyapunovChart.of([single])
     else:
-        chart = _computed(loaded, periods, whole(threads, "threads"), options)
+        with counting("trains") as tell:
+            chart = lyapunovs(loaded, periods, threads=whole(threads, "threads"), progress=tell, **options)
     screen = console()
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     train = f"{chart.drive.waveform.shape} {chart.drive.quantity}, overlap {chart.drive.overlap}"
@@ -136,33 +137,6 @@ def _periods(
     if count < 2:
         raise InputError(f"--steps {steps}: expected at least 2")
     return np.linspace(low, high, count)
-
-
-def _computed(
-    hammer: Hammer, periods: FloatArray, threads: int | None, options: dict[str, Any]
-) -> LyapunovChart:
-    """Compute many trains and show how far it is."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    from printhammer.chaos import lyapunovs
-
-    with Progress(
-        TextColumn("trains"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as shown:
-        task = shown.add_task("trains", total=len(periods))
-        return lyapunovs(
-            hammer,
-            periods,
-            threads=threads,
-            progress=lambda done, total: shown.update(task, completed=done, total=total),
-            **options,
-        )
 
 
 def summary(found: Lyapunov) -> Table:

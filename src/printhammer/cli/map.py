@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -13,13 +14,13 @@ from printhammer.cli.run import HAMMER, HammerArgument, Overlap
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
     from printhammer.hammer import Hammer
     from printhammer.segments import FloatArray
 
 EXAMPLE: Final = "Example: printhammer map hendriks-1983 --from '500 Hz' --to '2 kHz' --rates 64 --times 256"
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
 _BURST: Final = "Bursts"
 _FEW: Final = 6
 
@@ -64,11 +65,15 @@ def map_(
     Ends with status 1 where a run stopped before its end; its rate is named.
     """
     from printhammer.cli import run_files
+    from printhammer.cli.progress import counting
+    from printhammer.cli.saving import write_found
     from printhammer.cli.terminal import announce_compiling, console, load_checked
     from printhammer.drive import PulseTrain
     from printhammer.errors import InputError
     from printhammer.map_layout import save_map
+    from printhammer.maps import frequency_map
     from printhammer.measured_map import load_measured_map
+    from printhammer.problem import TOLERANCE
 
     wanted = out or []
     number_of_figure = _checked(wanted, figure, measured, force)
@@ -83,36 +88,32 @@ def map_(
     announce_compiling()
     screen = console()
     start = perf_counter()
-    chart = _computed(
-        loaded,
-        grid,
-        pulses=9 if pulses is None else whole(pulses, "pulses"),
-        times=moments,
-        tolerance=number(tolerance, "tolerance"),
-        threads=whole(threads, "threads"),
-        overlap=overlap.value,
-    )
+    options: dict[str, Any] = {
+        "pulses": 9 if pulses is None else whole(pulses, "pulses"),
+        "times": moments,
+        "tolerance": TOLERANCE if tolerance is None else number(tolerance, "tolerance"),
+        "threads": whole(threads, "threads"),
+        "overlap": overlap.value,
+    }
+    with counting("rates") as tell:
+        chart = frequency_map(loaded, grid, progress=tell, **options)
     _show(chart, beside, perf_counter() - start, loaded)
-    for path in wanted:
-        if path.suffix in _PICTURES:
-            _draw(path, loaded, chart, beside, number_of_figure)
-        else:
-            save_map(chart, path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+    write_found(
+        screen, wanted, partial(_drawn, loaded, chart, beside, number_of_figure), partial(save_map, chart)
+    )
     if _complaints(chart):
         raise typer.Exit(1)
 
 
 def _checked(wanted: list[Path], figure: str | None, measured: Path | None, force: bool) -> int:
     """Check the names of the files that are to be written; return the number of the figure that is drawn."""
+    from printhammer.cli.saving import PICTURES, check_endings
     from printhammer.errors import InputError
     from printhammer.map_layout import FILES, ZARR, need_zarr
 
-    known = (*FILES, *_PICTURES)
+    check_endings(wanted, (*FILES, *PICTURES))
     for path in wanted:
-        if path.suffix not in known:
-            raise InputError(f"--out {path}: expected a name that ends in {', '.join(known)}")
-        if path.suffix == ZARR:
+        if path.suffix.lower() == ZARR:
             need_zarr(path)
         if path.exists() and not force:
             raise InputError(f"--out {path}: expected a new file, this one is there; --force writes over it")
@@ -120,7 +121,7 @@ def _checked(wanted: list[Path], figure: str | None, measured: Path | None, forc
         return 9
     if figure not in ("8", "9"):
         raise InputError(f"--figure {figure}: expected 8 or 9")
-    if not any(path.suffix in _PICTURES for path in wanted):
+    if not any(path.suffix.lower() in PICTURES for path in wanted):
         raise InputError(f"--figure {figure}: expected a picture among the files of --out")
     if measured is not None:
         raise InputError(
@@ -134,7 +135,7 @@ def _check_places(wanted: list[Path], inputs: list[Path]) -> None:
     from printhammer.map_layout import ZARR
     from printhammer.outputs import check_outputs
 
-    stores = {path: path / "zarr.json" for path in wanted if path.suffix == ZARR and path.is_dir()}
+    stores = {path: path / "zarr.json" for path in wanted if path.suffix.lower() == ZARR and path.is_dir()}
     check_outputs([stores.get(path, path) for path in wanted], inputs)
 
 
@@ -173,32 +174,6 @@ def _axes(
             f"--from {low:.9g} Hz and --to {high:.9g} Hz: expected the second to be the higher one"
         )
     return np.linspace(low, high, count), moments
-
-
-def _computed(hammer: Hammer, rates: FloatArray, *, tolerance: float | None, **options: Any) -> xr.Dataset:
-    """Compute the map and show how far it is."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    from printhammer.maps import frequency_map
-    from printhammer.problem import TOLERANCE
-
-    with Progress(
-        TextColumn("rates"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as shown:
-        task = shown.add_task("rates", total=len(rates))
-        return frequency_map(
-            hammer,
-            rates,
-            tolerance=TOLERANCE if tolerance is None else tolerance,
-            progress=lambda done, total: shown.update(task, completed=done, total=total),
-            **options,
-        )
 
 
 def _show(chart: xr.Dataset, beside: xr.Dataset | None, seconds: float, hammer: Hammer) -> None:
@@ -256,13 +231,11 @@ def _complaints(chart: xr.Dataset) -> int:
     return count
 
 
-def _draw(path: Path, hammer: Hammer, chart: xr.Dataset, beside: xr.Dataset | None, number: int) -> None:
-    from printhammer.figures import FIGURES, save
+def _drawn(hammer: Hammer, chart: xr.Dataset, beside: xr.Dataset | None, number: int) -> Figure:
+    from printhammer.figures import FIGURES
 
     if beside is None:
-        drawn = FIGURES[number].draw(hammer, chart=chart)
-    else:
-        from printhammer.figures.map_comparison import compare_maps
+        return FIGURES[number].draw(hammer, chart=chart)
+    from printhammer.figures.map_comparison import compare_maps
 
-        drawn = compare_maps(chart, beside)
-    save(drawn, path.parent, path.stem, formats=[path.suffix[1:]])
+    return compare_maps(chart, beside)

@@ -92,6 +92,7 @@ def measure(
 
     The tables are those that `printhammer fit` reads; what was done stands in their comments.
     """
+    from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, console, load_checked
     from printhammer.identify.laboratory import measure as measured
 
@@ -128,7 +129,7 @@ def measure(
     for one, table in done.items():
         table.write(paths[one])
         screen.print(_told(table), soft_wrap=True)
-        screen.print(f"[dim]wrote[/dim] {paths[one]}", soft_wrap=True)
+        say_written(screen, paths[one])
 
 
 def _places(kind: str, out: Path | None, hammer: Path, force: bool) -> tuple[list[str], dict[str, Path]]:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from printhammer.chaos.orbit_search import Orbits
-    from printhammer.hammer import Hammer
 
 EXAMPLE: Final = "Example: printhammer orbits hendriks-1983 --period '1.05 ms' --longest 4 --out orbits.csv"
 
@@ -63,7 +62,10 @@ def orbits(
     """
     from rich.markup import escape
 
+    from printhammer.chaos.orbit_search import orbits as search
     from printhammer.chaos.orbit_tables import SUFFIXES, save_orbits
+    from printhammer.chaos.strobe_map import MAP_TOLERANCE
+    from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
@@ -76,16 +78,14 @@ def orbits(
         raise InputError("--period and --rate: expected one of them, such as --period '1.05 ms'")
     loaded = load_fired(hammer, wanted)
     announce_compiling()
-    found = _searched(
-        loaded,
-        period=period,
-        rate=rate,
-        overlap=overlap.value,
-        longest=whole(longest, "longest") or 0,
-        starts=whole(starts, "starts") or 0,
-        guesses=whole(guesses, "guesses") or 0,
-        tolerance=number(tolerance, "tolerance"),
-    )
+    options: dict[str, Any] = {
+        "longest": whole(longest, "longest") or 0,
+        "starts": whole(starts, "starts") or 0,
+        "guesses": whole(guesses, "guesses") or 0,
+        "tolerance": MAP_TOLERANCE if tolerance is None else number(tolerance, "tolerance"),
+    }
+    with counting("orbits", remaining=False) as tell:
+        found = search(loaded, period=period, rate=rate, overlap=overlap.value, progress=tell, **options)
     screen = console()
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     fired = found.regime.fired
@@ -99,30 +99,6 @@ def orbits(
     if not len(found):
         complain("no periodic orbit was found; more --starts or --guesses may find one")
         raise typer.Exit(1)
-
-
-def _searched(hammer: Hammer, *, tolerance: float | None, **options: Any) -> Orbits:
-    """Search and show how far it is."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from printhammer.chaos.orbit_search import orbits as search
-    from printhammer.chaos.strobe_map import MAP_TOLERANCE
-
-    with Progress(
-        TextColumn("orbits"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as shown:
-        task = shown.add_task("orbits", total=None)
-        return search(
-            hammer,
-            tolerance=MAP_TOLERANCE if tolerance is None else tolerance,
-            progress=lambda done, total: shown.update(task, completed=done, total=total),
-            **options,
-        )
 
 
 def summary(found: Orbits, units: Units) -> Table:

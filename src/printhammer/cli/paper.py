@@ -24,21 +24,17 @@ def paper(
 ) -> None:
     """Draw the figures, judge the claims, and write one HTML report, the figures and claims.json."""
     from rich.markup import escape
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+    from printhammer.cli.progress import telling
+    from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, console, load_checked, plain_table
     from printhammer.report import write_report
 
     loaded = load_checked(hammer)
     announce_compiling()
     screen = console()
-    with Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=screen, transient=True
-    ) as progress:
-        task = progress.add_task("…", total=None)
-        report = write_report(
-            loaded, out, progress=lambda text: progress.update(task, description=text), pdf=pdf
-        )
+    with telling() as say:
+        report = write_report(loaded, out, progress=say, pdf=pdf)
     table = plain_table(("claim", "left"), ("kind", "left"), ("verdict", "left"), ("measured", "left"))
     for result in report.results:
         style = _STYLES[result.verdict]
@@ -55,7 +51,7 @@ def paper(
     screen.print(f"\n{len(report.results)} claims: {counts}")
     whole = [path for path in report.files if path.parent == out]
     for path in whole:
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+        say_written(screen, path)
     pictures = len(report.files) - len(whole)
     screen.print(f"[dim]wrote[/dim] {out / 'figures'}, {pictures} files", soft_wrap=True)
     if strict and report.count("fails"):

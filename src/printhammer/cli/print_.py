@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -20,13 +21,11 @@ if TYPE_CHECKING:
 
 EXAMPLE: Final = "Example: printhammer print 'Bounce and chaotic motion' --rate 1.4kHz --out page.png"
 
-_PICTURES: Final = (".png", ".pdf", ".svg")
 _TABLES: Final = (".nc", ".csv")
 _USUAL: Final = ("printed.png", "printed.pdf", "printed-zoom.png")
 _PATTERN: Final = "What to print (a text, or --pattern)"
 _HEAD: Final = "Print head"
 _FILES: Final = "Files"
-_DPI: Final = 200.0
 
 
 def _option(panel: str, flag: str, metavar: str, text: str) -> Any:
@@ -123,13 +122,15 @@ def print_(
     from rich.markup import escape
 
     from printhammer.cli.feedback import feedback_strategy
+    from printhammer.cli.saving import PICTURES, check_endings, say_written, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs
     from printhammer.printing.limits import limits_named
     from printhammer.printing.nominal import rate_of
     from printhammer.printing.page import print_page
-    from printhammer.printing.pattern_file import BITMAPS
+    from printhammer.printing.page_tables import save_page
+    from printhammer.printing.pattern_file import BITMAPS, SUFFIXES
 
     if rate is None:
         raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'")
@@ -141,7 +142,10 @@ def print_(
     if not wanted and not views and save is None:
         *pages, last = (Path(name) for name in _USUAL)
         wanted, views = pages, [(last, "zoom")]
-    _check_names(wanted, [path for path, _view in views], save)
+    check_endings(wanted, (*PICTURES, *_TABLES))
+    check_endings([zoom] if zoom else [], PICTURES, "--zoom")
+    check_endings([sheet] if sheet else [], PICTURES, "--sheet")
+    check_endings([save] if save else [], SUFFIXES, "--save")
     read = [path for path in (pattern, font, table, Path(hammer)) if path is not None]
     check_outputs([*wanted, *(path for path, _view in views), *([save] if save else [])], read)
     asked = _pattern(text, pattern, font, whole(wires, "--wires"), whole(columns, "--columns"))
@@ -172,31 +176,17 @@ def print_(
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     screen.print(f"[dim]{page.status.size} runs, {page.line.size} dots, computed in {seconds:.2g} s[/dim]\n")
     screen.print(told(page, units))
-    for path in wanted:
-        _write(page, path)
+    write_found(screen, wanted, page.plot, partial(save_page, page))
     for path, view in views:
-        _draw(page, path, view)
+        write_found(screen, [path], partial(page.plot, view=view), partial(save_page, page))
     if save is not None:
         asked.save(save)
-    for path in [*wanted, *(path for path, _view in views), *([save] if save else [])]:
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+        say_written(screen, save)
     failed = page.status[page.status != "ok"]
     if failed.size:
         kinds = ", ".join(sorted(set(failed.tolist())))
         complain(f"{failed.size} of {page.status.size} runs ended early: {kinds}")
         raise typer.Exit(1)
-
-
-def _check_names(pages: list[Path], pictures: list[Path], save: Path | None) -> None:
-    from printhammer.errors import InputError
-    from printhammer.printing.pattern_file import SUFFIXES
-
-    patterns = [save] if save else []
-    kinds = ((pages, (*_PICTURES, *_TABLES)), (pictures, _PICTURES), (patterns, SUFFIXES))
-    for paths, known in kinds:
-        for path in paths:
-            if path.suffix not in known:
-                raise InputError(f"{path}: expected a name that ends in one of {', '.join(known)}")
 
 
 def _pattern(
@@ -282,18 +272,3 @@ def told(page: Page, units: Units) -> Table:
             f"{dark.min():.2f} to {dark.max():.2f}, mean {dark.mean():.2f}, spread {np.std(dark):.3f}",
         )
     return table
-
-
-def _write(page: Page, path: Path) -> None:
-    if path.suffix in _PICTURES:
-        _draw(page, path, "page")
-        return
-    from printhammer.printing.page_tables import save_page
-
-    save_page(page, path)
-
-
-def _draw(page: Page, path: Path, view: str) -> None:
-    from printhammer.figures.save import save
-
-    save(page.plot(view=view), path.parent, path.stem, formats=[path.suffix[1:]], dpi=_DPI)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -14,16 +14,11 @@ from printhammer.cli.run import HAMMER, HammerArgument, UnitsOption
 from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rich.console import Console
-
     from printhammer.hammer import Hammer
     from printhammer.printing.limits import Limits
 
 EXAMPLE: Final = "Example: printhammer quality hendriks-1983 --rate 900Hz --out quality.png"
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
 _REPORT: Final = "Report"
 _MORE: Final = "Instead of the report"
 _GRID: Final = "Limits and grid of rates"
@@ -107,6 +102,8 @@ def quality(
 
     from printhammer.cli import quality_screen, run_files
     from printhammer.cli.feedback import feedback_strategy
+    from printhammer.cli.progress import counting, telling
+    from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.drive import PulseTrain
     from printhammer.errors import InputError
@@ -114,10 +111,7 @@ def quality(
     from printhammer.printing.quality_tables import SUFFIXES, save_result
 
     wanted = out or []
-    for path in wanted:
-        if path.suffix.lower() not in (*SUFFIXES, *_PICTURES):
-            known = ", ".join((*SUFFIXES, *_PICTURES))
-            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
+    check_endings(wanted, (*SUFFIXES, *PICTURES))
     read = [Path(hammer), *([] if table is None else [table])]
     check_outputs(wanted, read)
     options = {
@@ -180,7 +174,8 @@ def quality(
     elif task == "safe-rate":
         from printhammer.printing.safe_rate import safe_rate as safe
 
-        found = _safely(lambda tell: safe(loaded, progress=tell, **many))
+        with telling("patterns") as say:
+            found = safe(loaded, progress=lambda at: say(f"patterns up to {at:g} Hz"), **many)
         lines = quality_screen.safe_rate(found, units)
     elif task == "yield":
         from printhammer.printing.tolerance import tolerance_yield
@@ -193,22 +188,21 @@ def quality(
         count = whole(yield_, "--yield")
         if not count or count < 1:
             raise InputError(f"--yield {yield_}: expected a number of hammers, 1 or more")
-        found = _computed(
-            "hammers",
-            lambda tell: tolerance_yield(loaded, rate, number=count, progress=tell, **spreads, **many),
-        )
+        with counting("hammers") as tell:
+            found = tolerance_yield(loaded, rate, number=count, progress=tell, **spreads, **many)
         lines = quality_screen.tolerance_yield(found, units)
     else:
         from printhammer.printing.damping import damping_study
 
         if current is not None:
             many["current"] = current
-        found = _computed("materials", lambda tell: damping_study(loaded, progress=tell, **many))
+        with counting("materials") as tell:
+            found = damping_study(loaded, progress=tell, **many)
         lines = quality_screen.damping(found, units)
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     screen.print(f"[dim]computed in {perf_counter() - begin:.2g} s[/dim]\n")
     screen.print(lines)
-    _write(found, wanted, screen, save_result)
+    write_found(screen, wanted, found.plot, partial(save_result, found))
     if bad:
         complain(bad)
         raise typer.Exit(1)
@@ -285,38 +279,3 @@ def _spreads(hammer: Hammer, given: list[str]) -> dict[str, Any]:
         if sign:
             found[key.strip()] = _share(value, f"--spread {key.strip()}")
     return {"spreads": found}
-
-
-def _safely(compute: Callable[[Callable[[float], None]], Any]) -> Any:
-    """Compute, and show up to which rate all is run."""
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn
-
-    columns, console = (SpinnerColumn(), TextColumn("{task.description}")), Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("patterns", total=None)
-        return compute(lambda rate: bar.update(task, description=f"patterns up to {rate:g} Hz"))
-
-
-def _computed(name: str, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:
-    """Compute, and show how far it is."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns, console = (TextColumn(name), BarColumn(), MofNCompleteColumn()), Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(name, total=None)
-        return compute(lambda done, total: bar.update(task, completed=done, total=total))
-
-
-def _write(found: Any, wanted: list[Path], screen: Console, save: Callable[[Any, Path], None]) -> None:
-    from printhammer.outputs import write_file
-
-    for path in wanted:
-        if path.suffix.lower() in _PICTURES:
-            buffer = BytesIO()
-            found.plot().savefig(buffer, format=path.suffix[1:].lower(), dpi=200.0)
-            write_file(path, buffer.getvalue())
-        else:
-            save(found, path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)

@@ -49,8 +49,8 @@ def search(
     """Try candidates, led by the claims, and note every one of them; Ctrl-C loses nothing."""
     from time import monotonic
 
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
+    from printhammer.cli.progress import telling
+    from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.cli.workers import worker_pool
     from printhammer.errors import InputError
@@ -70,17 +70,14 @@ def search(
     screen = console()
     count: int = 0
     best: dict[str, Any] | None = None
-    with Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=screen, transient=True
-    ) as progress:
-        task = progress.add_task("compiling and sampling", total=None)
+    with telling("compiling and sampling") as say:
 
         def tell(noted: int, least: float, row: dict[str, Any]) -> None:
             nonlocal count, best
             count, best = noted, row
             panels = row["measured"].get("panels")
             told = "" if panels is None else f", {panels} panels of Fig. 11 as printed"
-            progress.update(task, description=f"{noted} candidates, least loss {least:.3f}{told}")
+            say(f"{noted} candidates, least loss {least:.3f}{told}")
 
         with worker_pool(workers) as pool:
             for _row in candidates(plan, log, pool=pool, tell=tell):
@@ -90,7 +87,7 @@ def search(
         known = best["losses"]
         left = ", ".join(f"{name} {known[name]:.3f}" for name in WEIGHTS[plan.aim] if known.get(name))
         screen.print(f"{count} candidates; least loss {best['total']:.4f}: {left or 'none left'}")
-    screen.print(f"[dim]wrote[/dim] {log}", soft_wrap=True)
+    say_written(screen, log)
 
 
 @app.command("judge", epilog="Example: printhammer reconstruct judge all.jsonl judged.jsonl --best 20")
@@ -105,6 +102,8 @@ def judge(
 ) -> None:
     """Judge the best candidates of a search by the claims themselves, at the default tolerance."""
     from printhammer.claims import claims
+    from printhammer.cli.progress import counting
+    from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.cli.workers import worker_pool
     from printhammer.errors import InputError
@@ -121,11 +120,10 @@ def judge(
     announce_compiling()
     screen = console()
     names = list(claims()) if every_claim else list(STATED)
-    with _progress() as progress, worker_pool(workers) as pool:
-        task = progress.add_task("judging", total=len(chosen))
+    with counting("judging") as count, worker_pool(workers) as pool:
 
         def tell(done: int, of: int, _row: dict[str, Any]) -> None:
-            progress.update(task, completed=len(chosen) - of + done)
+            count(len(chosen) - of + done, len(chosen))
 
         found = judge_candidates(chosen, judged, names=names, pool=pool, tell=tell)
     whole = sum(all(row["verdicts"].get(name) for name in STATED) for row in found)
@@ -134,22 +132,7 @@ def judge(
         f"{len(found)} candidates judged: {whole} meet all stated claims outside Fig. 11; up to {panels}"
         " panels of Fig. 11 as printed"
     )
-    screen.print(f"[dim]wrote[/dim] {judged}", soft_wrap=True)
-
-
-def _progress() -> Any:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from printhammer.cli.terminal import console
-
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console(),
-        transient=True,
-    )
+    say_written(screen, judged)
 
 
 @app.command("base-rates", epilog="Example: printhammer reconstruct base-rates base_rates.json --hammers 10")
@@ -161,6 +144,7 @@ def base_rates(
     workers: WorkersOption = 2,
 ) -> None:
     """Count for how many random plausible hammers each claim holds."""
+    from printhammer.cli.progress import counting
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.cli.workers import worker_pool
     from printhammer.outputs import check_outputs
@@ -168,11 +152,8 @@ def base_rates(
 
     check_outputs([out])
     announce_compiling()
-    with _progress() as progress, worker_pool(workers) as pool:
-        task = progress.add_task("random hammers", total=hammers)
-        table = count(
-            hammers, seed, slow=slow, pool=pool, tell=lambda done, _of: progress.update(task, completed=done)
-        )
+    with counting("random hammers") as tell, worker_pool(workers) as pool:
+        table = count(hammers, seed, slow=slow, pool=pool, tell=tell)
     _write_json(out, table)
     for name, entry in table["claims"].items():
         console().print(f"{name}: {entry['holds']} of {entry['measured']}")
@@ -181,11 +162,12 @@ def base_rates(
 def _write_json(out: Path, table: dict[str, Any]) -> None:
     import json
 
+    from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import console
     from printhammer.outputs import write_file
 
     write_file(out, json.dumps(table, indent=1, allow_nan=False) + "\n")
-    console().print(f"[dim]wrote[/dim] {out}", soft_wrap=True)
+    say_written(console(), out)
 
 
 @app.command(
@@ -241,6 +223,7 @@ def ship(
     import math
 
     from printhammer.claims import claims
+    from printhammer.cli.progress import telling
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.errors import InputError
     from printhammer.outputs import check_outputs, make_folder
@@ -259,11 +242,10 @@ def ship(
     check_outputs([folder / f"{name}.toml", folder / "search.json"], [judged, *logs])
     announce_compiling()
     hammer.save(folder / f"{name}.toml")
-    with _progress() as progress:
-        task = progress.add_task("judging", total=len(claims()))
+    with telling("judging") as say:
 
         def tell(claim: str) -> None:
-            progress.update(task, description=claim.replace("_", " "), completed=list(claims()).index(claim))
+            say(f"judging {claim.replace('_', ' ')}, {list(claims()).index(claim) + 1} of {len(claims())}")
 
         table = search_json(hammer, rows, searches=searches, core_hours=core_hours, progress=tell)
     _write_json(folder / "search.json", table)

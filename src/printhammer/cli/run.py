@@ -92,6 +92,7 @@ def run(
     Ends with status 1 where the run stopped before its end, which the status line names.
     """
     from printhammer.cli import run_files, run_screen
+    from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, complain, console, load_checked
     from printhammer.drive_input import read_number
     from printhammer.problem import TOLERANCE
@@ -121,7 +122,7 @@ def run(
     run_screen.show(motion, units, screen)
     run_files.write(motion, wanted)
     for path in wanted.values():
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+        say_written(screen, path)
     if not motion.ok:
         complain(motion.message)
         raise typer.Exit(1)

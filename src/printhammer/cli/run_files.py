@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any, Final
 
+from printhammer.cli.saving import PICTURES, write_picture
 from printhammer.cli.tables import frame, named, named_energy
 from printhammer.errors import InputError
 from printhammer.outputs import check_outputs, write_file
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 _SUFFIXES: Final = {
     "dots": (".csv", ".parquet"),
     "contacts": (".csv", ".parquet"),
-    "plot": (".svg", ".png", ".pdf"),
+    "plot": PICTURES,
 }
 
 
@@ -65,7 +66,7 @@ def write(motion: Motion, wanted: Mapping[str, Path]) -> None:
         elif kind == "json":
             write_file(path, json.dumps(as_json(motion), indent=2, allow_nan=False) + "\n")
         elif kind == "plot":
-            _plot(motion, path)
+            write_picture(path, motion.plot())
         else:
             table = frame(motion.dots, Dot) if kind == "dots" else frame(motion.contacts, Contact)
             (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(table, path)
@@ -91,11 +92,3 @@ def as_json(motion: Motion) -> dict[str, Any]:
         "drive": motion.drive.to_toml(),
         "provenance": motion.provenance,
     }
-
-
-def _plot(motion: Motion, path: Path) -> None:
-    from io import BytesIO
-
-    buffer = BytesIO()
-    motion.plot().savefig(buffer, format=path.suffix[1:].lower())
-    write_file(path, buffer.getvalue())

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from matplotlib.figure import Figure
     from rich.console import Console
 
     from printhammer.hammer import Hammer
@@ -67,8 +67,6 @@ def write_found(
     wanted: Iterable[Path],
     plot: Callable[[], Any],
     save: Callable[[Path], Any],
-    *,
-    dpi: float | None = None,
 ) -> None:
     """Write a result, as a picture where the name is that of one, and say so.
 
@@ -82,22 +80,34 @@ def write_found(
         Returns a matplotlib figure.
     save : callable
         Writes any other file.
-    dpi : float, optional
-        Dots per inch of a picture; by default those of the figure.
 
     Raises
     ------
     InputError
         A file cannot be written.
     """
-    from printhammer.outputs import write_file
-
     for path in wanted:
-        ending = path.suffix.lower()
-        if ending in PICTURES:
-            buffer = BytesIO()
-            plot().savefig(buffer, format=ending[1:], dpi="figure" if dpi is None else dpi)
-            write_file(path, buffer.getvalue())
+        if path.suffix.lower() in PICTURES:
+            write_picture(path, plot())
         else:
             save(path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+        say_written(screen, path)
+
+
+def write_picture(path: Path, figure: Figure) -> None:
+    """Write a figure; the end of the name, one of `PICTURES`, tells how.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    from printhammer.figures.save import picture
+    from printhammer.outputs import write_file
+
+    write_file(path, picture(figure, path.suffix.lower()[1:]))
+
+
+def say_written(screen: Console, path: Path) -> None:
+    """Tell that a file was written."""
+    screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)

@@ -39,6 +39,7 @@ def sweep(
     if example or schema:
         typer.echo(_schema() if schema else _example(), nl=False)
         return
+    from printhammer.cli.saving import say_written
     from printhammer.cli.sweep_screen import Telling, show_plan, show_results
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.errors import InputError
@@ -62,7 +63,7 @@ def sweep(
     with Telling() as telling:
         found = run_sweep(spec, out, threads=whole(threads, "threads"), dask=dask, progress=telling.tell)
     show_results(found, telling.new, time.monotonic() - began, screen)
-    screen.print(f"[dim]wrote[/dim] {out}", soft_wrap=True)
+    say_written(screen, out)
 
 
 def _example() -> str:

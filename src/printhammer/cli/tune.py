@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from printhammer.cli.numbers import number, whole
+from printhammer.cli.numbers import number, rates_between, whole
 from printhammer.cli.run import HAMMER, HammerArgument, UnitsOption
 from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.table import Table
 
     from printhammer.control.table import CompensationTable
@@ -25,7 +22,7 @@ EXAMPLE: Final = (
     "Example: printhammer tune hendriks-1983 --rate 1.3kHz --history 2 --out table.csv --out table.h"
 )
 
-_PICTURES: Final = (".svg", ".png", ".pdf")
+_MOST_RATES: Final = 2000
 _ROWS: Final = 12
 
 
@@ -72,23 +69,22 @@ def tune(
     """
     from rich.markup import escape
 
+    from printhammer.cli.progress import counting
+    from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.control.table_files import SUFFIXES
     from printhammer.control.table_report import judge_table
     from printhammer.control.table_tuning import tune as tuned
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs, write_file
+    from printhammer.outputs import check_outputs, write_dataset
 
     wanted = out or []
-    for path in wanted:
-        if path.suffix.lower() not in (*SUFFIXES, *_PICTURES):
-            known = ", ".join((*SUFFIXES, *_PICTURES))
-            raise InputError(f"--out {path}: expected a name that ends in one of {known}")
-    if report is not None and report.suffix.lower() not in (".nc", *_PICTURES):
-        raise InputError(f"--report {report}: expected a name that ends in .nc, .svg, .png or .pdf")
-    if report is not None and not judge:
+    reports = [] if report is None else [report]
+    check_endings(wanted, (*SUFFIXES, *PICTURES))
+    check_endings(reports, (".nc", *PICTURES), "--report")
+    if reports and not judge:
         raise InputError(f"--report {report} is given, expected none beside --no-judge")
-    check_outputs([*wanted, *([] if report is None else [report])], [Path(hammer)])
+    check_outputs([*wanted, *reports], [Path(hammer)])
     if rate is not None and rates is not None:
         raise InputError("--rate and --rates are given, expected one of them")
     loaded = load_checked(hammer)
@@ -99,12 +95,11 @@ def tune(
     options = {key: value for key, value in given.items() if value is not None}
     announce_compiling()
     screen, begin = console(), perf_counter()
-    table: CompensationTable = _computed(
-        "tuning",
-        lambda tell: tuned(
+    with counting("tuning") as tell:
+        table = tuned(
             loaded,
             rate=rate,
-            rates=None if rates is None else _several(rates),
+            rates=None if rates is None else rates_between(rates, "--rates", most=_MOST_RATES),
             history=whole(history, "history") or 0,
             reach=whole(reach, "reach") or 0,
             brake=brake,
@@ -112,70 +107,24 @@ def tune(
             largest_current=largest_current,
             progress=tell,
             **options,
-        ),
-    )
+        )
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     screen.print(f"[dim]tuned in {perf_counter() - begin:.2g} s[/dim]\n")
     screen.print(told(table, units))
     found: TableReport | None = None
     if judge:
-        found = _computed("judging", lambda tell: judge_table(loaded, table, progress=tell, **options))
+        with counting("judging") as tell:
+            found = judge_table(loaded, table, progress=tell, **options)
         screen.print()
         screen.print(judged(found))
-    for path in wanted:
-        if path.suffix.lower() in _PICTURES:
-            write_file(path, _picture(table, path))
-        else:
-            table.save(path)
-        screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
-    if report is not None and found is not None:
-        if report.suffix.lower() == ".nc":
-            data = found.to_dataset().to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-            write_file(report, bytes(data))
-        else:
-            write_file(report, _picture(found, report))
-        screen.print(f"[dim]wrote[/dim] {report}", soft_wrap=True)
+    write_found(screen, wanted, table.plot, table.save)
+    if found is not None:
+        data = found.to_dataset()
+        write_found(screen, reports, found.plot, lambda path: write_dataset(path, data))
     if found is not None and not found.passed[1, 0].all():
         off = ", ".join(f"{one:g} Hz" for one in found.rates[~found.passed[1, 0]].tolist())
         complain(f"with the table not all dots are within the limits at {off}")
         raise typer.Exit(1)
-
-
-def _computed(name: str, compute: Callable[[Callable[[int, int], None]], Any]) -> Any:
-    """Compute, and show how far it is, where somebody looks."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn(name), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(name, total=None)
-        return compute(lambda done, total: bar.update(task, completed=done, total=total))
-
-
-def _several(text: str) -> list[float]:
-    """Read two rates and how many between them, such as '1.2 kHz, 1.4 kHz, 41'."""
-    import numpy as np
-
-    from printhammer.drive_input import read_count, read_positive
-    from printhammer.errors import InputError
-
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 3:
-        raise InputError(f"--rates {text!r}: expected two rates and a number, such as '1.2 kHz, 1.4 kHz, 41'")
-    low, high = (read_positive(part, "Hz", "--rates") for part in parts[:2])
-    count = read_count(whole(parts[2], "--rates") or 0, "--rates")
-    if high <= low or count < 2:
-        raise InputError(
-            f"--rates {text!r}: expected a higher rate after a lower one, and two of them at least"
-        )
-    return [float(one) for one in np.linspace(low, high, count)]
-
-
-def _picture(found: CompensationTable | TableReport, path: Path) -> bytes:
-    buffer = BytesIO()
-    found.plot().savefig(buffer, format=path.suffix[1:].lower(), dpi=200.0)
-    return buffer.getvalue()
 
 
 def told(table: CompensationTable, units: Units) -> Table:

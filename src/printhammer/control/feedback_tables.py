@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,5 +93,4 @@ def save_feedback(found: Feedback, path: str | Path) -> None:
     target = Path(path)
     if target.suffix.lower() != ".nc":
         raise InputError(f"{target}: expected a name that ends in .nc")
-    content = feedback_dataset(found).to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-    write_file(target, bytes(content))
+    write_dataset(target, feedback_dataset(found))

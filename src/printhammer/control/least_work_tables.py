@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.coil_work import coil_power
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,8 +117,7 @@ def save_least_work(found: LeastWork, path: str | Path) -> None:
     """
     target = Path(path)
     if target.suffix.lower() == ".nc":
-        content = least_work_dataset(found).to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-        write_file(target, bytes(content))
+        write_dataset(target, least_work_dataset(found))
     elif target.suffix.lower() == ".csv":
         write_file(target, current_csv(found))
     else:

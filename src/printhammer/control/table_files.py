@@ -27,7 +27,7 @@ from printhammer.control.histories import (
 )
 from printhammer.control.table import COLUMNS, CompensationTable
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -67,10 +67,7 @@ def save_table(table: CompensationTable, path: str | Path) -> None:
 
         write_file(target, header_text(table))
     elif suffix == ".nc":
-        # SciPy writes the classic format, which everything reads.
-        write_file(
-            target, bytes(table_dataset(table).to_netcdf(None, engine="scipy", format="NETCDF3_64BIT"))
-        )
+        write_dataset(target, table_dataset(table))
     else:
         raise InputError(f"{target}: expected a name that ends in one of {', '.join(SUFFIXES)}")
 

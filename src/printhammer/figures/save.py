@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 
 FORMATS: Final = ("svg", "pdf", "png")
 
+DOTS_PER_INCH: Final = 200.0
+"""Of a PNG, unless told otherwise."""
+
 _METADATA: Final[dict[str, dict[str, Any]]] = {
     # Neither dates nor versions, which would make equal figures differ.
     "svg": {"Date": None, "Creator": None},
@@ -23,8 +27,31 @@ _METADATA: Final[dict[str, dict[str, Any]]] = {
 }
 
 
+def picture(figure: Figure, kind: str, *, dpi: float = DOTS_PER_INCH) -> bytes:
+    """Return the contents of a file with a figure.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    kind : str
+        One of `FORMATS`.
+    dpi : float, optional
+        Dots per inch of a PNG.
+    """
+    buffer = BytesIO()
+    with in_style():
+        figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
+    return buffer.getvalue()
+
+
 def save(
-    figure: Figure, folder: str | Path, name: str, *, formats: Sequence[str] = FORMATS, dpi: float = 200.0
+    figure: Figure,
+    folder: str | Path,
+    name: str,
+    *,
+    formats: Sequence[str] = FORMATS,
+    dpi: float = DOTS_PER_INCH,
 ) -> list[Path]:
     """Write a figure into a folder, which is made if it is missing.
 
@@ -61,8 +88,7 @@ def save(
         target.mkdir(parents=True, exist_ok=True)
         try:
             for kind, draft in drafts.items():
-                with in_style():
-                    figure.savefig(draft, format=kind, dpi=dpi, metadata=_METADATA[kind])
+                draft.write_bytes(picture(figure, kind, dpi=dpi))
             # All or none, so that an interrupted call leaves no files of two figures under one name.
             for kind, draft in drafts.items():
                 draft.replace(paths[kind])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 from printhammer.printing.judging import FAULTS
 
 if TYPE_CHECKING:
@@ -136,9 +136,7 @@ def save_page(page: Page, path: str | Path) -> None:
         chart = page_dataset(page)
         # The classic NetCDF format has no truth values.
         truths = {name: values.astype(np.int8) for name, values in chart.items() if values.dtype == np.bool_}
-        # SciPy writes the classic format, which everything reads.
-        content = chart.assign(truths).to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")
-        write_file(target, bytes(content))
+        write_dataset(target, chart.assign(truths))
     elif target.suffix.lower() == ".csv":
         write_file(target, page_table(page).to_csv(index=False, float_format="%.17g"))
     else:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
+from printhammer.outputs import write_dataset, write_file
 from printhammer.printing.judging import FAULTS
 
 if TYPE_CHECKING:
@@ -195,8 +195,7 @@ def save_result(found: Quality | SafeRate, path: str | Path) -> None:
     kind = target.suffix.lower()
     chart = found.to_dataset()
     if kind == ".nc":
-        # SciPy writes the classic format, which everything reads.
-        write_file(target, bytes(chart.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")))
+        write_dataset(target, chart)
     elif kind == ".csv":
         table = chart.to_dataframe().reset_index()
         units = {name: chart[name].attrs.get("units", "1") for name in chart.variables}
