@@ -30,10 +30,10 @@ $(INSTALLED): $(LOCKED) pyproject.toml
 test: lint types contract test-fast ## everything but the slow tests
 
 test-fast: $(INSTALLED) ## the fast tests alone
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
 test-slow: $(INSTALLED) ## the slow tests alone
-	$(BIN)/python -m pytest -n $(WORKERS) -m slow
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m slow
 
 test-all: test test-slow ## everything
 

@@ -3,6 +3,11 @@
 Run it with ``.venv/bin/python docs/measure/feedback.py [--step HZ] [HAMMER ...]``; it takes hours a hammer.
 Safe rates are those of `printhammer.printing.safe_rate`: all patterns of eight slots and the de Bruijn cycle.
 The grid of rates has the step asked for, from 500 Hz on, and from the last rate that passes 5 Hz to the next.
+
+With ``--grid FIRST`` it looks at every rate of the grid of 5 Hz from there up to 2.2 times the open loop, for
+the hammer as it should be, and goes on after one that fails; some six seconds a rate.
+With ``--shares X [X ...]`` it counts how many of the 128 patterns that begin with a dot are within limits, at
+rates in parts of the open loop's safe rate, for all hammers that differ; some seconds a number.
 """
 
 import argparse
@@ -15,10 +20,12 @@ from printhammer.control.driver import driver_of
 from printhammer.control.feedback import FeedbackStrategy
 from printhammer.control.sensor import PositionSensor
 from printhammer.ensemble import DISPLAY_TOLERANCE
+from printhammer.printing.limits import Limits
 from printhammer.printing.page import Page
 from printhammer.printing.perturbation import Perturbation, perturbed
-from printhammer.printing.safe_rate import safe_rate
+from printhammer.printing.safe_rate import from_rest, safe_rate
 from printhammer.printing.strategy import Strategy, open_loop
+from printhammer.printing.trial import Case, attempt
 
 FIRST, FINE = 500.0, 5.0
 CASES = [
@@ -27,10 +34,12 @@ CASES = [
     *(Perturbation(travel=way) for way in (-10e-6, 10e-6)),
     *(Perturbation(current=share, travel=way) for share in (-0.03, 0.03) for way in (-10e-6, 10e-6)),
     *(Perturbation(forms=share) for share in (-0.1, 0.1)),
-    *(Perturbation(magnet=share) for share in (-0.02, 0.02)),
+    *(Perturbation(magnet=share) for share in (-0.01, 0.01)),
     *(Perturbation(damping=share) for share in (-0.2, 0.2)),
 ]
 SEEDS = range(1, 6)
+ASKED = 2.2
+"""How many times faster than the open loop feedback is asked to be."""
 TEXT = "The quick brown fox\njumps over the lazy dog\n0123456789 !?"
 
 
@@ -44,6 +53,43 @@ def fastest(hammer: ph.Hammer, strategy: Strategy, controller: Controller, step:
     return fine.rate, "" if fine.failure is None else fine.failure.text
 
 
+def every_rate(hammer: ph.Hammer, controller: Controller, first: float, own: float) -> None:
+    """Print which rates fail on the fine grid, from a first one to that which is asked for."""
+    strategy = FeedbackStrategy(controller)
+    rates = np.arange(first, ASKED * own + FINE, FINE)
+    failed = []
+    for number, rate in enumerate(rates.tolist(), 1):
+        found = safe_rate(
+            hammer,
+            strategy,
+            first=rate,
+            last=rate,
+            step=FINE,
+            nominal=controller.single,
+            tolerance=DISPLAY_TOLERANCE,
+        )
+        if found.failure is not None:
+            failed.append(rate)
+            print(found.failure.text, flush=True)
+        if number % 20 == 0 or number == rates.size:
+            print(f"{number} of {rates.size} rates, to {rate:g} Hz: {len(failed)} fail", flush=True)
+
+
+def counts(hammer: ph.Hammer, controller: Controller, own: float, shares: list[float]) -> None:
+    """Print how many patterns are within limits on hammers that differ, open loop and with feedback."""
+    patterns = from_rest(every=False)
+    print("| | " + " | ".join(f"{share:g} x, open loop | feedback" for share in shares) + " |")
+    print("|---" * (2 * len(shares) + 1) + "|")
+    for by in CASES:
+        cases = [Case(perturbed(hammer, by), controller.single, share * own) for share in shares]
+        ways = [
+            attempt(cases, patterns, way, limits=Limits(), tolerance=DISPLAY_TOLERANCE)
+            for way in (open_loop, FeedbackStrategy(controller))
+        ]
+        found = np.stack([way.judgement.passed.reshape(len(cases), -1).sum(axis=1) for way in ways], axis=1)
+        print(f"| {by.name} | " + " | ".join(map(str, found.ravel().tolist())) + " |", flush=True)
+
+
 def page_row(page: Page) -> str:
     """Return how good a page is."""
     on = page.printed
@@ -53,12 +99,23 @@ def page_row(page: Page) -> str:
     return f"{counts} | {dark:.3f} | {np.std(place):.1f}, worst {np.abs(place).max():.1f}"
 
 
-def measure(name: str, step: float) -> None:
-    """Print what is found for one hammer."""
+def measure(name: str, given: argparse.Namespace) -> None:
+    """Print what is asked for of one hammer."""
     hammer = ph.load(name)
     own = safe_rate(hammer).rate
     controller = Controller(hammer, driver_of(hammer))
-    print(f"\n{hammer.name}: open loop {own:.0f} Hz\n\n| | safe rate, Hz | to open loop | first failure |")
+    print(f"\n{hammer.name}: open loop {own:.0f} Hz\n", flush=True)
+    if given.grid is not None:
+        every_rate(hammer, controller, given.grid, own)
+    if given.shares:
+        counts(hammer, controller, own, given.shares)
+    if given.grid is None and not given.shares:
+        compare(hammer, controller, own, given.step)
+
+
+def compare(hammer: ph.Hammer, controller: Controller, own: float, step: float) -> None:
+    """Print safe rates, and pages."""
+    print("| | safe rate, Hz | to open loop | first failure |")
     print("|---|---|---|---|")
     for case in CASES:
         rate, why = fastest(perturbed(hammer, case), FeedbackStrategy(controller), controller, step)
@@ -68,7 +125,7 @@ def measure(name: str, step: float) -> None:
         print(f"| nominal, seed {seed} | {rate:.0f} | {rate / own:.2f} | {why} |", flush=True)
     print("\n| rate, Hz | | dots | lost | within limits | spread of darkness | placement, µm |")
     print("|---|---|---|---|---|---|---|")
-    for share in (1.5, 2.2):
+    for share in (1.5, ASKED):
         for way in (open_loop, FeedbackStrategy(controller)):
             page = ph.print_page(hammer, TEXT, share * own, strategy=way)
             print(f"| {share * own:.0f} | {page.strategy} | {page_row(page)} |", flush=True)
@@ -79,9 +136,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("hammers", nargs="*", default=["hendriks-1983"])
     parser.add_argument("--step", type=float, default=50.0)
+    parser.add_argument("--grid", type=float, metavar="FIRST")
+    parser.add_argument("--shares", type=float, nargs="+", default=[])
     given = parser.parse_args()
     for name in given.hammers:
-        measure(name, given.step)
+        measure(name, given)
 
 
 if __name__ == "__main__":

@@ -74,14 +74,6 @@ def test_a_hammer_without_a_rest_state_fails_with_the_reason(hammer: "ph.Hammer"
         assert "no rest state" in result.detail
 
 
-@pytest.mark.slow
-def test_every_claim_is_judged_for_the_shipped_hammer(hammer: "ph.Hammer") -> None:
-    results = judge_all(hammer)
-    assert [result.claim.name for result in results] == list(claims())
-    for result in results:
-        assert_complete(result)
-
-
 def assert_complete(result: Result) -> None:
     assert result.detail.endswith(".")
     if result.verdict == "not yet":
@@ -97,15 +89,13 @@ def assert_complete(result: Result) -> None:
     [
         {
             "backstop": {"law": "rigid", "position": "0.002 in", "restitution": "0.6"},
+            "pack": {"law": "dashpot", "front": "0.008 in", "stiffness": "400 N/mm", "damping": "20 N s/m"},
             "waveform": {"shape": "half-sine", "amplitude": "20 N", "width": "300 us"},
         },
-        {
-            "pack": {"law": "dashpot", "front": "0.008 in", "stiffness": "400 N/mm", "damping": "20 N s/m"},
-            "waveform.amplitude": "2 A",
-        },
+        {"waveform.amplitude": "2 A"},
         {"waveform.width": "3 ms"},
     ],
-    ids=["rigid backstop and a force", "dashpot pack and a strong pulse", "long pulse"],
+    ids=["rigid backstop, dashpot pack and a force", "strong pulse", "long pulse"],
 )
 def test_no_claim_crashes_on_another_hammer(hammer: "ph.Hammer", changes: dict[str, object]) -> None:
     for result in judge_all(hammer.replace(changes), set(claims()) - MANY_RUNS):

@@ -95,4 +95,9 @@ def test_the_whole_report_twice(cli, tmp_path: Path) -> None:
         assert cli("paper", "--out", tmp_path / name).status == 0
     first, second = ((tmp_path / name / "claims.json").read_bytes() for name in ("first", "second"))
     assert first == second
-    assert [entry["name"] for entry in json.loads(first)] == list(claims())
+    entries = json.loads(first)
+    assert [entry["name"] for entry in entries] == list(claims())
+    for entry in entries:
+        assert entry["verdict"] in ("holds", "fails")
+        if entry["value"] is not None:
+            assert set(entry["band"]) <= set(entry["value"])

@@ -184,7 +184,7 @@ def test_losses_are_between_zero_and_one_and_go_into_the_log(aim: str) -> None:
 
 @pytest.mark.slow
 def test_losses_that_follow_whole_scans_of_rates() -> None:
-    chosen = some_candidates(12, 12, 3)
+    chosen = some_candidates(6, 6, 3)
     scores = looked_at(chosen)
     losses.hung(chosen, scores)
     for candidate, score in zip(chosen, scores, strict=True):
@@ -206,7 +206,7 @@ def test_losses_that_follow_whole_scans_of_rates() -> None:
 def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
     from printhammer.reconstruction.judged import plain_panels
 
-    chosen = some_candidates(8, 8, 9)[-8:]
+    chosen = some_candidates(5, 5, 9)[-5:]
     scores = [Score() for _ in chosen]
     panels(chosen, scores)
     right, off = 0, []
