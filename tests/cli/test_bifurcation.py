@@ -1,5 +1,6 @@
 import shlex
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +62,7 @@ def test_ctrl_c_writes_what_is_done(
     def interrupted(*_arguments: object, **_options: object) -> None:
         raise InterruptedDiagram(found)
 
-    monkeypatch.setattr("printhammer.cli.bifurcation._computed", interrupted)
+    monkeypatch.setattr(import_module("printhammer.chaos.bifurcation"), "bifurcation", interrupted)
     out = tmp_path / "diagram.csv"
     done = cli("bifurcation", "--values", "2", "--out", out)
     assert done.status == 130

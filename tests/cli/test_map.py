@@ -117,7 +117,10 @@ def test_runs_that_stop_are_named(cli: "Callable[..., object]", hammer: "ph.Hamm
         (("--pulses", "0"), "pulses = 0 is expected to be a whole number"),
         (("--tolerance", "2"), "tolerance = 2.0, expected a number from"),
         (("--threads", "0"), "threads = 0, expected at least 1"),
-        (("--out", "map.csv"), "--out map.csv: expected a name that ends in .nc, .zarr, .svg, .png, .pdf"),
+        (
+            ("--out", "map.csv"),
+            "--out map.csv: expected a name that ends in one of .nc, .zarr, .svg, .png, .pdf",
+        ),
         (("--out", "nowhere/map.nc"), "nowhere/map.nc: expected a file in a folder that exists"),
         (("--out", "map.nc", "--out", "map.nc"), "map.nc: expected a file of its own"),
         (("--figure", "7"), "--figure 7: expected 8 or 9"),

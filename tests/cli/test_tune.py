@@ -50,7 +50,7 @@ def test_what_is_gained_and_lost(cli: Callable, quick: Path, tmp_path: Path) -> 
         ("--rate 1mm", "rate"),
         ("--rate 1kHz --rates '1 kHz, 2 kHz, 3'", "expected one of them"),
         ("--rates '1 kHz, 2 kHz'", "expected two rates and a number"),
-        ("--rates '2 kHz, 1 kHz, 3'", "expected a higher rate after a lower one"),
+        ("--rates '2 kHz, 1 kHz, 3'", "expected the lower rate first"),
         ("--rate 1kHz --history 9", "history = 9, expected a whole number from 1 to 4"),
         ("--rate 1kHz --history one", "expected a whole number"),
         ("--rate 1kHz --reach 0", "reach"),

@@ -10,6 +10,7 @@ from printhammer.control.table_newton import LONGEST_STEP, changes
 
 FREE = np.array([1.0])
 
+number = st.floats(-1.0, 1.0)
 slope = st.floats(-2e5, 2e5)
 deviation = st.floats(-1.0, 1.0)
 
@@ -53,3 +54,22 @@ def test_no_other_change_is_better(rows: list[tuple[float, float, float]], room:
 
     # On its bound the step leaves the damping out.
     assert size(found / LONGEST_STEP) <= size(least.x) + 1e-3
+
+
+@given(st.tuples(number, number, number, number), number, number)
+def test_a_step_solves_two_equations_or_keeps_to_the_bounds(
+    slopes: tuple[float, float, float, float], force: float, arrival: float
+) -> None:
+    # Deviations per 100 us, as they are in a table.
+    matrix = np.array(slopes).reshape(1, 2, 2) * 1e4 + np.diag([2e4, 2e4])
+    off = 0.1 * np.array([[force, arrival]])
+    bound = np.array([3e-6])
+    later, wider = changes(matrix, off, -bound, bound)[0]
+    assert abs(wider) <= bound[0]
+    exact = -np.linalg.solve(matrix[0], off[0])
+    if abs(exact[1]) < 0.9 * bound[0]:
+        assert np.allclose([later, wider], exact, rtol=0.05, atol=2e-7)
+    elif abs(wider) == bound[0]:
+        # The best firing time with that width: the deviation that is left has no part along it.
+        left = off[0] + matrix[0] @ [later, wider]
+        assert abs(matrix[0][:, 0] @ left) <= 1e-6 * np.linalg.norm(matrix[0][:, 0])

@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from tests.control.test_table_tuning import RATE, SLOTS, quick
 
 import printhammer as ph
@@ -17,8 +15,6 @@ from printhammer.printing.perturbation import perturbed
 
 TOLERANCE = 1e-10
 PERIOD = 1.0 / RATE
-
-number = st.floats(-1.0, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -104,25 +100,6 @@ def test_pulses_that_do_not_fit_are_never_run(work: Work) -> None:
     ways = table_ways.ways_of([(PERIOD, 0.0, 0.0, early, 150e-6)])
     assert not table_ways.fits(work, ways).any()
     assert np.isinf(table_ways.costs(work, ways)).all()
-
-
-@given(st.tuples(number, number, number, number), number, number)
-def test_a_step_solves_two_equations_or_keeps_to_the_bounds(
-    slopes: tuple[float, float, float, float], force: float, arrival: float
-) -> None:
-    # Deviations per 100 us, as they are in a table.
-    matrix = np.array(slopes).reshape(1, 2, 2) * 1e4 + np.diag([2e4, 2e4])
-    off = 0.1 * np.array([[force, arrival]])
-    bound = np.array([3e-6])
-    later, wider = table_ways._changes(matrix, off, -bound, bound)[0]
-    assert abs(wider) <= bound[0]
-    exact = -np.linalg.solve(matrix[0], off[0])
-    if abs(exact[1]) < 0.9 * bound[0]:
-        assert np.allclose([later, wider], exact, rtol=0.05, atol=2e-7)
-    elif abs(wider) == bound[0]:
-        # The best firing time with that width: the deviation that is left has no part along it.
-        left = off[0] + matrix[0] @ [later, wider]
-        assert abs(matrix[0][:, 0] @ left) <= 1e-6 * np.linalg.norm(matrix[0][:, 0])
 
 
 def ways(rows: list[tuple[float, float, float]]) -> Ways:
