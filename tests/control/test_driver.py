@@ -20,6 +20,7 @@ def test_the_driver_is_as_fast_as_the_hammers_own_decay() -> None:
         Driver(2.0, -1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_a_stated_bound_is_that_of_its_own_drive_in_any_company(order: tuple[int, int]) -> None:
     """The bound sets the scale of the errors; a drive of the same pulses without one has another."""

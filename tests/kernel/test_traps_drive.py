@@ -188,7 +188,9 @@ def switches(motion: ph.Motion) -> list[tuple[str, float]]:
     return found
 
 
-@pytest.mark.parametrize("hammer", ["current", "force", "rigid", "dashpot"])
+@pytest.mark.parametrize(
+    "hammer", ["current", "force", "rigid", pytest.param("dashpot", marks=pytest.mark.slow)]
+)
 def test_a_run_restarted_exactly_on_a_switch_goes_on(hammer: str) -> None:
     """Cut at each switch and at each edge, and started again from the state there, the motion is the same."""
     end = 1.9e-3

@@ -92,6 +92,7 @@ def test_extra_contacts_are_those_of_the_motion(hammer: ph.Hammer, page: Page) -
         _check_extra_contacts(hammer, page, wire)
 
 
+@pytest.mark.slow
 def test_several_extra_contacts_of_one_firing() -> None:
     # A force that lasts holds the armature near a hard pack, where it bounces.
     push = Rectangle(amplitude=5.0, width=5e-3, rise=0.0, decay=0.0, quantity="force")
