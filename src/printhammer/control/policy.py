@@ -14,6 +14,7 @@ import itertools
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from printhammer.control.fronts import MIDDLE, OFFSETS, between_fronts
 from printhammer.control.swing_table import FORCES
@@ -35,6 +36,7 @@ _ROUNDS: Final = 8
 _LATENESS: Final = np.linspace(-0.9, 0.9, 13)
 _SPEED_DOUBT: Final = 0.04
 _STEEPEST: Final = 2e-3
+_NEAR: Final = 2
 _FAST: Final = 0.3
 _STEEP: Final = 8.0
 _EFFORT: Final = 0.1
@@ -164,13 +166,22 @@ class Policy:
         return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice
 
     def _doubts(self) -> FloatArray:
-        """Return what it costs that the speed of a touch is known only so well, for all ways, (T, A)."""
+        """Return what it costs that the speed of a touch is known only so well, for all ways, (T, A).
+
+        A way counts as steep as it is anywhere near: beside a jump, where it has one bounce more or less, the
+        table between the speeds says little.
+        """
         table = self.table
         found = np.zeros(table.next_touch.shape)
         for rows in self._rows:
-            slope = np.gradient(table.next_touch[rows], table.speed[rows], axis=0)
+            speeds, touch = table.speed[rows], table.next_touch[rows]
+            slope = np.abs(np.gradient(touch, speeds, axis=0))
+            steps = np.nan_to_num(np.abs(np.diff(touch, axis=0)) / np.diff(speeds)[:, np.newaxis])
+            steepest = maximum_filter1d(steps, 2 * _NEAR, axis=0, mode="constant")
+            around = np.vstack([steepest, steepest[-1:]])
             # At the end of what is possible there is no slope to either side.
-            found[rows] = np.square(np.nan_to_num(slope, nan=_STEEPEST) * _SPEED_DOUBT / self.limits.arrival)
+            slope = np.nan_to_num(np.maximum(slope, around), nan=_STEEPEST)
+            found[rows] = np.square(slope * _SPEED_DOUBT / self.limits.arrival)
         return found
 
     def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
