@@ -99,5 +99,6 @@ def test_the_whole_report_twice(cli, tmp_path: Path) -> None:
     assert [entry["name"] for entry in entries] == list(claims())
     for entry in entries:
         assert entry["verdict"] in ("holds", "fails")
+        assert entry["detail"].endswith(".")
         if entry["value"] is not None:
             assert set(entry["band"]) <= set(entry["value"])
