@@ -9,8 +9,8 @@ damping of its own.
 Packed constants: c = [K, D, b].
 """
 
-from printhammer.constants import quantity
 from printhammer.parts import SpringPart, register
+from printhammer.support.constants import quantity
 
 
 def spring_force(c, x):

@@ -8,8 +8,8 @@ import numpy as np
 from tests.hammers import CRUDE
 
 import printhammer as ph
-from printhammer.reconstruction.candidates import Candidate, candidates
-from printhammer.reconstruction.space import VARIABLES, constants_at, point_of, values_of
+from printhammer.reconstruction.search.candidates import Candidate, candidates
+from printhammer.reconstruction.search.space import VARIABLES, constants_at, point_of, values_of
 
 Points = list[Any]
 

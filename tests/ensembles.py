@@ -10,8 +10,8 @@ import numpy.typing as npt
 from tests import hammers
 
 import printhammer as ph
-from printhammer.ensemble import Ensemble, EnsembleResult
 from printhammer.kernel.lane_layout import LANES
+from printhammer.run.ensemble import Ensemble, EnsembleResult
 
 SIZE = 3 * LANES + 100
 TIMES = np.linspace(0.0, 7e-3, 600)

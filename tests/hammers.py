@@ -17,20 +17,20 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer import constant_flow
+from printhammer.derivatives import constants as constant_flow
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
 from printhammer.kernel import specialise, specialise_sensitivity
 from printhammer.kernel.reference import ReferenceRun, reference
-from printhammer.parts.backstop_elastomer import ElastomerBackstop
-from printhammer.parts.backstop_hertz import HertzBackstop
-from printhammer.parts.backstop_rigid import RigidBackstop
+from printhammer.parts.backstop.elastomer import ElastomerBackstop
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.parts.backstop.rigid import RigidBackstop
 from printhammer.parts.base import Part
-from printhammer.parts.magnet_inverse_root import InverseRootMagnet
-from printhammer.parts.pack_dashpot import DashpotPack
-from printhammer.parts.pack_power import PowerPack
-from printhammer.parts.spring_linear import LinearSpring
-from printhammer.parts.spring_preload import PreloadSpring
-from printhammer.problem import Problem
-from printhammer.waveforms import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
+from printhammer.parts.magnet.inverse_root import InverseRootMagnet
+from printhammer.parts.pack.dashpot import DashpotPack
+from printhammer.parts.pack.power import PowerPack
+from printhammer.parts.spring.linear import LinearSpring
+from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.run.problem import Problem
 
 CRUDE = Path(__file__).parent / "data" / "hendriks-1983.toml"
 """A first, crude reconstruction, whose numbers tests may rely on: the shipped hammer is not meant to stay."""

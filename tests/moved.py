@@ -10,9 +10,9 @@ from tests.tangents import SHARP, arrive, richardson
 
 import printhammer as ph
 from printhammer.chaos.sensitivity_dots import RUN_QUANTITIES, dot_values
-from printhammer.constant_flow import constant_map
-from printhammer.parameters import parameters
-from printhammer.problem import Problem
+from printhammer.derivatives.constants import constant_map
+from printhammer.derivatives.parameters import parameters
+from printhammer.run.problem import Problem
 
 Drive = ph.PulseTrain | ph.SineForce
 MINUTE = 1e-14

@@ -5,8 +5,8 @@ from typing import cast
 import numpy as np
 from hypothesis import strategies as st
 
-from printhammer.drive_sequence import PulseSequence
-from printhammer.waveforms import Chain, HalfSine, Rectangle, Sampled, Trapezoid, Waveform
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.waveforms.shapes import Chain, HalfSine, Rectangle, Sampled, Trapezoid, Waveform
 
 widths = st.floats(1e-5, 2e-3)
 edges = st.one_of(st.just(0.0), st.floats(1e-6, 1e-4))

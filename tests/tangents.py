@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 import printhammer as ph
+from printhammer.derivatives.states import TangentMap, tangent_map
 from printhammer.kernel import carry
 from printhammer.kernel.modes import RELOADING, UNLOADING
-from printhammer.problem import Problem, fresh_carry
-from printhammer.tangent import TangentMap, tangent_map
+from printhammer.run.problem import Problem, fresh_carry
 
 SHARP = 1e-13
 """Tolerance of runs whose differences are taken."""

@@ -14,7 +14,7 @@ EXAMPLES = ROOT / "examples"
 PARTS = {"cubic_spring"}
 SCRIPTS = sorted(path for path in EXAMPLES.glob("*.py") if path.stem not in PARTS)
 # What a part from outside the package is made of.
-FOR_PARTS = {"printhammer.constants", "printhammer.parts"}
+FOR_PARTS = {"printhammer.support.constants", "printhammer.parts"}
 
 
 def imported(path: Path) -> set[str]:

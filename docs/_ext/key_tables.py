@@ -8,8 +8,8 @@ from docutils import nodes
 from docutils.statemachine import StringList
 from sphinx.util.docutils import SphinxDirective
 
-from printhammer.constants import Quantity, quantities
-from printhammer.hammer_file import SELECTORS, Body, file_options, kinds_of, model_of
+from printhammer.hammer.file import SELECTORS, Body, file_options, kinds_of, model_of
+from printhammer.support.constants import Quantity, quantities
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

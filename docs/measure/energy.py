@@ -6,7 +6,7 @@ rest, the settle-out included, for the shipped hammer and five of its family; th
 
 import printhammer as ph
 from printhammer.control.least_work import NoBurstError
-from printhammer.reconstruction.family import family_hammers
+from printhammer.reconstruction.family.family import family_hammers
 
 FAMILY = ("02", "06", "10", "14", "18")
 FORCES = (0.9, 1.1, 1.2)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 import printhammer as ph
-from printhammer.ensemble import DISPLAY_TOLERANCE
 from printhammer.kernel.reference import horizon, reference
-from printhammer.problem import TOLERANCE
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.problem import TOLERANCE
 
 PULSES = 9
 GRID = np.linspace(0.0, 17e-3, 512)

@@ -19,13 +19,13 @@ from printhammer.control.controller import Controller
 from printhammer.control.driver import driver_of
 from printhammer.control.feedback import FeedbackStrategy
 from printhammer.control.sensor import PositionSensor
-from printhammer.ensemble import DISPLAY_TOLERANCE
 from printhammer.printing.limits import Limits
 from printhammer.printing.page import Page
 from printhammer.printing.perturbation import Perturbation, perturbed
 from printhammer.printing.safe_rate import from_rest, safe_rate
 from printhammer.printing.strategy import Strategy, open_loop
 from printhammer.printing.trial import Case, attempt
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 FIRST, FINE = 500.0, 5.0
 CASES = [

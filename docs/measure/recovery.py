@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import printhammer as ph
-from printhammer.identify.recovery import Recovery, recover
+from printhammer.identify.bench.recovery import Recovery, recover
 
 SPREAD = 0.2
 """Range of the constants of random hammers about the shipped one, both ways."""

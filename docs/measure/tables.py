@@ -19,7 +19,7 @@ from printhammer.control.table_report import PERTURBATIONS
 from printhammer.printing.nominal import nominal
 from printhammer.printing.perturbation import Perturbation, perturbed
 from printhammer.printing.safe_rate import SafeRate
-from printhammer.reconstruction.family import family_hammers
+from printhammer.reconstruction.family.family import family_hammers
 
 OTHERS = (1, 5, 9, 13, 17)
 """Places of the five hammers in the family."""

@@ -18,9 +18,9 @@ from tests.tangents import SHARP, before_slow_touches, deviation, scaled
 from tests.truth.test_tangent_finite_differences import CASES, MOVING, drive_of, hammer_of
 
 import printhammer as ph
-from printhammer.equilibrium import rest_state
-from printhammer.problem import TOLERANCE, Problem
-from printhammer.tangent import strobe_exponent, tangent_map
+from printhammer.derivatives.states import strobe_exponent, tangent_map
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.run.problem import TOLERANCE, Problem
 
 SIZES = (1e-4, 1e-5, 1e-3, 1e-6)
 """First spacings of the differences; the best counts, since each has its own rounding and curvature."""

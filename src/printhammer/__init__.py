@@ -32,16 +32,15 @@ if TYPE_CHECKING:
     from printhammer.control.table_files import load_table
     from printhammer.control.table_report import judge_table
     from printhammer.control.table_tuning import tune
-    from printhammer.drive import Burst, PulseTrain, SineForce
-    from printhammer.drive_sequence import PulseSequence
-    from printhammer.ensemble import Ensemble, EnsembleResult
-    from printhammer.equilibrium import equilibria, holding_margin, release_current, rest_state
+    from printhammer.drive.sequence import PulseSequence
+    from printhammer.drive.trains import Burst, PulseTrain, SineForce
+    from printhammer.drive.waveforms.shapes import Chain, Waveform
     from printhammer.errors import InputError, PrinthammerError
-    from printhammer.hammer import Hammer, load
+    from printhammer.hammer.equilibrium import equilibria, holding_margin, release_current, rest_state
+    from printhammer.hammer.hammer import Hammer, load
+    from printhammer.identify.bench.laboratory import measure
     from printhammer.identify.fitting import fit
-    from printhammer.identify.laboratory import measure
-    from printhammer.maps import frequency_map
-    from printhammer.motion import Motion
+    from printhammer.maps.frequency import frequency_map
     from printhammer.printing.damping import damping_study
     from printhammer.printing.limits import Limits
     from printhammer.printing.materials import Material
@@ -51,9 +50,10 @@ if TYPE_CHECKING:
     from printhammer.printing.quality import quality
     from printhammer.printing.safe_rate import safe_rate
     from printhammer.printing.tolerance import tolerance_yield
-    from printhammer.simulate import simulate
+    from printhammer.run.ensemble import Ensemble, EnsembleResult
+    from printhammer.run.motion import Motion
+    from printhammer.run.simulate import simulate
     from printhammer.sweep import sweep
-    from printhammer.waveforms import Chain, Waveform
 
 __version__ = "0.1.0"
 

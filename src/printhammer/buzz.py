@@ -20,10 +20,10 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.contacts import Contact
-    from printhammer.hammer import Hammer
-    from printhammer.motion import Motion
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.contacts import Contact
+    from printhammer.run.motion import Motion
 
 MAX_CURRENT: Final = 2.0
 """Largest coil current of a train, A: the range of the paper's Fig. 2."""
@@ -235,8 +235,8 @@ def delayed_train(
 
 
 def _run(hammer: Hammer, times: Sequence[float], patience: float | None) -> Motion:
-    from printhammer.drive import PulseTrain
-    from printhammer.simulate import simulate
+    from printhammer.drive.trains import PulseTrain
+    from printhammer.run.simulate import simulate
 
     drive = PulseTrain(_waveform(hammer), at=list(times))
     duration = None if patience is None else times[-1] + patience

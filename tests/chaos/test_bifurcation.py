@@ -18,7 +18,7 @@ from printhammer.chaos.bifurcation_tables import bifurcation_table, meaning_of, 
 from printhammer.chaos.bifurcation_windows import cells, doublings, hysteresis
 from printhammer.chaos.regime import Regime
 from printhammer.chaos.verdict import period_of, repeats
-from printhammer.parts.spring_preload import PreloadSpring
+from printhammer.parts.spring.preload import PreloadSpring
 
 ARRAYS = ("values", "x", "v", "branch", "status", "cycles", "distances", "levels")
 SHORT = {"firings": 80, "transient": 40}

@@ -16,7 +16,7 @@ from printhammer.chaos import Lyapunov, LyapunovChart, lyapunovs, strobes
 from printhammer.chaos.lyapunov import cycle_of, kaplan_yorke, whole_cycles
 from printhammer.chaos.lyapunov_tables import SUFFIXES, chart_table, save_lyapunov
 from printhammer.claims.verdicts import printed_verdicts
-from printhammer.tangent import standard_error, strobe_exponent
+from printhammer.derivatives.states import standard_error, strobe_exponent
 
 FEW = {"firings": 120, "transient": 100}
 ROWS = ("exponents", "standard_errors", "total", "total_error", "dimension", "dimension_error", "k")

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import printhammer as ph
 from printhammer.chaos.quench import QuenchMap, two_pulse_drive
 from printhammer.chaos.quench_tables import quench_table, save_quench
-from printhammer.segments import table
-from printhammer.waveforms import HalfSine, Rectangle, Trapezoid
+from printhammer.drive.segments import table
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
 
 TIGHT = 1e-11
 US = 1e-6

@@ -5,7 +5,7 @@ import pytest
 
 import printhammer as ph
 from printhammer.chaos import Regime
-from printhammer.waveforms import HalfSine
+from printhammer.drive.waveforms.shapes import HalfSine
 
 
 def test_period_and_rate(hammer: ph.Hammer) -> None:

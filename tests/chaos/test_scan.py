@@ -8,7 +8,7 @@ from printhammer.chaos import strobes
 from printhammer.chaos.scan import CLOSER, LARGEST_MULTIPLIER, largest_multiplier, scan
 from printhammer.chaos.train import Train, run_trains
 from printhammer.chaos.verdict import AGREEMENT, LAST
-from printhammer.problem import TOLERANCE
+from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
     import printhammer as ph

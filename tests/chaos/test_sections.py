@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer import touches
 from printhammer.chaos import Section, sections
+from printhammer.run import touches
 
 PERIOD = 1.05e-3
 

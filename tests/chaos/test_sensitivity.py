@@ -8,7 +8,7 @@ from tests.hammers import block, hertz, interpreted, made_of, power, preload
 
 import printhammer as ph
 from printhammer.chaos import Sensitivities
-from printhammer.parameters import parameter_names, parameters
+from printhammer.derivatives.parameters import parameter_names, parameters
 
 
 @pytest.fixture(scope="module")

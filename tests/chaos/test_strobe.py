@@ -11,8 +11,8 @@ from printhammer.chaos import Strobe, strobes
 from printhammer.chaos.tables import save_strobe, strobe_table
 from printhammer.chaos.window import PAPER_WINDOW, window_of
 from printhammer.claims import claims
-from printhammer.ensemble import MODE_NAMES
-from printhammer.parts.spring_preload import PreloadSpring
+from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.run.ensemble import MODE_NAMES
 
 MASS, STIFFNESS, FREQUENCY, AMPLITUDE = 1e-3, 900.0, 100.0, 0.5
 OMEGA = 2.0 * math.pi * FREQUENCY

@@ -14,7 +14,7 @@ from printhammer.chaos.verdict import (
     repeats,
     verdict,
 )
-from printhammer.tangent import Exponent, standard_error
+from printhammer.derivatives.states import Exponent, standard_error
 
 RANDOM = np.random.default_rng(64)
 ONES = np.ones(3)

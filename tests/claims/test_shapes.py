@@ -8,7 +8,7 @@ from scipy.stats import spearmanr
 
 from printhammer.claims.shapes import falling, largest, rank_correlation
 from printhammer.claims.two_pulses import half_rise
-from printhammer.waveforms import HalfSine, Rectangle, Trapezoid
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
 
 
 @given(st.floats(0.02, 0.98))

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 import printhammer as ph
-from printhammer.hammer import shipped
+from printhammer.hammer.hammer import shipped
 
 
 def test_show_tells_every_constant_with_status_and_source(cli, hammer: "ph.Hammer") -> None:

@@ -10,7 +10,7 @@ import xarray as xr
 
 import printhammer as ph
 from printhammer.cli import map as verb
-from printhammer.map_layout import save_map
+from printhammer.maps.layout import save_map
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,7 +10,7 @@ import pytest
 import printhammer as ph
 from printhammer.cli.main import app
 from printhammer.cli.measure import EXAMPLE
-from printhammer.identify.laboratory import KINDS
+from printhammer.identify.bench.laboratory import KINDS
 from printhammer.identify.tables import read_table
 
 

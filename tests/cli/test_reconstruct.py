@@ -21,10 +21,12 @@ from printhammer.claims import claims, judge_all
 from printhammer.cli.main import app
 from printhammer.cli.reconstruct import EXAMPLE
 from printhammer.cli.reconstruct import app as verbs
-from printhammer.reconstruction import base_rates as rates
-from printhammer.reconstruction import search, shipping, shortlist
-from printhammer.reconstruction.judged import FIGURE_11, SLOW, STATED
+from printhammer.reconstruction import shipping
+from printhammer.reconstruction.judging import base_rates as rates
+from printhammer.reconstruction.judging import shortlist
+from printhammer.reconstruction.judging.judged import FIGURE_11, SLOW, STATED
 from printhammer.reconstruction.results import BaseRates, Predictions, Search
+from printhammer.reconstruction.search import search
 
 HEADING = {"format": 1, "aim": "stated", "seed": 4}
 BRIEF = ("--minutes", "0.00001", "--workers", "1")

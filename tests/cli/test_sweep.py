@@ -9,7 +9,7 @@ import pytest
 
 from printhammer.cli.sweep import EXAMPLE
 from printhammer.cli.sweep_screen import Telling, duration_text, progress_text, size_text
-from printhammer.store import open_store
+from printhammer.results.store import open_store
 
 SCRIPTS = Path(sysconfig.get_path("scripts"))
 SPEC = """

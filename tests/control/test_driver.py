@@ -7,7 +7,7 @@ from tests import hammers
 import printhammer as ph
 from printhammer.control.bounded import BoundedSequence
 from printhammer.control.driver import Driver, driver_of
-from printhammer.waveforms import Switched
+from printhammer.drive.waveforms.shapes import Switched
 
 
 def test_the_driver_is_as_fast_as_the_hammers_own_decay() -> None:

@@ -15,7 +15,7 @@ from printhammer.control.driver import driver_of
 from printhammer.control.feedback import Feedback, FeedbackStrategy
 from printhammer.control.learning import FRONT_ERROR, SCALE_ERROR
 from printhammer.control.sensor import PositionSensor
-from printhammer.drive_file import read_drive
+from printhammer.drive.file import read_drive
 from printhammer.printing.limits import Limits
 from printhammer.printing.perturbation import Perturbation, perturbed
 from printhammer.printing.slots import eight_slot_patterns, slots_of

@@ -6,8 +6,8 @@ from matplotlib.colors import to_rgb
 
 import printhammer as ph
 from printhammer.chaos import Bifurcation
-from printhammer.figures import basins as basin_figures
-from printhammer.figures.bifurcation import SHADES
+from printhammer.figures.chaos import basins as basin_figures
+from printhammer.figures.chaos.bifurcation import SHADES
 
 
 def gids(figure: object) -> list[str]:

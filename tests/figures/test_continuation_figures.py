@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 import printhammer as ph
 from printhammer.chaos import Branch, Branches, StabilityChart
-from printhammer.figures.continuation import colour_of
+from printhammer.figures.chaos.continuation import colour_of
 
 GRAVITY, RESTITUTION, FREQUENCY, GAMMA = 9.80665, 0.5, 50.0, 1.3
 WEIGHT = 1e-3 * GRAVITY

@@ -7,8 +7,8 @@ import printhammer as ph
 from printhammer.chaos import Strobe, strobes
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.figures import FIGURES
-from printhammer.figures.figure11 import PERIODS
-from printhammer.figures.strobe import shown_period
+from printhammer.figures.chaos.strobe import shown_period
+from printhammer.figures.paper.poincare import PERIODS
 
 INCH = 0.0254
 

@@ -10,9 +10,9 @@ from tests.measurements import write
 
 from printhammer.errors import InputError
 from printhammer.figures.fit import plot
-from printhammer.identify.backstop import Stiffness, fit_backstop
-from printhammer.identify.magnet import fit_magnet
-from printhammer.identify.pack import fit_pack
+from printhammer.identify.static.backstop import Stiffness, fit_backstop
+from printhammer.identify.static.magnet import fit_magnet
+from printhammer.identify.static.pack import fit_pack
 
 
 def texts(figure: Figure) -> str:

@@ -12,9 +12,9 @@ from matplotlib.lines import Line2D
 
 import printhammer as ph
 from printhammer.figures import FIGURES, save
-from printhammer.figures.figure8 import thinned
+from printhammer.figures.elements.map_marks import edges
 from printhammer.figures.map_comparison import compare_maps
-from printhammer.figures.map_marks import edges
+from printhammer.figures.paper.surface import thinned
 
 RATES = np.linspace(500.0, 2300.0, 37)
 

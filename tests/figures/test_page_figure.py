@@ -10,10 +10,10 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 import printhammer as ph
-from printhammer.drive import Drive
-from printhammer.figures import ink
-from printhammer.figures.ink import INK, PAPER, Sheet, coloured, inked
-from printhammer.figures.page import summary, whole_sheet, zoom_slots, zoomed_sheet
+from printhammer.drive.trains import Drive
+from printhammer.figures.elements import ink
+from printhammer.figures.elements.ink import INK, PAPER, Sheet, coloured, inked
+from printhammer.figures.printing.page import summary, whole_sheet, zoom_slots, zoomed_sheet
 from printhammer.printing.page import Page, print_page
 from printhammer.printing.pattern import Pattern
 from printhammer.printing.strategy import open_loop

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from printhammer.figures.curves import fired, places, settled_at, shown_until, times_of
-from printhammer.figures.room import freest
-from printhammer.figures.scales import scale
+from printhammer.figures.elements.curves import fired, places, settled_at, shown_until, times_of
+from printhammer.figures.elements.room import freest
+from printhammer.figures.elements.scales import scale
 
 if TYPE_CHECKING:
     import printhammer as ph

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import printhammer as ph
-from printhammer.figures.quality import plot_safe_rate
+from printhammer.figures.printing.quality import plot_safe_rate
 from printhammer.printing.damping import DampingStudy
 from printhammer.printing.judging import FAULTS
 from printhammer.printing.limits import Limits

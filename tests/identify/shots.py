@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 import printhammer as ph
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.identify.result import Fit, FittedConstant
-from printhammer.waveforms import Waveform
 
 FINE = 0.1e-6
 

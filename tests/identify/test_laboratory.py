@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from tests import hammers
 
 import printhammer as ph
-from printhammer.identify.laboratory import KINDS, SENSORS, SI, UNITS
-from printhammer.identify.sensor import Amount, Channel, Sensor, wrong_rows
-from printhammer.identify.sensor_settings import by_quantity
+from printhammer.identify.bench.laboratory import KINDS, SENSORS, SI, UNITS
+from printhammer.identify.bench.sensor import Amount, Channel, Sensor, wrong_rows
+from printhammer.identify.bench.sensor_settings import by_quantity
 from printhammer.identify.tables import read_table
 
 HAMMER = hammers.crude()

@@ -11,9 +11,9 @@ from tests.hammers import CRUDE
 from tests.identify import shots
 
 import printhammer as ph
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle
 from printhammer.errors import InputError
-from printhammer.identify.motion import fit_motion
-from printhammer.waveforms import HalfSine, Rectangle
+from printhammer.identify.shots.motion import fit_motion
 
 HAMMER = ph.load(CRUDE)
 assert HAMMER.waveform is not None

@@ -10,11 +10,11 @@ from tests.measurements import Array, write
 
 import printhammer as ph
 from printhammer.errors import InputError
-from printhammer.identify.backstop import RATIO, Stiffness, fit_backstop
-from printhammer.identify.magnet import fit_magnet
-from printhammer.identify.pack import fit_pack
 from printhammer.identify.result import Fit
-from printhammer.identify.spring import fit_spring
+from printhammer.identify.static.backstop import RATIO, Stiffness, fit_backstop
+from printhammer.identify.static.magnet import fit_magnet
+from printhammer.identify.static.pack import fit_pack
+from printhammer.identify.static.spring import fit_spring
 
 
 def noisy(columns: dict[str, Array], name: str, size: float, seed: int = 0) -> dict[str, Array]:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from printhammer import problem
+from printhammer.run import problem
 
 
 @pytest.fixture(autouse=True)

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from tests import hammers
 
 import printhammer as ph
-from printhammer import ensemble_group
-from printhammer.ensemble import Ensemble, EnsembleResult
 from printhammer.kernel import carry
 from printhammer.kernel.modes import BACKSTOP, HELD, PAUSED, STATUS_NAMES
-from printhammer.problem import MAX_STEPS, TOLERANCE, Problem, Record, fresh_carry
+from printhammer.run import ensemble_group
+from printhammer.run.ensemble import Ensemble, EnsembleResult
+from printhammer.run.problem import MAX_STEPS, TOLERANCE, Problem, Record, fresh_carry
 
 NODE, OPEN_AT_START = 5, 6
 """Columns of a contact."""

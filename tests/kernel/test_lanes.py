@@ -9,9 +9,9 @@ from tests import hammers
 from tests.ensembles import TIMES, Members, differing
 
 import printhammer as ph
-from printhammer import ensemble_group
-from printhammer.ensemble import DISPLAY_TOLERANCE, EnsembleResult
 from printhammer.kernel import lane_layout
+from printhammer.run import ensemble_group
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, EnsembleResult
 
 
 @pytest.fixture(scope="module")

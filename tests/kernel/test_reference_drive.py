@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from printhammer.drive import PulseTrain, SineForce
+from printhammer.drive.trains import PulseTrain, SineForce
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid
 from printhammer.kernel.reference_drive import ReferenceDrive
-from printhammer.waveforms import HalfSine, Rectangle, Sampled, Trapezoid
 
 SAMPLES = Sampled.from_samples([0.0, 1e-4, 1.5e-4, 4e-4], [0.0, 1.0, 0.8, 0.0])
 SHAPES = {

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from tests.truth import oracles
 
-from printhammer.drive import PulseTrain, SineForce
+from printhammer.drive.trains import PulseTrain, SineForce
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle
 from printhammer.kernel.reference import reference
 from printhammer.kernel.schemes_1983 import (
     CONTACT_STEP,
@@ -19,12 +20,11 @@ from printhammer.kernel.schemes_1983 import (
     integrate,
 )
 from printhammer.parts import absent
-from printhammer.parts.backstop_hertz import HertzBackstop
-from printhammer.parts.backstop_rigid import RigidBackstop
-from printhammer.parts.magnet_inverse_root import InverseRootMagnet
-from printhammer.parts.pack_power import PowerPack
-from printhammer.parts.spring_preload import PreloadSpring
-from printhammer.waveforms import HalfSine, Rectangle
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.magnet.inverse_root import InverseRootMagnet
+from printhammer.parts.pack.power import PowerPack
+from printhammer.parts.spring.preload import PreloadSpring
 
 MASS = 4e-4
 MAGNET = InverseRootMagnet(F0=2.47, Am=0.437, Bm=0.0931)

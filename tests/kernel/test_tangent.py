@@ -12,10 +12,10 @@ from tests.hammers import crude, made_of
 from tests.tangents import scaled
 
 import printhammer as ph
-from printhammer import tangent
+from printhammer.derivatives import states as tangent
+from printhammer.derivatives.states import standard_error, strobe_exponent, strobe_exponents, tangent_map
+from printhammer.drive.waveforms.shapes import Rectangle
 from printhammer.kernel.modes import BACKSTOP, LOADING, UNLOADING
-from printhammer.tangent import standard_error, strobe_exponent, strobe_exponents, tangent_map
-from printhammer.waveforms import Rectangle
 
 SCALES = hammers.STROKE, 2.0
 

@@ -9,9 +9,9 @@ from tests.hammers import FRONT, MASS, STOP, STROKE
 from tests.truth import oracles
 
 import printhammer as ph
-from printhammer.contacts import Contact
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
 from printhammer.kernel.reference import reference
-from printhammer.waveforms import HalfSine, Rectangle, Trapezoid
+from printhammer.run.contacts import Contact
 
 PULL = 1e4
 """Acceleration of `hammers.shelf` with 4 N, m/s^2."""

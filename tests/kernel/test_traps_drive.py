@@ -8,8 +8,8 @@ from tests import hammers
 from tests.hammers import FRONT, STOP, STROKE
 
 import printhammer as ph
-from printhammer.problem import TOLERANCE, Problem
-from printhammer.waveforms import HalfSine, Rectangle, Trapezoid
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
+from printhammer.run.problem import TOLERANCE, Problem
 
 BLOCK = Rectangle(amplitude=14.0, width=2e-4, rise=0.0, decay=0.0, quantity="force")
 
@@ -250,7 +250,7 @@ def test_an_armature_that_runs_away() -> None:
 
 
 def test_a_run_that_takes_too_many_steps_is_a_status(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("printhammer.problem.MAX_STEPS", 50)
+    monkeypatch.setattr("printhammer.run.problem.MAX_STEPS", 50)
     motion = run(ph.PulseTrain(BLOCK))
     assert motion.status == "step limit"
     assert "needed more than 50 steps" in motion.message

@@ -12,10 +12,10 @@ from tests import hammers
 from tests.hammers import FRONT, MASS, STOP, STROKE
 
 import printhammer as ph
-from printhammer.contacts import Contact
+from printhammer.drive.waveforms.shapes import Rectangle, Trapezoid
 from printhammer.kernel.landing import step_factor
 from printhammer.kernel.reference import reference
-from printhammer.waveforms import Rectangle, Trapezoid
+from printhammer.run.contacts import Contact
 
 PULL = 1e4
 """Deceleration of `hammers.shelf`, m/s^2."""

@@ -9,7 +9,7 @@ from tests import hammers
 from tests.hammers import MASS, STROKE
 
 import printhammer as ph
-from printhammer.waveforms import Trapezoid
+from printhammer.drive.waveforms.shapes import Trapezoid
 
 
 def test_the_end_of_the_range_of_a_fit_is_met() -> None:

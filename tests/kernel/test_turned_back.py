@@ -5,9 +5,9 @@ import pytest
 from tests.hammers import crude
 
 import printhammer as ph
-from printhammer.equilibrium import rest_state
+from printhammer.hammer.equilibrium import rest_state
 from printhammer.kernel.modes import ANY_SCALES
-from printhammer.problem import Problem
+from printhammer.run.problem import Problem
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.1, 0.3, 0.6, 0.9])

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from printhammer.errors import InputError
-from printhammer.parts.magnet_table import TableMagnet
+from printhammer.parts.magnet.table import TableMagnet
 
 GRID = """# measured on 1982-11-03
 displacement [mm],current [A],force [N]

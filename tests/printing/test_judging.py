@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.ensemble import DotTable
 from printhammer.printing.judging import FAULTS, judge
 from printhammer.printing.limits import Limits
 from printhammer.printing.nominal import SinglePulse
+from printhammer.run.ensemble import DotTable
 
 SINGLE = SinglePulse(force=20.0, flight_time=300e-6)
 US = 1e-6

@@ -8,7 +8,8 @@ import xarray as xr
 from tests.hammers import hertz, made_of, power, preload
 
 import printhammer as ph
-from printhammer.drive import Drive
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Rectangle
 from printhammer.printing import page as page_module
 from printhammer.printing.head import head_of
 from printhammer.printing.limits import PRESETS
@@ -17,7 +18,6 @@ from printhammer.printing.page_tables import page_table, save_page
 from printhammer.printing.pattern import Pattern
 from printhammer.printing.slots import FIRST_SLOT
 from printhammer.printing.strategy import open_loop
-from printhammer.waveforms import Rectangle
 
 TIGHT = 1e-12
 RATE = 1500.0

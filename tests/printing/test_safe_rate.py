@@ -7,7 +7,7 @@ import pytest
 from tests.hammers import made_of, preload
 
 import printhammer as ph
-from printhammer.drive import Drive
+from printhammer.drive.trains import Drive
 from printhammer.printing.limits import Limits
 from printhammer.printing.nominal import nominal, single_pulses
 from printhammer.printing.perturbation import Perturbation, perturbed

@@ -8,11 +8,11 @@ import pytest
 
 from printhammer.claims import Context, claims, judge
 from printhammer.claims.verdicts import printed_verdicts
-from printhammer.reconstruction import base_rates as module
-from printhammer.reconstruction.base_rates import MASSES, STROKE, base_rates, draw
-from printhammer.reconstruction.judged import FIGURE_11, SLOW
+from printhammer.reconstruction.judging import base_rates as module
+from printhammer.reconstruction.judging.base_rates import MASSES, STROKE, base_rates, draw
+from printhammer.reconstruction.judging.judged import FIGURE_11, SLOW
 from printhammer.reconstruction.results import BaseRates
-from printhammer.reconstruction.space import VARIABLES, hammer_of, values_of
+from printhammer.reconstruction.search.space import VARIABLES, hammer_of, values_of
 
 PANELS = [f"{period * 1e3:.2f} ms" for period in printed_verdicts()]
 

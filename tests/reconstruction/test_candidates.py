@@ -6,9 +6,9 @@ from tests.candidates import near_points, random_points, some_candidates
 
 from printhammer.claims import Context, claims, judge
 from printhammer.claims.definition import within
-from printhammer.equilibrium import rest_state
-from printhammer.reconstruction.candidates import candidates
-from printhammer.reconstruction.space import PRINT_FORCE, geometry, hammer_of, point_of, values_at
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.reconstruction.search.candidates import candidates
+from printhammer.reconstruction.search.space import PRINT_FORCE, geometry, hammer_of, point_of, values_at
 
 
 def test_candidates_print_the_stroke_of_the_paper() -> None:

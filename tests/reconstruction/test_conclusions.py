@@ -8,8 +8,8 @@ import pytest
 import printhammer as ph
 from printhammer.claims import Context
 from printhammer.claims.context import NotMeasurableError
-from printhammer.reconstruction import conclusions, safe_rate
-from printhammer.reconstruction.conclusions import QUANTITIES, Conclusions, conclude
+from printhammer.reconstruction.family import conclusions, safe_rate
+from printhammer.reconstruction.family.conclusions import QUANTITIES, Conclusions, conclude
 
 
 @pytest.fixture(scope="module")

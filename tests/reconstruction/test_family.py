@@ -8,12 +8,12 @@ import pytest
 
 import printhammer as ph
 from printhammer.errors import InputError
-from printhammer.reconstruction import family
-from printhammer.reconstruction.family import Member, csv_text, family_hammers, write_family
-from printhammer.reconstruction.family_picture import family_picture
-from printhammer.reconstruction.judged import STATED
+from printhammer.reconstruction.family import family
+from printhammer.reconstruction.family.family import Member, csv_text, family_hammers, write_family
+from printhammer.reconstruction.family.picture import family_picture
+from printhammer.reconstruction.judging.judged import STATED
 from printhammer.reconstruction.results import results_in
-from printhammer.reconstruction.space import hammer_of, template
+from printhammer.reconstruction.search.space import hammer_of, template
 from printhammer.units import to_si
 
 VARIED = ("waveform.rise", "waveform.decay", "backstop.damping", "backstop.stiffness")

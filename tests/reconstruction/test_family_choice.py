@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from printhammer.reconstruction.choice import choose, distances
-from printhammer.reconstruction.family import compared
+from printhammer.reconstruction.family.choice import choose, distances
+from printhammer.reconstruction.family.family import compared
 
 WIDTH = 5
 FEW = np.array([1.0, 1.05, 1.09, 1.11, 1.3, -1.0, 0.0])

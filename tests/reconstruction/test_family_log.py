@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from printhammer.errors import InputError
-from printhammer.reconstruction.family import promising
-from printhammer.reconstruction.family_log import read_logs
-from printhammer.reconstruction.judged_log import read_judged
+from printhammer.reconstruction.family.family import promising
+from printhammer.reconstruction.family.log import read_logs
+from printhammer.reconstruction.judging.log import read_judged
 
 GOOD = {
     "constants": {"mass": 4e-4},

@@ -5,13 +5,13 @@ import itertools
 import pytest
 
 from printhammer.errors import InputError
-from printhammer.reconstruction.choice import at_gauge
-from printhammer.reconstruction.conclusions import conclude
-from printhammer.reconstruction.family import _judge, family_hammers
-from printhammer.reconstruction.judged import STATED
+from printhammer.reconstruction.family.choice import at_gauge
+from printhammer.reconstruction.family.conclusions import conclude
+from printhammer.reconstruction.family.family import _judge, family_hammers
+from printhammer.reconstruction.family.robustness import robustness
+from printhammer.reconstruction.judging.judged import STATED
 from printhammer.reconstruction.results import FamilyMember, shipped_results
-from printhammer.reconstruction.robustness import robustness
-from printhammer.reconstruction.space import template
+from printhammer.reconstruction.search.space import template
 
 UNITS = {key: constant.si_unit for key, constant in template().constants.items()}
 

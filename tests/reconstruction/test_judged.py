@@ -12,10 +12,10 @@ from tests.hammers import CRUDE
 from printhammer.chaos import strobe
 from printhammer.claims import Context, claims, judge
 from printhammer.errors import InputError
-from printhammer.reconstruction import judged as module
-from printhammer.reconstruction.judged import FIGURE_11, SLOW, STATED, plain_panels, row_of, text_of
-from printhammer.reconstruction.judged_log import append, joined, key_of, mend, read_judged
-from printhammer.reconstruction.space import hammer_of
+from printhammer.reconstruction.judging import judged as module
+from printhammer.reconstruction.judging.judged import FIGURE_11, SLOW, STATED, plain_panels, row_of, text_of
+from printhammer.reconstruction.judging.log import append, joined, key_of, mend, read_judged
+from printhammer.reconstruction.search.space import hammer_of
 
 QUICK = ("geometry", "single_pulse_stroke", "release_margin", "two_pulses_660us", "print_force")
 ROW: dict[str, Any] = {

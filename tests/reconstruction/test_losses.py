@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from tests.candidates import near_points, random_points, some_candidates
 
 from printhammer.claims import Context, claims, judge
-from printhammer.reconstruction import losses
-from printhammer.reconstruction.candidates import Candidate, candidates
-from printhammer.reconstruction.evaluation import WEIGHTS, evaluate, rows
-from printhammer.reconstruction.losses import Score, hinge
-from printhammer.reconstruction.panel_losses import FIRINGS, panels
+from printhammer.reconstruction.search import losses
+from printhammer.reconstruction.search.candidates import Candidate, candidates
+from printhammer.reconstruction.search.evaluation import WEIGHTS, evaluate, rows
+from printhammer.reconstruction.search.losses import Score, hinge
+from printhammer.reconstruction.search.panel_losses import FIRINGS, panels
 
 QUICK = (
     "single_pulse_stroke",
@@ -204,7 +204,7 @@ def test_losses_that_follow_whole_scans_of_rates() -> None:
 
 @pytest.mark.slow
 def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
-    from printhammer.reconstruction.judged import plain_panels
+    from printhammer.reconstruction.judging.judged import plain_panels
 
     chosen = some_candidates(5, 5, 9)[-5:]
     scores = [Score() for _ in chosen]

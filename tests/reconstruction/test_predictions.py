@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from printhammer.claims import claims
-from printhammer.reconstruction.judged import FIGURE_11, STATED
-from printhammer.reconstruction.predictions import predictions
+from printhammer.reconstruction.judging.judged import FIGURE_11, STATED
+from printhammer.reconstruction.judging.predictions import predictions
 from printhammer.reconstruction.results import Predictions
 
 SHAPES = [name for name, claim in claims().items() if claim.kind == "shape"]

@@ -8,8 +8,8 @@ from scipy.stats import binomtest
 from tests.results import changed, write
 
 from printhammer.errors import InputError
+from printhammer.reconstruction.judging.shares import Share
 from printhammer.reconstruction.results import FILES, results_in, shipped_results
-from printhammer.reconstruction.shares import Share
 
 
 def test_all_that_is_there_is_read(tmp_path: Path) -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from printhammer.reconstruction.conclusions import QUANTITIES
-from printhammer.reconstruction.robustness import STATEMENTS, decisive_constants, robustness
+from printhammer.reconstruction.family.conclusions import QUANTITIES
+from printhammer.reconstruction.family.robustness import STATEMENTS, decisive_constants, robustness
 
 COUNT = 24
 

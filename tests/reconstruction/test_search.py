@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from printhammer.errors import InputError
-from printhammer.reconstruction import evaluation
-from printhammer.reconstruction import search as module
-from printhammer.reconstruction.explorer import CHEAP, Explorer
-from printhammer.reconstruction.search import Plan, search, starts_of
-from printhammer.reconstruction.space import VARIABLES
+from printhammer.reconstruction.search import evaluation
+from printhammer.reconstruction.search import search as module
+from printhammer.reconstruction.search.explorer import CHEAP, Explorer
+from printhammer.reconstruction.search.search import Plan, search, starts_of
+from printhammer.reconstruction.search.space import VARIABLES
 
 PLAN = Plan("all", seed=3, sample=16)
 SAMPLED = 16

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from printhammer.errors import InputError
-from printhammer.reconstruction.search_log import read_search
+from printhammer.reconstruction.search.log import read_search
 
 HEADING = {"format": 1, "aim": "stated", "seed": 4}
 

@@ -12,12 +12,12 @@ from tests.hammers import CRUDE
 import printhammer as ph
 from printhammer.claims import Result, claims
 from printhammer.reconstruction import shipping as module
-from printhammer.reconstruction.candidates import TOLERANCE
-from printhammer.reconstruction.judged import FIGURE_11, STATED
+from printhammer.reconstruction.judging.judged import FIGURE_11, STATED
+from printhammer.reconstruction.judging.shortlist import rounded
 from printhammer.reconstruction.results import results_in
+from printhammer.reconstruction.search.candidates import TOLERANCE
+from printhammer.reconstruction.search.space import BEYOND
 from printhammer.reconstruction.shipping import NOTE, TITLE, best_of, gauge, search_json, shipped_hammer
-from printhammer.reconstruction.shortlist import rounded
-from printhammer.reconstruction.space import BEYOND
 
 FAILING = ("settle_out", FIGURE_11, "release_margin")
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from printhammer.claims import claims
 from printhammer.errors import InputError
-from printhammer.reconstruction import shortlist as module
-from printhammer.reconstruction.judged import FIGURE_11, STATED
-from printhammer.reconstruction.shortlist import judge_candidates, rounded, shortlist, standing
+from printhammer.reconstruction.judging import shortlist as module
+from printhammer.reconstruction.judging.judged import FIGURE_11, STATED
+from printhammer.reconstruction.judging.shortlist import judge_candidates, rounded, shortlist, standing
 
 
 def candidate(*point: float, total: float, constants: Any = None) -> dict[str, Any]:

@@ -12,9 +12,10 @@ from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.claims.definition import claims
-from printhammer.equilibrium import rest_state
-from printhammer.reconstruction.choice import scaled
-from printhammer.reconstruction.space import (
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.static_force import StaticForce
+from printhammer.reconstruction.family.choice import scaled
+from printhammer.reconstruction.search.space import (
     PRINT_FORCE,
     VARIABLES,
     constants_at,
@@ -26,7 +27,6 @@ from printhammer.reconstruction.space import (
     values_at,
     values_of,
 )
-from printhammer.static_force import StaticForce
 
 POINTS = st.lists(st.floats(0.0, 1.0), min_size=len(VARIABLES), max_size=len(VARIABLES)).map(np.array)
 MASSES = st.floats(1e-5, 1e-2)

@@ -15,7 +15,7 @@ from printhammer.studio.frames import unframe
 
 SCRIPT = """
 import sys
-from printhammer.hammer import load
+from printhammer.hammer.hammer import load
 from printhammer.studio import serve
 serve(load(sys.argv[1]), ready=lambda address: print(address, flush=True))
 """
@@ -64,7 +64,7 @@ class Studio:
 @contextmanager
 def studio(hammer: str = str(CRUDE)) -> Iterator[Studio]:
     """Run a studio with a hammer, by default the crude one."""
-    from printhammer.hammer import load
+    from printhammer.hammer.hammer import load
 
     command = (sys.executable, "-c", SCRIPT, hammer)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

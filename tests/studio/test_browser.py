@@ -14,9 +14,9 @@ from tests.studio.server import Studio
 
 import printhammer as ph
 from printhammer.studio.bundle import module
-from printhammer.studio.engine import motion_frame
+from printhammer.studio.pictures.engine import motion_frame
 from printhammer.studio.session import answer, read_message
-from printhammer.studio.shelf import Shelf
+from printhammer.studio.states.shelf import Shelf
 
 CTRL, SHIFT = 2, 8
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"

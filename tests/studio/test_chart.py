@@ -8,13 +8,13 @@ from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
 import printhammer as ph
-from printhammer.ensemble import DISPLAY_TOLERANCE
 from printhammer.errors import InputError
-from printhammer.maps import TAIL
+from printhammer.maps.frequency import TAIL
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.studio import bounds
-from printhammer.studio.chart import GAP, codes_of, map_frame, map_key, try_map
 from printhammer.studio.frames import unframe
-from printhammer.studio.state import State, read_state
+from printhammer.studio.pictures.chart import GAP, codes_of, map_frame, map_key, try_map
+from printhammer.studio.states.state import State, read_state
 from printhammer.studio.work import GivenUp
 
 TEXT = CRUDE.read_text("utf-8")

@@ -3,8 +3,8 @@
 import pytest
 from tests.hammers import CRUDE
 
-from printhammer.hammer import Hammer, load, shipped
-from printhammer.studio import controls
+from printhammer.hammer.hammer import Hammer, load, shipped
+from printhammer.studio.states import controls
 from printhammer.units import to_si
 
 HAMMERS = [*shipped(), str(CRUDE)]

@@ -8,8 +8,8 @@ from tests.hammers import CRUDE
 
 from printhammer.errors import InputError
 from printhammer.studio.bounds import MOST_SAMPLES
-from printhammer.studio.drops import dropped, read_curve
 from printhammer.studio.frames import unframe
+from printhammer.studio.states.drops import dropped, read_curve
 
 
 def test_a_hammer_file_is_told_by_its_name() -> None:

@@ -7,10 +7,11 @@ from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
 import printhammer as ph
-from printhammer.ensemble import DISPLAY_TOLERANCE
-from printhammer.studio import bounds, engine
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.studio import bounds
 from printhammer.studio.frames import unframe
-from printhammer.studio.state import State, read_state
+from printhammer.studio.pictures import engine
+from printhammer.studio.states.state import State, read_state
 
 TEXT = CRUDE.read_text("utf-8")
 

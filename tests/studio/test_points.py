@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from printhammer.studio.engine import POINTS, points_of
+from printhammer.studio.pictures.engine import POINTS, points_of
 
 STEPS = st.lists(st.floats(1e-9, 1e-3), min_size=1, max_size=60)
 

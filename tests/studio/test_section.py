@@ -8,12 +8,12 @@ from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
 import printhammer as ph
+from printhammer.derivatives.states import strobe_exponent
 from printhammer.errors import InputError
 from printhammer.studio import bounds
 from printhammer.studio.frames import unframe
-from printhammer.studio.section import check_strobe, strobe_frame
-from printhammer.studio.state import State, read_state
-from printhammer.tangent import strobe_exponent
+from printhammer.studio.pictures.section import check_strobe, strobe_frame
+from printhammer.studio.states.state import State, read_state
 
 TEXT = CRUDE.read_text("utf-8")
 

@@ -10,15 +10,15 @@ import pytest
 from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
-from printhammer.hammer import Hammer
+from printhammer.hammer.hammer import Hammer
 from printhammer.studio import bounds
 from printhammer.studio import session as sessions
 from printhammer.studio.bounds import LARGEST_MESSAGE
 from printhammer.studio.frames import unframe
-from printhammer.studio.section import AT_ONCE, LATER
+from printhammer.studio.pictures.section import AT_ONCE, LATER
 from printhammer.studio.session import Session, read_message
-from printhammer.studio.shelf import Shelf
-from printhammer.studio.state import ProtocolError
+from printhammer.studio.states.shelf import Shelf
+from printhammer.studio.states.state import ProtocolError
 
 TEXT = CRUDE.read_text("utf-8")
 

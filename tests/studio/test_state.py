@@ -12,10 +12,10 @@ from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
 from printhammer.errors import InputError
-from printhammer.hammer import load
+from printhammer.hammer.hammer import load
 from printhammer.studio import bounds
-from printhammer.studio.shelf import Shelf
-from printhammer.studio.state import ProtocolError, dropped_hammer, read_state
+from printhammer.studio.states.shelf import Shelf
+from printhammer.studio.states.state import ProtocolError, dropped_hammer, read_state
 
 NAME = "tung-shaw-1988"
 TEXT = CRUDE.read_text("utf-8")

@@ -10,10 +10,10 @@ from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
 import printhammer as ph
-from printhammer.drive_file import read_drive
-from printhammer.studio.shelf import Shelf
-from printhammer.studio.state import State, read_state
-from printhammer.studio.texts import DRIVE_FILE, HAMMER_FILE, texts_of
+from printhammer.drive.file import read_drive
+from printhammer.studio.states.shelf import Shelf
+from printhammer.studio.states.state import State, read_state
+from printhammer.studio.states.texts import DRIVE_FILE, HAMMER_FILE, texts_of
 
 TEXT = CRUDE.read_text("utf-8")
 SAMPLED = {"shape": "sampled", "times": [0.0, 1e-4, 3e-4], "values": [0.0, 1.0, 0.0], "quantity": "current"}

@@ -12,7 +12,7 @@ import pytest
 from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
-from printhammer.hammer import load
+from printhammer.hammer.hammer import load
 from printhammer.studio import widget
 from printhammer.studio.bundle import module, style
 from printhammer.studio.files import page_files

@@ -11,8 +11,8 @@ from tests.studio.server import STATE
 from printhammer.errors import InputError
 from printhammer.studio import bounds
 from printhammer.studio.frames import unframe
-from printhammer.studio.printed import line_frame
-from printhammer.studio.state import State, read_state
+from printhammer.studio.pictures.printed import line_frame
+from printhammer.studio.states.state import State, read_state
 from printhammer.studio.work import GivenUp, Patience, alike, near
 
 TEXT = CRUDE.read_text("utf-8")

@@ -17,7 +17,7 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
-from printhammer.store import open_store
+from printhammer.results.store import open_store
 from printhammer.sweep import cluster
 from printhammer.sweep.outputs import WORKER_LOST
 

@@ -14,13 +14,13 @@ import xarray as xr
 from tests.hammers import CRUDE
 
 import printhammer as ph
-from printhammer.store import Store, open_store
+from printhammer.drive.waveforms.shapes import Rectangle
+from printhammer.results.store import Store, open_store
 from printhammer.sweep.members import check_tables
 from printhammer.sweep.outputs import DOTS, STATUSES
 from printhammer.sweep.plan import make_plan
 from printhammer.sweep.spec import read_spec
 from printhammer.sweep.work import run_chunk
-from printhammer.waveforms import Rectangle
 
 # So that two integrators agree although bounces amplify what they differ by.
 TIGHT = 1e-13

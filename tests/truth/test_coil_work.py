@@ -7,8 +7,8 @@ import pytest
 from tests import hammers
 
 import printhammer as ph
-from printhammer.coil_work import coil_power, squared_current
-from printhammer.waveforms import HalfSine, Rectangle, Sampled, Waveform
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Waveform
+from printhammer.run.coil_work import coil_power, squared_current
 
 
 def burst() -> ph.PulseTrain:

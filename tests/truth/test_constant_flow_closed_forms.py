@@ -14,11 +14,11 @@ from tests.truth import oracles
 
 import printhammer as ph
 from printhammer.chaos.sensitivity_dots import DOT_QUANTITIES
-from printhammer.constant_flow import constant_map, flow, rest_columns
-from printhammer.parameters import parameters
-from printhammer.problem import Problem
-from printhammer.tangent import tangent_map
-from printhammer.waveforms import Rectangle
+from printhammer.derivatives.constants import constant_map, flow, rest_columns
+from printhammer.derivatives.parameters import parameters
+from printhammer.derivatives.states import tangent_map
+from printhammer.drive.waveforms.shapes import Rectangle
+from printhammer.run.problem import Problem
 
 CLOSE = 1e-9
 AREA = 259.0

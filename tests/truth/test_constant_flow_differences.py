@@ -14,8 +14,8 @@ from tests.tangents import before_slow_touches
 from tests.truth.test_tangent_finite_differences import CASES, MOVING, drive_of, hammer_of
 
 import printhammer as ph
-from printhammer.equilibrium import rest_state
-from printhammer.parameters import parameter_names, parameters
+from printhammer.derivatives.parameters import parameter_names, parameters
+from printhammer.hammer.equilibrium import rest_state
 
 WANTED = 1e-6
 LATER = 20e-6

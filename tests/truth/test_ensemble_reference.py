@@ -10,9 +10,9 @@ import pytest
 from tests.hammers import TRUTH, Draw
 
 import printhammer as ph
-from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble, EnsembleResult
 from printhammer.kernel.reference import ReferenceRun, reference
-from printhammer.problem import TOLERANCE
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble, EnsembleResult
+from printhammer.run.problem import TOLERANCE
 
 BOUND = 1e-8
 """Largest error at the default tolerance, of the stroke."""

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from printhammer.equilibrium import equilibria, release_current, rest_state
+from printhammer.hammer.equilibrium import equilibria, release_current, rest_state
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, SpringPart
-from printhammer.parts.backstop_hertz import HertzBackstop
-from printhammer.parts.magnet_inverse_root import InverseRootMagnet
-from printhammer.parts.pack_power import PowerPack
-from printhammer.parts.spring_linear import LinearSpring
-from printhammer.parts.spring_preload import PreloadSpring
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.parts.magnet.inverse_root import InverseRootMagnet
+from printhammer.parts.pack.power import PowerPack
+from printhammer.parts.spring.linear import LinearSpring
+from printhammer.parts.spring.preload import PreloadSpring
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,9 @@
 import pytest
 
 import printhammer as ph
-from printhammer.reconstruction.choice import at_gauge, scaled
-from printhammer.reconstruction.family import print_forces
-from printhammer.reconstruction.space import CURRENT, PRINT_FORCE
+from printhammer.reconstruction.family.choice import at_gauge, scaled
+from printhammer.reconstruction.family.family import print_forces
+from printhammer.reconstruction.search.space import CURRENT, PRINT_FORCE
 
 
 def si(hammer: ph.Hammer) -> tuple[dict[str, float], dict[str, str]]:

@@ -10,10 +10,10 @@ from tests.hammers import CRUDE
 from tests.identify import shots
 
 import printhammer as ph
+from printhammer.drive.segments import evaluate
 from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform
-from printhammer.identify.motion import fit_motion
 from printhammer.identify.residuals import memory_factor, noise_of_record
-from printhammer.segments import evaluate
+from printhammer.identify.shots.motion import fit_motion
 
 HAMMER = ph.load(CRUDE)
 STATIC = {

@@ -8,12 +8,12 @@ import pytest
 from tests import measurements as lab
 from tests.measurements import write
 
-from printhammer.identify.backstop import RATIO, Stiffness, fit_backstop
-from printhammer.identify.magnet import fit_magnet
-from printhammer.identify.pack import fit_pack
-from printhammer.identify.restitution import rebound
 from printhammer.identify.result import Fit
-from printhammer.identify.spring import fit_spring
+from printhammer.identify.static.backstop import RATIO, Stiffness, fit_backstop
+from printhammer.identify.static.magnet import fit_magnet
+from printhammer.identify.static.pack import fit_pack
+from printhammer.identify.static.restitution import rebound
+from printhammer.identify.static.spring import fit_spring
 
 FIVE = {
     "magnet.F0": lab.F0,

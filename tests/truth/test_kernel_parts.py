@@ -14,7 +14,7 @@ from tests import hammers
 from tests.hammers import BACKSTOPS, PACKS, SPRINGS, STOP, compare, drives, interpreted, made_of
 
 import printhammer as ph
-from printhammer import problem
+from printhammer.run import problem
 
 DURATION = 2.4e-3
 PAIRS = [pair for pair in itertools.product(PACKS, BACKSTOPS) if pair != ("", "")]

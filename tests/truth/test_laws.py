@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
 from printhammer.parts import Part
-from printhammer.parts.backstop_elastomer import ElastomerBackstop
-from printhammer.parts.backstop_hertz import HertzBackstop
-from printhammer.parts.backstop_rigid import RigidBackstop
-from printhammer.parts.magnet_inverse_root import InverseRootMagnet
-from printhammer.parts.magnet_table import TableMagnet
-from printhammer.parts.pack_dashpot import DashpotPack
-from printhammer.parts.pack_power import PowerPack
-from printhammer.parts.spring_linear import LinearSpring
-from printhammer.parts.spring_preload import PreloadSpring
+from printhammer.parts.backstop.elastomer import ElastomerBackstop
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.magnet.inverse_root import InverseRootMagnet
+from printhammer.parts.magnet.table import TableMagnet
+from printhammer.parts.pack.dashpot import DashpotPack
+from printhammer.parts.pack.power import PowerPack
+from printhammer.parts.spring.linear import LinearSpring
+from printhammer.parts.spring.preload import PreloadSpring
 
 
 def law(part: Part, origin: float = 0.0) -> tuple[ModuleType, np.ndarray]:

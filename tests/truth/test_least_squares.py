@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from printhammer.identify.checks import runs_p_value
 from printhammer.identify.least_squares import sandwich, variance_of
 from printhammer.identify.result import FittedConstant, student
+from printhammer.identify.static.checks import runs_p_value
 
 
 def test_the_sandwich_of_a_mean() -> None:

@@ -8,14 +8,14 @@ from scipy import optimize
 from tests import hammers
 
 import printhammer as ph
-from printhammer.coil_work import coil_power
 from printhammer.control.coil_force import CoilForce
 from printhammer.control.least_work_bound import bound
-from printhammer.parts.backstop_hertz import HertzBackstop
-from printhammer.parts.magnet_inverse_root import InverseRootMagnet
-from printhammer.parts.pack_power import PowerPack
-from printhammer.parts.spring_linear import LinearSpring
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.parts.magnet.inverse_root import InverseRootMagnet
+from printhammer.parts.pack.power import PowerPack
+from printhammer.parts.spring.linear import LinearSpring
 from printhammer.printing.nominal import nominal
+from printhammer.run.coil_work import coil_power
 
 
 @pytest.mark.parametrize("softer", [1.0, 2.0])

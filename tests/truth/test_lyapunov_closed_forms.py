@@ -13,8 +13,8 @@ import printhammer as ph
 from printhammer.chaos import strobes
 from printhammer.chaos.lyapunov import kaplan_yorke
 from printhammer.claims.verdicts import printed_verdicts
-from printhammer.parts.pack_dashpot import DashpotPack
-from printhammer.tangent import standard_error, tangent_map
+from printhammer.derivatives.states import standard_error, tangent_map
+from printhammer.parts.pack.dashpot import DashpotPack
 
 CLOSE = 1e-9
 

@@ -13,7 +13,7 @@ from printhammer.chaos.orbit_newton import Images, close_orbits
 from printhammer.chaos.orbit_result import multipliers_of
 from printhammer.chaos.orbit_search import shortest
 from printhammer.chaos.regime import Regime
-from printhammer.parts.pack_dashpot import DashpotPack
+from printhammer.parts.pack.dashpot import DashpotPack
 
 A, B = 1.4, 0.3
 ONE = np.ones(2)

@@ -10,12 +10,12 @@ from scipy.optimize import brentq
 from tests.candidates import some_candidates, values_in
 from tests.hammers import CRUDE
 
-from printhammer.reconstruction import losses
-from printhammer.reconstruction.candidates import Candidate, candidates
-from printhammer.reconstruction.choice import scaled
-from printhammer.reconstruction.losses import Score
-from printhammer.reconstruction.panel_losses import panels
-from printhammer.reconstruction.space import hammer_of, point_of
+from printhammer.reconstruction.family.choice import scaled
+from printhammer.reconstruction.search import losses
+from printhammer.reconstruction.search.candidates import Candidate, candidates
+from printhammer.reconstruction.search.losses import Score
+from printhammer.reconstruction.search.panel_losses import panels
+from printhammer.reconstruction.search.space import hammer_of, point_of
 
 INCH = 0.0254
 B, XP, D, PLATEN = 0.002 * INCH, 0.008 * INCH, 0.007 * INCH, 0.015 * INCH

@@ -1,6 +1,6 @@
 """Hammer, measurements, constants, hammer: what is found is what was measured, as well as it says.
 
-The measurements are those of an ordinary bench, `printhammer.identify.laboratory.SENSORS`.
+The measurements are those of an ordinary bench, `printhammer.identify.bench.laboratory.SENSORS`.
 """
 
 import functools
@@ -14,11 +14,11 @@ from scipy.stats import binom, chi2
 from tests import hammers
 
 import printhammer as ph
-from printhammer.identify.backstop import fit_backstop
-from printhammer.identify.magnet import fit_magnet
-from printhammer.identify.pack import fit_pack
-from printhammer.identify.recovery import Recovery, measured_stiffness, recover, true_value
+from printhammer.identify.bench.recovery import Recovery, measured_stiffness, recover, true_value
 from printhammer.identify.result import Fit
+from printhammer.identify.static.backstop import fit_backstop
+from printhammer.identify.static.magnet import fit_magnet
+from printhammer.identify.static.pack import fit_pack
 
 HAMMER = hammers.crude()
 CONSTANTS = {

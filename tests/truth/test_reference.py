@@ -10,19 +10,19 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import RectBivariateSpline
 from tests.truth import oracles
 
-from printhammer.drive import PulseTrain, SineForce
+from printhammer.drive.trains import PulseTrain, SineForce
+from printhammer.drive.waveforms.shapes import Rectangle
 from printhammer.kernel.reference import ReferenceRun, _Run, horizon, reference
 from printhammer.kernel.reference_series import ORDER
-from printhammer.parts.backstop_elastomer import ElastomerBackstop
-from printhammer.parts.backstop_hertz import HertzBackstop
-from printhammer.parts.backstop_rigid import RigidBackstop
-from printhammer.parts.magnet_inverse_root import InverseRootMagnet
-from printhammer.parts.magnet_table import TableMagnet
-from printhammer.parts.pack_dashpot import DashpotPack
-from printhammer.parts.pack_power import PowerPack
-from printhammer.parts.spring_linear import LinearSpring
-from printhammer.parts.spring_preload import PreloadSpring
-from printhammer.waveforms import Rectangle
+from printhammer.parts.backstop.elastomer import ElastomerBackstop
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.magnet.inverse_root import InverseRootMagnet
+from printhammer.parts.magnet.table import TableMagnet
+from printhammer.parts.pack.dashpot import DashpotPack
+from printhammer.parts.pack.power import PowerPack
+from printhammer.parts.spring.linear import LinearSpring
+from printhammer.parts.spring.preload import PreloadSpring
 
 MASS = 4e-4
 MAGNET = InverseRootMagnet(F0=2.47, Am=0.437, Bm=0.0931)

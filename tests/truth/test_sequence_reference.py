@@ -11,10 +11,10 @@ from tests.tangents import before_slow_touches, deviation
 from tests.truth.test_constant_flow_differences import compare_quantities
 
 import printhammer as ph
-from printhammer.ensemble_group import closed_form
-from printhammer.equilibrium import rest_state
-from printhammer.parameters import parameter_names
-from printhammer.waveforms import Chain, HalfSine, Rectangle, Sampled, Trapezoid, Waveform
+from printhammer.derivatives.parameters import parameter_names
+from printhammer.drive.waveforms.shapes import Chain, HalfSine, Rectangle, Sampled, Trapezoid, Waveform
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.run.ensemble_group import closed_form
 
 BOUND = 1e-8
 """Largest error at the default tolerance before the horizon, of the stroke."""

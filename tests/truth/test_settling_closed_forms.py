@@ -7,8 +7,8 @@ from scipy.optimize import brentq
 from tests.hammers import MASS, STOP, hertz, interpreted, made_of, preload, rigid
 
 import printhammer as ph
+from printhammer.drive.waveforms.shapes import Rectangle
 from printhammer.printing.settling import SETTLED, settle, wear_of
-from printhammer.waveforms import Rectangle
 
 PUSH = 12.0
 WIDTH = 150e-6

@@ -10,8 +10,8 @@ from tests.tangents import SHARP, richardson
 from tests.truth import oracles
 
 import printhammer as ph
-from printhammer.parts.pack_dashpot import DashpotPack
-from printhammer.tangent import TangentMap, strobe_exponent, tangent_map
+from printhammer.derivatives.states import TangentMap, strobe_exponent, tangent_map
+from printhammer.parts.pack.dashpot import DashpotPack
 
 CLOSE = 1e-9
 

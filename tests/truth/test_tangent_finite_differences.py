@@ -25,7 +25,8 @@ from tests.hammers import (
 from tests.tangents import SHARP, before_slow_touches, deviation, richardson, scaled
 
 import printhammer as ph
-from printhammer.equilibrium import rest_state
+from printhammer.derivatives.states import TangentMap, tangent_map
+from printhammer.hammer.equilibrium import rest_state
 from printhammer.kernel.modes import (
     BACKSTOP,
     BACKSTOP_RELEASED,
@@ -36,8 +37,7 @@ from printhammer.kernel.modes import (
     UNLOADING,
 )
 from printhammer.kernel.reference import reference
-from printhammer.problem import Problem
-from printhammer.tangent import TangentMap, tangent_map
+from printhammer.run.problem import Problem
 
 WANTED = 1e-6
 MOVING = STOP + 20e-6, -0.4

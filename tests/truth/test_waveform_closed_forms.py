@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from printhammer.drive import PulseTrain
-from printhammer.waveforms import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
+from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
 
 mp = mpmath.mp.clone()
 mp.dps = 40

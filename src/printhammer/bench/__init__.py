@@ -16,7 +16,7 @@ _COMPILING: Final = """
 import sys, time
 from printhammer.bench.ensembles import trains
 from printhammer.bench.problem import frozen
-from printhammer.ensemble import Ensemble
+from printhammer.run.ensemble import Ensemble
 drives, ends = trains(frozen(), 16, 2)
 began = time.perf_counter()
 Ensemble(frozen().hammer, drives, ends).run(times=[0.0, 1e-3], threads=1, engine=sys.argv[1])

@@ -18,7 +18,7 @@ from printhammer.bench.problem import FIRST, GRID, PERIOD
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _FLAGS = ("-std=c++17", "-O3", "-march=native", "-shared", "-fPIC")
 _SUNDIALS = ("-lsundials_cvode", "-lsundials_nvecserial", "-lsundials_sunnonlinsolfixedpoint")

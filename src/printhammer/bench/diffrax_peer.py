@@ -24,7 +24,7 @@ from printhammer.bench.problem import (
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _FIRST_STEP = 0.01
 

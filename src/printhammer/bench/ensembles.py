@@ -12,16 +12,16 @@ import numpy as np
 
 from printhammer.bench import exact
 from printhammer.bench.own import engines
-from printhammer.problem import TOLERANCE
+from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.bench.problem import Task
     from printhammer.bench.table import Say
-    from printhammer.drive import PulseTrain
-    from printhammer.ensemble import Ensemble
-    from printhammer.segments import FloatArray
+    from printhammer.drive.trains import PulseTrain
+    from printhammer.run.ensemble import Ensemble
+    from printhammer.support.arrays import FloatArray
 
 LOWEST: Final = 500.0
 """Lowest firing rate, Hz."""
@@ -139,7 +139,7 @@ class Figures:
 
 def trains(task: Task, members: int, pulses: int) -> tuple[list[PulseTrain], FloatArray]:
     """Return trains at rates from 500 Hz to 2 kHz, and the ends of their runs, s."""
-    from printhammer.drive import PulseTrain
+    from printhammer.drive.trains import PulseTrain
 
     waveform: Any = task.hammer.waveform
     rates = np.linspace(LOWEST, HIGHEST, members)
@@ -161,7 +161,7 @@ def measure(task: Task, quick: bool, threads: int, say: Say) -> Figures:
     say : callable
         Called with a line before each step.
     """
-    from printhammer.ensemble import Ensemble
+    from printhammer.run.ensemble import Ensemble
 
     rates, pulses, times = (32, 3, 64) if quick else (512, 9, 512)
     drives, ends = trains(task, rates, pulses)
@@ -212,7 +212,7 @@ def measure(task: Task, quick: bool, threads: int, say: Say) -> Figures:
 def _mass(
     task: Task, engine: str, tolerance: float, threads: int, members: int, pulses: int, repeats: int
 ) -> Mass:
-    from printhammer.ensemble import Ensemble
+    from printhammer.run.ensemble import Ensemble
 
     drives, ends = trains(task, members, pulses)
     runs = Ensemble(task.hammer, drives, ends, tolerance=tolerance)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 
 class Absent(Exception):

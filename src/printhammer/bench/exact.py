@@ -12,9 +12,9 @@ from printhammer.kernel.reference import reference
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
-    from printhammer.drive_base import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.drive.base import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 _FINE: Final = 1e-14
 _COARSE: Final = 1e-13

@@ -37,7 +37,7 @@ from printhammer.bench.problem import (
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _ENTRY: Final = 1e-5
 """Indentation r at which the loading branch begins; the work up to there is some 1e-19 of its full size."""

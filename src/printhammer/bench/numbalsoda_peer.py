@@ -28,7 +28,7 @@ from printhammer.bench.problem import (
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _MODE, _PEAK, _PIECE, _CONSTANTS = 0, 1, 2, 7
 _SIZE = _CONSTANTS + 12

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Final, get_args
 
 from printhammer.bench.entry import Entry
 from printhammer.bench.problem import ENDS, FIRST, GRID, PERIOD, checked, ensemble_tasks
-from printhammer.problem import TOLERANCE, Problem
+from printhammer.run.problem import TOLERANCE, Problem
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
-    from printhammer.ensemble import Ensemble
-    from printhammer.segments import FloatArray
+    from printhammer.run.ensemble import Ensemble
+    from printhammer.support.arrays import FloatArray
 
 TOLERANCES: Final = tuple(
     sorted({TOLERANCE, *(f * 10.0**-e for e in range(5, 13) for f in (1.0, 0.3)), 1e-13}, reverse=True)
@@ -26,7 +26,7 @@ def _chosen(quick: bool) -> tuple[float, ...]:
 
 def engines() -> list[str]:
     """Return the engines of an ensemble that can be asked for by name."""
-    from printhammer.ensemble import Engine
+    from printhammer.run.ensemble import Engine
 
     return [engine for engine in get_args(Engine) if engine != "auto"]
 
@@ -45,7 +45,7 @@ def singles(task: Task, quick: bool) -> list[Entry]:
 
 def schemes(task: Task, quick: bool) -> list[Entry]:
     """Return the integrators of the paper, on its schedule of steps."""
-    from printhammer.scheme_runs import SchemeProblem
+    from printhammer.run.scheme_runs import SchemeProblem
 
     pulses = 5 if quick else 50
     found = []
@@ -74,7 +74,7 @@ def _single(name: str, problem: Problem, pulses: int) -> Entry:
 
 def ensembles(task: Task, quick: bool, members: int) -> list[Entry]:
     """Return ensembles of so many members, on one thread, with each engine that there is."""
-    from printhammer.ensemble import Ensemble
+    from printhammer.run.ensemble import Ensemble
 
     tasks = ensemble_tasks(task, members)
     pulses = 5 if quick else 10

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from printhammer.drive import PulseTrain
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.drive.trains import PulseTrain
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 PERIOD: Final = 1.35e-3
 """Time between firings, s."""
@@ -72,13 +72,13 @@ class Task:
     @cached_property
     def rest(self) -> float:
         """Displacement at rest, m."""
-        from printhammer.equilibrium import rest_state
+        from printhammer.hammer.equilibrium import rest_state
 
         return rest_state(self.hammer)
 
     def drive(self, pulses: int) -> PulseTrain:
         """Return the drive with so many firings."""
-        from printhammer.drive import PulseTrain
+        from printhammer.drive.trains import PulseTrain
 
         assert self.hammer.waveform is not None
         return PulseTrain(self.hammer.waveform, period=self.period, pulses=pulses)
@@ -89,7 +89,7 @@ class Task:
 
         The current of a piece is A + B exp(-rate (t - begin)), A. Between pulses it is zero.
         """
-        from printhammer.waveforms import DECAY_TIMES
+        from printhammer.drive.waveforms.shapes import DECAY_TIMES
 
         form: Any = self.hammer.waveform
         top = -form.amplitude * np.expm1(-form.width / form.rise)
@@ -111,7 +111,7 @@ class Task:
 @lru_cache(maxsize=1)
 def frozen() -> Task:
     """Return the problem of the benchmark."""
-    from printhammer.hammer import load
+    from printhammer.hammer.hammer import load
 
     return Task(load(Path(__file__).with_name("frozen-hammer.toml")))
 

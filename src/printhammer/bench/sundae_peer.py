@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.bench.problem import Task
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _CLOSE = 1e-13
 

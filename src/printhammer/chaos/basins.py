@@ -21,21 +21,21 @@ from printhammer.chaos.basins_entropy import BOX, BasinEntropy, basin_entropy
 from printhammer.chaos.bifurcation_columns import OK, TOLERANCE, run_columns, scales_of_columns
 from printhammer.chaos.regime import Regime
 from printhammer.chaos.verdict import LARGEST_PERIOD
-from printhammer.drive_input import read_count, read_number
+from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
-from printhammer.problem import check_tolerance
-from printhammer.start import initial_state
+from printhammer.run.problem import check_tolerance
+from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 FIRINGS: Final = 200
 """Firings of a round unless told otherwise."""
@@ -122,9 +122,9 @@ class Basins:
         return basins_dataset(self)
 
     def plot(self, **options: Any) -> Any:
-        """Draw the basins; returns a matplotlib figure, see `printhammer.figures.basins`."""
+        """Draw the basins; returns a matplotlib figure, see `printhammer.figures.chaos.basins`."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.basins").plot(self, **options)
+        return import_module("printhammer.figures.chaos.basins").plot(self, **options)
 
 
 def basins(

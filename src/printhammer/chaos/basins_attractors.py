@@ -12,14 +12,14 @@ from scipy.spatial import cKDTree
 from printhammer.chaos.bifurcation_columns import OK, cycles_of, run_columns
 from printhammer.chaos.train import Train, exponents_of
 from printhammer.chaos.verdict import SIGNIFICANT
-from printhammer.drive import PulseTrain
+from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.chaos.bifurcation_columns import Columns
     from printhammer.chaos.regime import Regime
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 MATCH: Final = 1e-2
 """Distance, in half-widths of the window, up to which periodic orbits count as the same attractor."""

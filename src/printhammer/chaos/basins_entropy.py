@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.drive_input import read_count
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.chaos.bifurcation_tables import provenance_of
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,22 +18,22 @@ from printhammer.chaos.bifurcation_work import Work
 from printhammer.chaos.regime import PERIOD, RATE, Regime
 from printhammer.chaos.strobe_map import check_phase
 from printhammer.chaos.verdict import SIGNIFICANT
-from printhammer.drive_input import read_count
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.problem import check_tolerance
-from printhammer.start import initial_state
+from printhammer.run.problem import check_tolerance
+from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
     from printhammer.chaos.bifurcation_windows import Route, Window
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 FIRINGS: Final = 300
 """Firings of a train unless told otherwise."""
@@ -86,7 +86,7 @@ class Bifurcation:
     x, v : array, shape (D, C, P)
         Displacement, m, and velocity, m/s; NaN where a run did not get.
     branch : int8 array, shape (D, C, P)
-        Code of the mode, a place in `printhammer.ensemble.MODE_NAMES`; -1 where a run did not get.
+        Code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where a run did not get.
     status : str array, shape (D, C)
         How the runs ended.
     cycles : int array, shape (D, C)
@@ -155,9 +155,9 @@ class Bifurcation:
         return bifurcation_dataset(self)
 
     def plot(self, **options: Any) -> Any:
-        """Draw the diagram; returns a matplotlib figure, see `printhammer.figures.bifurcation`."""
+        """Draw the diagram; returns a matplotlib figure, see `printhammer.figures.chaos.bifurcation`."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.bifurcation").plot(self, **options)
+        return import_module("printhammer.figures.chaos.bifurcation").plot(self, **options)
 
 
 def bifurcation(

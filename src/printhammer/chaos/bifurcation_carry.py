@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.bifurcation_columns import Columns, State
     from printhammer.chaos.regime import Regime
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 STRAND: Final = 16
 """Values in a strand."""

@@ -11,10 +11,10 @@ import numpy as np
 from printhammer.chaos.train import HELD_BRANCHES
 from printhammer.chaos.verdict import AGREEMENT, LARGEST_PERIOD
 from printhammer.chaos.window import window_of
-from printhammer.drive import PulseTrain
-from printhammer.ensemble import MODE_NAMES, Ensemble
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
-from printhammer.start import check_branch, initial_state
+from printhammer.run.ensemble import MODE_NAMES, Ensemble
+from printhammer.run.start import check_branch, initial_state
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.chaos.regime import Regime
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 State = tuple[float, float, float, float]
 """Displacement, m, velocity, m/s, branch of the pack or -1, and memory of the pack, m."""
@@ -36,7 +36,7 @@ FROM_REST: Final[State] = (math.nan, math.nan, -1.0, 0.0)
 TOLERANCE: Final = 1e-9
 """Tolerance of diagrams and basins unless told otherwise: noise far below what a period is judged by.
 
-With `printhammer.ensemble.DISPLAY_TOLERANCE` weakly stable orbits never settle to within 1e-6 of the window.
+With `printhammer.run.ensemble.DISPLAY_TOLERANCE` weakly stable orbits never settle to within 1e-6 of the window.
 """
 
 OK: Final = "ok"
@@ -59,7 +59,7 @@ class Columns:
     x, v : array, shape (M, P)
         Displacement, m, and velocity, m/s; NaN where a run did not get.
     branch : int8 array, shape (M, P)
-        Code of the mode, a place in `printhammer.ensemble.MODE_NAMES`; -1 where a run did not get.
+        Code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where a run did not get.
     memory : array, shape (M, P)
         Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0.
     status : str array, shape (M,)

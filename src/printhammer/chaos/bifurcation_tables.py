@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.chaos.regime import PERIOD, RATE
-from printhammer.constants import quantities
-from printhammer.drive_text import inline, waveform_text
-from printhammer.ensemble import MODE_NAMES
+from printhammer.drive.text import inline, waveform_text
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
+from printhammer.run.ensemble import MODE_NAMES
+from printhammer.support.constants import quantities
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd

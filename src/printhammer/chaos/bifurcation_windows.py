@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.chaos.bifurcation import Bifurcation
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 SERIES: Final = (2, 4, 8)
 """Periods that, one after the other, count as a series of doublings."""

@@ -20,15 +20,15 @@ from printhammer.chaos.bifurcation_columns import (
     usable,
 )
 from printhammer.chaos.train import Train, exponents_of
-from printhammer.drive import PulseTrain
+from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.chaos.bifurcation_columns import State
     from printhammer.chaos.regime import Regime
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 JUMP: Final = 0.2
 """Distance of neighbouring orbits of the same period, in half-widths of the window, that is refined."""

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.chaos.arclength import Curve, MapFamily, Node, Steps, Watch
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change"]
 

@@ -20,17 +20,17 @@ from printhammer.chaos.orbit_result import Orbit
 from printhammer.chaos.orbit_search import orbits_of
 from printhammer.chaos.regime import Regime
 from printhammer.chaos.strobe_map import MAP_TOLERANCE, check_phase
-from printhammer.drive_input import read_count
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.problem import check_tolerance
+from printhammer.run.problem import check_tolerance
 
 if TYPE_CHECKING:
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 __all__ = ["Branch", "continuation"]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 import numpy as np
 
 from printhammer.chaos.branch_points import BIRTH
-from printhammer.drive_input import read_count
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation_events import BranchEvent
     from printhammer.chaos.orbit_result import Orbit
     from printhammer.chaos.regime import Regime
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 MOST: Final = 1000
 """Number of steps in either direction unless told otherwise."""
@@ -208,4 +208,4 @@ class Branch:
     def plot(self, **options: Any) -> Any:
         """Draw the branch against its constant; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.continuation").plot(self, **options)
+        return import_module("printhammer.figures.chaos.continuation").plot(self, **options)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.branch_points import BranchPoint
     from printhammer.chaos.continuation_branch import Branch
     from printhammer.chaos.continuation_family import Surface, Touch
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 EventKind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "grazing"]
 KINDS: Final = ("fold", "period doubling", "Neimark-Sacker", "branching", "grazing")

@@ -13,17 +13,17 @@ import numpy as np
 
 from printhammer.chaos.arclength import MapValue
 from printhammer.chaos.strobe_map import IN_PACK, image_of, margin_of, usable
-from printhammer.contacts import contacts_of
 from printhammer.errors import InputError
-from printhammer.ledger import increments_of
-from printhammer.problem import Problem
-from printhammer.start import initial_state
+from printhammer.run.contacts import contacts_of
+from printhammer.run.ledger import increments_of
+from printhammer.run.problem import Problem
+from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
     from printhammer.chaos.regime import Regime
-    from printhammer.hammer import Hammer
-    from printhammer.problem import Record
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.problem import Record
+    from printhammer.support.arrays import FloatArray
 
 _SPACING: Final = 1e-6
 """Relative change of the parameter by which the slope is taken; it only steers, and need not be exact."""

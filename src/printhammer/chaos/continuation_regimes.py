@@ -20,9 +20,9 @@ from printhammer.chaos.continuation_work import PRECISION, Work, read_bounds
 from printhammer.chaos.orbit_search import orbits_of
 from printhammer.chaos.regime import RATE, Regime
 from printhammer.chaos.strobe_map import MAP_TOLERANCE
-from printhammer.drive_input import read_count, read_positive
+from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
-from printhammer.threads import in_threads, thread_count
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.chaos.orbit_result import Orbit
-    from printhammer.drive_base import Overlap
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 SEEDS: Final = 6
 """Number of rates at which orbits are searched for unless told otherwise."""
@@ -97,7 +97,7 @@ class Branches:
     def plot(self, **options: Any) -> Any:
         """Draw the branches against their constant; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.continuation").plot(self, **options)
+        return import_module("printhammer.figures.chaos.continuation").plot(self, **options)
 
 
 class InterruptedBranches(KeyboardInterrupt):

@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.chaos.continuation_events import KINDS
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,16 +14,16 @@ from printhammer.chaos.continuation_branch import Branch
 from printhammer.chaos.continuation_events import event_of
 from printhammer.chaos.continuation_family import RegimeFamily, rigid_backstop
 from printhammer.chaos.regime import PERIOD, RATE
-from printhammer.drive_input import read_number
+from printhammer.drive.input import read_number
 from printhammer.errors import InputError
-from printhammer.threads import in_threads, thread_count
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from printhammer.chaos.continuation_events import BranchEvent
     from printhammer.chaos.continuation_family import Course, Passage
     from printhammer.chaos.regime import Regime
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 PRECISION: Final = 1e-10
 """Scaled correction of Newton's method below which an orbit is found; see `printhammer.chaos.arclength`."""
@@ -51,7 +51,7 @@ def unit_of(regime: Regime, parameter: str) -> str:
     if parameter in own:
         return own[parameter]
     if parameter.startswith("waveform.") and regime.waveform is not None:
-        from printhammer.constants import quantities
+        from printhammer.support.constants import quantities
 
         note = quantities(type(regime.waveform))[parameter.removeprefix("waveform.")]
         return note.also[0] if note.also and regime.waveform.quantity == "force" else note.si

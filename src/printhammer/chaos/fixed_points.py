@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _MOST_CORRECTIONS: Final = 12
 _STAGNANT: Final = 1e3

@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 import numpy as np
 
 from printhammer.chaos.sections import Section
-from printhammer.drive_input import read_count, read_positive
+from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 BINS: Final = 60
 """Number of bins of the histogram unless told otherwise."""
@@ -127,7 +127,7 @@ class ImpactTrain:
     def plot(self, **options: Any) -> Any:
         """Draw histogram, return map and autocorrelation of the intervals; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.impact_train").plot(self, **options)
+        return import_module("printhammer.figures.chaos.impact_train").plot(self, **options)
 
 
 def impact_train(

@@ -19,22 +19,22 @@ from printhammer.chaos.strobe import Strobe, transient_of
 from printhammer.chaos.train import States, Train
 from printhammer.chaos.verdict import SIGNIFICANT, verdict
 from printhammer.chaos.zero_one import FEWEST, ZeroOne, zero_one
-from printhammer.drive_input import read_count, read_positive
+from printhammer.derivatives.states import standard_error, strobe_exponent
+from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
-from printhammer.problem import TOLERANCE
-from printhammer.tangent import standard_error, strobe_exponent
+from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
     from printhammer.chaos.verdict import Verdict
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.tangent import Exponent
-    from printhammer.waveforms import Waveform
+    from printhammer.derivatives.states import Exponent
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 FIRINGS: Final = 1000
 """Number of firings over which growth counts unless told otherwise."""
@@ -181,7 +181,7 @@ class Lyapunov:
     def plot(self, **options: Any) -> Any:
         """Draw the running estimates with their errors; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.lyapunov").plot(self, **options)
+        return import_module("printhammer.figures.chaos.lyapunov").plot(self, **options)
 
 
 def lyapunov(
@@ -202,7 +202,7 @@ def lyapunov(
     Two changes of the state are carried along with the motion and made orthonormal again at every step (G.
     Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21); they begin up to a
     hundred firings earlier, to find their directions. Standard errors are those of the means of
-    autocorrelated series, from overlapping batch means (`printhammer.tangent.standard_error`); of
+    autocorrelated series, from overlapping batch means (`printhammer.derivatives.states.standard_error`); of
     a periodic train, of whole cycles.
 
     Parameters

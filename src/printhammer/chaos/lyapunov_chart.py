@@ -12,11 +12,11 @@ import numpy as np
 from printhammer.chaos.lyapunov import FIRINGS, TRANSIENT, exponents_of_train
 from printhammer.chaos.strobe import transient_of
 from printhammer.chaos.train import Train
-from printhammer.drive_input import read_count, read_positive
+from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
-from printhammer.hammer import Hammer
-from printhammer.problem import TOLERANCE
-from printhammer.threads import in_threads, thread_count
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.problem import TOLERANCE
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.lyapunov import Lyapunov
     from printhammer.chaos.strobe import Strobe
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class LyapunovChart:
 
     def plot(self, **options: Any) -> Any:
         """Draw exponents and K against the period; returns a matplotlib figure."""
-        return import_module("printhammer.figures.lyapunov").plot_chart(self, **options)
+        return import_module("printhammer.figures.chaos.lyapunov").plot_chart(self, **options)
 
 
 def lyapunovs(

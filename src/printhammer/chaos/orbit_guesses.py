@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.chaos.strobe_map import WITH_MEMORY, front_with_memory
-from printhammer.ensemble import Ensemble
-from printhammer.equilibrium import rest_state
 from printhammer.errors import InputError
-from printhammer.problem import TOLERANCE
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.run.ensemble import Ensemble
+from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.orbit_newton import Closing
     from printhammer.chaos.regime import Regime
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 PHASES: Final = (0.0, 0.5)
 """Sections at which orbits are looked for; the second one where the first falls into the pack."""

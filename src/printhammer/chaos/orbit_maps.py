@@ -12,16 +12,16 @@ import numpy as np
 
 from printhammer.chaos.orbit_newton import CLOSED, Images
 from printhammer.chaos.strobe_map import IN_PACK, WITH_MEMORY, image_of, usable
-from printhammer.ensemble import Ensemble
 from printhammer.errors import InputError
-from printhammer.start import initial_state
-from printhammer.threads import in_threads, thread_count
+from printhammer.run.ensemble import Ensemble
+from printhammer.run.start import initial_state
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.chaos.regime import Regime
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 RANGE_LEFT: Final = "range left"
 _SPACING: Final = 1e-5

@@ -16,7 +16,7 @@ import numpy as np
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 CLOSED: Final = ""
 """What is told of an orbit that closes; of others it is the reason why it does not."""

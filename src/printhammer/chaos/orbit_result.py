@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.chaos.strobe_map import margin_of
-from printhammer.motion import Motion
-from printhammer.problem import Problem
-from printhammer.tangent import follow
+from printhammer.derivatives.states import follow
+from printhammer.run.motion import Motion
+from printhammer.run.problem import Problem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.orbit_newton import Closing
     from printhammer.chaos.regime import Regime
-    from printhammer.contacts import Contact, Dot
-    from printhammer.ledger import Ledger
-    from printhammer.segments import FloatArray
+    from printhammer.run.contacts import Contact, Dot
+    from printhammer.run.ledger import Ledger
+    from printhammer.support.arrays import FloatArray
 
 STABLE: Final = "stable"
 SADDLE: Final = "saddle"
@@ -56,7 +56,7 @@ class Orbit:
     x, v : array, shape (firings,)
         Displacement, m, and velocity, m/s, at the firings.
     branch : int array, shape (firings,)
-        Code of the mode of motion there, a place in `printhammer.ensemble.MODE_NAMES`.
+        Code of the mode of motion there, a place in `printhammer.run.ensemble.MODE_NAMES`.
     memory : array, shape (firings,)
         Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0.
     phase : float
@@ -195,7 +195,7 @@ class Orbit:
     def plot(self, **options: Any) -> Any:
         """Draw the orbit in the plane of displacement and velocity and against time; a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.orbits").plot_orbit(self, **options)
+        return import_module("printhammer.figures.chaos.orbits").plot_orbit(self, **options)
 
 
 def no_orbit(regime: Regime, firings: int, phase: float, tolerance: float, status: str) -> Orbit:

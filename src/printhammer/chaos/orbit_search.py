@@ -15,10 +15,10 @@ from printhammer.chaos.orbit_newton import Closing, close_orbits
 from printhammer.chaos.orbit_result import KINDS, STABLE, Orbit, no_orbit, orbit_of
 from printhammer.chaos.regime import Regime
 from printhammer.chaos.strobe_map import MAP_TOLERANCE, check_phase
-from printhammer.drive_input import read_count
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.problem import TOLERANCE, check_tolerance
-from printhammer.threads import in_threads, thread_count
+from printhammer.run.problem import TOLERANCE, check_tolerance
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.chaos.orbit_guesses import Guess, Records
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 LONGEST: Final = 8
 """Largest number of firings of the orbits that are looked for unless told otherwise."""
@@ -142,7 +142,7 @@ class Orbits:
     def plot(self, **options: Any) -> Any:
         """Draw the orbits in the plane of displacement and velocity; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.orbits").plot(self, **options)
+        return import_module("printhammer.figures.chaos.orbits").plot(self, **options)
 
 
 def orbits(

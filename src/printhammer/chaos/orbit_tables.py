@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.chaos.orbit_result import KINDS
-from printhammer.ensemble import MODE_NAMES
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
+from printhammer.run.ensemble import MODE_NAMES
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

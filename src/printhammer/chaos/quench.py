@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, SupportsIndex
 
 import numpy as np
 
-from printhammer.drive import Drive, PulseTrain
-from printhammer.drive_input import read_count, read_number, read_positive
-from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.drive.input import read_count, read_number, read_positive
+from printhammer.drive.segments import table
+from printhammer.drive.trains import Drive, PulseTrain
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
-from printhammer.segments import table
-from printhammer.simulate import simulate
-from printhammer.waveforms import Waveform
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 TAIL: Final = 1e-3
 """Time after the second firing, s, within which a second dot is waited for unless told otherwise."""
@@ -128,9 +128,9 @@ class QuenchMap:
         return quench_dataset(self)
 
     def plot(self, **options: Any) -> Any:
-        """Draw the map; returns a matplotlib figure, see `printhammer.figures.quench`."""
+        """Draw the map; returns a matplotlib figure, see `printhammer.figures.chaos.quench`."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.quench").plot(self, **options)
+        return import_module("printhammer.figures.chaos.quench").plot(self, **options)
 
 
 class TwoPulses(Waveform):

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.drive_text import inline, waveform_text
+from printhammer.drive.text import inline, waveform_text
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd

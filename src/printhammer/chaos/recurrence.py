@@ -17,14 +17,14 @@ import numpy as np
 
 from printhammer.chaos.strobe import Strobe
 from printhammer.chaos.verdict import AGREEMENT
-from printhammer.drive_input import read_count
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 MOST: Final = 4096
 """Largest number of states; a matrix of so many squared has 16 million points."""
@@ -110,7 +110,7 @@ class Recurrence:
     def plot(self, **options: Any) -> Any:
         """Draw the plot with its quantities; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.recurrence").plot(self, **options)
+        return import_module("printhammer.figures.chaos.recurrence").plot(self, **options)
 
 
 def recurrence(

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 
 from printhammer.chaos.window import window_of
-from printhammer.constants import quantities
-from printhammer.drive import PulseTrain, SineForce
-from printhammer.drive_input import read_positive
+from printhammer.drive.input import read_positive
+from printhammer.drive.trains import PulseTrain, SineForce
 from printhammer.errors import InputError
+from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
     from printhammer.chaos.window import Window
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 PERIOD: Final = "period"
 RATE: Final = "rate"

@@ -22,9 +22,9 @@ import numpy as np
 
 from printhammer.chaos.train import Train, exponents_of, run_trains
 from printhammer.chaos.verdict import AGREEMENT, FIRST, LAST, period_of, verdict
-from printhammer.drive import PulseTrain
-from printhammer.problem import TOLERANCE
-from printhammer.threads import in_threads, thread_count
+from printhammer.drive.trains import PulseTrain
+from printhammer.run.problem import TOLERANCE
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.train import States
     from printhammer.chaos.verdict import Verdict
-    from printhammer.hammer import Hammer
-    from printhammer.threads import Progress
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.threads import Progress
 
 STAGES: Final = (32, 128)
 """Numbers of firings after which a train may count as periodic."""
@@ -144,7 +144,7 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
     Infinite where the period begins inside the pack, where the state has a memory, or the derivative is not
     known.
     """
-    from printhammer.tangent import tangent_map
+    from printhammer.derivatives.states import tangent_map
 
     if _in_pack(train, states, -1):
         return np.inf

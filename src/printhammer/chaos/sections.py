@@ -15,13 +15,13 @@ import numpy as np
 
 from printhammer.chaos.strobe import transient_of
 from printhammer.chaos.train import Train
-from printhammer.drive_input import MOST_PULSES, read_count, read_positive
+from printhammer.drive.input import MOST_PULSES, read_count, read_positive
 from printhammer.errors import InputError
-from printhammer.hammer import Hammer
-from printhammer.problem import TOLERANCE, Problem, check_tolerance
-from printhammer.start import initial_state
-from printhammer.threads import in_threads, thread_count
-from printhammer.touches import touches_of
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
+from printhammer.run.start import initial_state
+from printhammer.run.touches import touches_of
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 Surface = Literal["pack", "backstop"]
 SURFACES: Final = get_args(Surface)
@@ -162,7 +162,7 @@ class Section:
     def plot(self, **options: Any) -> Any:
         """Draw velocity against time since the last firing; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.sections").plot(self, **options)
+        return import_module("printhammer.figures.chaos.sections").plot(self, **options)
 
 
 def section(

@@ -1,6 +1,6 @@
 """Sensitivities: how flight time, force and energy change with every constant of the hammer and the pulse.
 
-The derivatives come from the tangent flow of the constants along one run (`printhammer.constant_flow`), not
+The derivatives come from the tangent flow of the constants along one run (`printhammer.derivatives.constants`), not
 from differences of runs. The table that follows also tells how tolerances of the constants show in what is
 printed.
 """
@@ -14,24 +14,24 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.chaos.sensitivity_dots import DOT_QUANTITIES, RUN_QUANTITIES, changes_of, dot_values
-from printhammer.constant_flow import rest_columns
-from printhammer.drive_input import read_number
+from printhammer.derivatives.constants import rest_columns
+from printhammer.derivatives.parameters import parameter_names, parameters
+from printhammer.drive.input import read_number
 from printhammer.errors import InputError
-from printhammer.motion import Motion
-from printhammer.parameters import parameter_names, parameters
-from printhammer.problem import Problem, check_tolerance
-from printhammer.simulate import end_of_run
-from printhammer.start import initial_state
+from printhammer.run.motion import Motion
+from printhammer.run.problem import Problem, check_tolerance
+from printhammer.run.simulate import end_of_run
+from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import xarray as xr
 
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.parameters import Parameter
-    from printhammer.segments import FloatArray
+    from printhammer.derivatives.parameters import Parameter
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 TOLERANCE: Final = 1e-12
 """Tolerance of the run unless told otherwise."""
@@ -48,7 +48,7 @@ class Sensitivities:
     drive : Drive
         The drive.
     constants : tuple of str
-        Names of the n constants, as in `printhammer.parameters`.
+        Names of the n constants, as in `printhammer.derivatives.parameters`.
     units, meanings : tuple of str
         SI unit and meaning of each constant.
     values : array, shape (n,)
@@ -191,7 +191,7 @@ class Sensitivities:
     def plot(self, **options: Any) -> Any:
         """Draw the largest sensitivities of one dot as bars; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.sensitivity").plot(self, **options)
+        return import_module("printhammer.figures.chaos.sensitivity").plot(self, **options)
 
     def __repr__(self) -> str:
         struck = len(self.dots) - len(self.lost)

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.constant_flow import Flow, flow, pack_push_changes, pack_push_rate, surface_moves
+from printhammer.derivatives.constants import Flow, flow, pack_push_changes, pack_push_rate, surface_moves
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.contacts import Contact
-    from printhammer.motion import Motion
-    from printhammer.parameters import Parameter
-    from printhammer.problem import Problem, Record
-    from printhammer.segments import FloatArray
+    from printhammer.derivatives.parameters import Parameter
+    from printhammer.run.contacts import Contact
+    from printhammer.run.motion import Motion
+    from printhammer.run.problem import Problem, Record
+    from printhammer.support.arrays import FloatArray
 
 DOT_QUANTITIES: Final = {
     "flight_time": ("s", "from firing to touch"),

@@ -24,9 +24,9 @@ from printhammer.chaos.continuation_work import read_bounds, unit_of
 from printhammer.chaos.strobe_map import image_of
 from printhammer.chaos.train import Train
 from printhammer.chaos.verdict import period_of
-from printhammer.drive_input import read_count
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.threads import in_threads, thread_count
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation_branch import Branch
     from printhammer.chaos.continuation_events import BranchEvent
     from printhammer.chaos.regime import Regime
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 MOST: Final = 200
 """Number of steps of a curve in either direction unless told otherwise."""
@@ -181,7 +181,7 @@ class StabilityChart:
     def plot(self, **options: Any) -> Any:
         """Draw the chart; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.stability_chart").plot(self, **options)
+        return import_module("printhammer.figures.chaos.stability_chart").plot(self, **options)
 
 
 def stability_chart(

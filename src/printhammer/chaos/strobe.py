@@ -17,10 +17,10 @@ import numpy as np
 from printhammer.chaos.train import Train, run_trains
 from printhammer.chaos.verdict import FIRST, LAST
 from printhammer.chaos.window import window_of
-from printhammer.drive_input import MOST_PULSES, read_count, read_number, read_positive
+from printhammer.drive.input import MOST_PULSES, read_count, read_number, read_positive
 from printhammer.errors import InputError
-from printhammer.hammer import Hammer
-from printhammer.problem import TOLERANCE
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.verdict import Verdict
     from printhammer.chaos.window import Window
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 POINTS = 200
 """Number of points unless told otherwise, as in Fig. 11."""
@@ -61,7 +61,7 @@ class Strobe:
     x, v : array, shape (n,)
         Displacement, m, and velocity, m/s; NaN where the run did not get.
     branch : int array, shape (n,)
-        Code of the mode of motion, a place in `printhammer.ensemble.MODE_NAMES`; -1 where the run did not
+        Code of the mode of motion, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where the run did not
         get.
     memory : array, shape (n,)
         Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0.
@@ -129,7 +129,7 @@ class Strobe:
     def plot(self, **options: Any) -> Any:
         """Draw the points in the plane of displacement and velocity; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.strobe").plot(self, **options)
+        return import_module("printhammer.figures.chaos.strobe").plot(self, **options)
 
 
 def strobe(

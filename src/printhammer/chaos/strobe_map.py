@@ -15,24 +15,24 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.chaos.regime import Regime
-from printhammer.contacts import touches_of
-from printhammer.drive_input import read_count
-from printhammer.ensemble import MODE_NAMES
+from printhammer.derivatives.states import follow
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.problem import Problem, check_tolerance
-from printhammer.start import initial_state
-from printhammer.tangent import follow
-from printhammer.threads import in_threads, thread_count
+from printhammer.run.contacts import touches_of
+from printhammer.run.ensemble import MODE_NAMES
+from printhammer.run.problem import Problem, check_tolerance
+from printhammer.run.start import initial_state
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.hammer import Hammer
-    from printhammer.problem import Record
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.problem import Record
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 __all__ = ["IN_PACK", "MAP_TOLERANCE", "Image", "Regime", "strobe_map", "strobe_maps", "strobe_slope"]
 

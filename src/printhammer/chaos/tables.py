@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.ensemble import MODE_NAMES
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
+from printhammer.run.ensemble import MODE_NAMES
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,10 +10,10 @@ import numpy as np
 
 from printhammer.chaos.verdict import period_of, repeats, verdict
 from printhammer.chaos.window import window_of
-from printhammer.drive import PulseTrain
-from printhammer.ensemble import MODE_NAMES, Ensemble
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
-from printhammer.threads import in_threads, thread_count
+from printhammer.run.ensemble import MODE_NAMES, Ensemble
+from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.chaos.verdict import Verdict
-    from printhammer.drive import Drive
-    from printhammer.drive_base import Overlap
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.tangent import Exponent
-    from printhammer.threads import Progress
-    from printhammer.waveforms import Waveform
+    from printhammer.derivatives.states import Exponent
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 HELD_BRANCHES: Final = {
     MODE_NAMES.index(f"held on the {branch} branch"): MODE_NAMES.index(branch)
@@ -226,7 +226,7 @@ def exponents_of(
     progress: Progress | None = None,
 ) -> list[Exponent]:
     """Return the largest exponents of trains, from the first to the last of some firings, on all cores."""
-    from printhammer.tangent import strobe_exponent
+    from printhammer.derivatives.states import strobe_exponent
 
     found: dict[int, Exponent] = {}
 

@@ -16,8 +16,8 @@ import numpy as np
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.segments import FloatArray
-    from printhammer.tangent import Exponent
+    from printhammer.derivatives.states import Exponent
+    from printhammer.support.arrays import FloatArray
 
 LARGEST_PERIOD: Final = 64
 """Largest period that is looked for, in firings."""

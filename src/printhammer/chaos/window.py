@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.problem import scales_of
+from printhammer.run.problem import scales_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 PAPER_X: Final = (38.1e-6, 88.9e-6)
 """Displacements of the window of Fig. 11 of Hendriks (1983), m: 0.0015 to 0.0035 in."""
@@ -65,7 +65,7 @@ def window_of(hammer: Hammer, drive: Drive) -> Window:
     That of Fig. 11 for a hammer whose backstop and pack are where the paper has them. For others its
     half-widths are a sixth of the way from backstop to pack, as in Fig. 11, and a sixth of the speed that
     the largest force gives the armature over that way; where a hammer lacks one of them and nothing bounds
-    the motion, the whole of its scales (`printhammer.problem.scales_of`). As in Fig. 11 the backstop, or the
+    the motion, the whole of its scales (`printhammer.run.problem.scales_of`). As in Fig. 11 the backstop, or the
     origin, lies a quarter of its width from the left.
     """
     place, front = hammer.position, hammer.front

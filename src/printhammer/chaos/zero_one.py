@@ -24,14 +24,14 @@ import numpy as np
 
 from printhammer.chaos.strobe import Strobe
 from printhammer.chaos.verdict import AGREEMENT
-from printhammer.drive_input import read_count
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 ANGLES: Final = 100
 """Number of angles c unless told otherwise."""
@@ -157,7 +157,7 @@ class ZeroOne:
     def plot(self, **options: Any) -> Any:
         """Draw path, mean square displacement and correlations; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.lyapunov").plot_zero_one(self, **options)
+        return import_module("printhammer.figures.chaos.lyapunov").plot_zero_one(self, **options)
 
 
 def zero_one(

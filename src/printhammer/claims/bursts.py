@@ -11,13 +11,13 @@ from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.definition import claims
 from printhammer.claims.judging import Measured, measures
 from printhammer.claims.shapes import spread
-from printhammer.drive import PulseTrain
+from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
-    from printhammer.drive import Drive
-    from printhammer.motion import Motion
+    from printhammer.drive.trains import Drive
+    from printhammer.run.motion import Motion
 
 _WHOLE = ("backstop", "pack", "waveform")
 _CLOSER: Final = 8

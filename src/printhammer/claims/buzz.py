@@ -8,11 +8,11 @@ from printhammer.buzz import BuzzSearch, BuzzTrain, delayed_train, find_buzz_tra
 from printhammer.claims.context import TAIL, Context, touches
 from printhammer.claims.definition import claims
 from printhammer.claims.judging import Measured, measures
-from printhammer.drive import PulseTrain
+from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
     from printhammer.claims.definition import Claim
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 _WHOLE = ("backstop", "pack", "waveform")
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from printhammer.drive import PulseTrain
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import PrinthammerError
-from printhammer.problem import TOLERANCE
-from printhammer.simulate import simulate
+from printhammer.run.problem import TOLERANCE
+from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from printhammer.contacts import Contact, Dot
-    from printhammer.drive import Drive
-    from printhammer.ensemble import DotTable, EnsembleResult
-    from printhammer.hammer import Hammer
-    from printhammer.motion import Motion
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.contacts import Contact, Dot
+    from printhammer.run.ensemble import DotTable, EnsembleResult
+    from printhammer.run.motion import Motion
 
 CYCLE: Final = 20e-3
 """Duration of the single-pulse cycle, s: from rest to rest, with ample time to settle."""
@@ -128,7 +128,7 @@ class Context:
         NotMeasurableError
             A run ended early.
         """
-        from printhammer.ensemble import Ensemble
+        from printhammer.run.ensemble import Ensemble
 
         ends = [float(drive.times[-1]) + tail for drive in drives]
         result = Ensemble(self.hammer, list(drives), ends, tolerance=self.tolerance).run(dots=True)

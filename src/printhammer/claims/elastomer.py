@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims.context import CYCLE, NotMeasurableError, touches
 from printhammer.claims.judging import Measured, measures
-from printhammer.drive import PulseTrain
+from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
-    from printhammer.hammer import Hammer
-    from printhammer.motion import Motion
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.motion import Motion
 
 _NEVER: Final = 1.0
 """A firing time after the end of every run, s."""

@@ -10,8 +10,8 @@ import numpy as np
 from printhammer.claims.bursts import hang_up_range, onsets
 from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.judging import Measured, measures
-from printhammer.drive import PulseTrain
-from printhammer.maps import TAIL
+from printhammer.drive.trains import PulseTrain
+from printhammer.maps.frequency import TAIL
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
@@ -45,7 +45,7 @@ def sensitivity(context: Context, band: tuple[float, float], grid: float, step: 
     NotMeasurableError
         The band is narrower than a step, or a run ended early.
     """
-    from printhammer.ensemble import Ensemble
+    from printhammer.run.ensemble import Ensemble
 
     low, high = band
     slower = low + grid * np.arange(math.floor((high - step - low) / grid * (1.0 + 1e-12)) + 1)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.claims.judging import Measured, measures
-from printhammer.drive import PulseTrain
-from printhammer.equilibrium import equilibria
+from printhammer.drive.trains import PulseTrain
+from printhammer.hammer.equilibrium import equilibria
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
-    from printhammer.motion import Motion
+    from printhammer.run.motion import Motion
 
 REFERENCE_TOLERANCE: Final = 1e-13
 _CYCLE: Final = 10e-3

@@ -12,7 +12,7 @@ from printhammer.claims.definition import Claim, claims
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 Verdict = Literal["holds", "fails", "not yet"]
 

@@ -13,8 +13,8 @@ from printhammer.claims.context import touches
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.motion import Motion
-    from printhammer.segments import FloatArray
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
 
 _POINTS: Final = 4001
 _ZOOMS: Final = 6

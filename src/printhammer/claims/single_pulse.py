@@ -13,7 +13,7 @@ from printhammer.claims.shapes import falling, largest, rank_correlation, reboun
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _WHOLE = ("backstop", "pack", "waveform")
 

@@ -9,9 +9,9 @@ import numpy as np
 from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.definition import claims
 from printhammer.claims.judging import Measured, measures
-from printhammer.drive import PulseTrain
-from printhammer.equilibrium import equilibria, holding_margin, positive_intervals
-from printhammer.static_force import StaticForce
+from printhammer.drive.trains import PulseTrain
+from printhammer.hammer.equilibrium import equilibria, holding_margin, positive_intervals
+from printhammer.hammer.static_force import StaticForce
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context

@@ -14,7 +14,7 @@ from printhammer.claims.shapes import rank_correlation
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _WHOLE = ("backstop", "pack", "waveform")
 _ORBIT_TIME: Final = 4e-3

@@ -12,7 +12,7 @@ from printhammer.claims.judging import Measured, measures
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.waveforms.shapes import Waveform
 
 _WHOLE = ("backstop", "pack", "waveform")
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from printhammer.chaos import Strobe, Verdict
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 _WHOLE = ("backstop", "pack", "waveform")
 _CHANGE: Final = 1e-5

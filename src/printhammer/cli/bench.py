@@ -34,7 +34,7 @@ def bench(
     from printhammer.cli.progress import telling
     from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, console
-    from printhammer.outputs import check_outputs, write_file
+    from printhammer.support.outputs import check_outputs, write_file
 
     count = whole(threads, "threads")
     wanted = [path for path in (json, markdown) if path is not None]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from printhammer.chaos.bifurcation import Bifurcation
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 EXAMPLE: Final = (
     "Example: printhammer bifurcation hendriks-1983 --from '1.2 ms' --to '1.35 ms' --values 60"
@@ -97,7 +97,7 @@ def bifurcation(
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
-    from printhammer.outputs import check_outputs
+    from printhammer.support.outputs import check_outputs
 
     wanted = out or []
     _check(wanted, show)
@@ -169,7 +169,7 @@ def _values(
 
     from printhammer.chaos.bifurcation_tables import meaning_of
     from printhammer.chaos.regime import Regime
-    from printhammer.drive_input import read_number
+    from printhammer.drive.input import read_number
     from printhammer.errors import InputError
 
     timed = parameter in ("period", "rate")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation_branch import Branch
     from printhammer.chaos.continuation_regimes import Branches
     from printhammer.chaos.stability_chart import StabilityChart
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 EXAMPLE: Final = (
     "Example: printhammer continue hendriks-1983 --period '1.3 ms' --parameter period"
@@ -106,7 +106,7 @@ def continue_(
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs, write_dataset
+    from printhammer.support.outputs import check_outputs, write_dataset
 
     wanted = out or []
     endings = (".nc", *PICTURES) if second is not None else (*SUFFIXES, *PICTURES)
@@ -178,7 +178,7 @@ def _tolerance(text: str | None) -> dict[str, float]:
 
 
 def _state(text: str | None) -> tuple[float, float] | None:
-    from printhammer.drive_input import read_number
+    from printhammer.drive.input import read_number
     from printhammer.errors import InputError
 
     if text is None:

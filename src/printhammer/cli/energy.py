@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from printhammer.control.least_work import LeastWork
     from printhammer.control.least_work_supply import SupplyCheck
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 EXAMPLE: Final = "Example: printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png"
 
@@ -86,7 +86,7 @@ def energy(
     from printhammer.control.least_work import least_work
     from printhammer.control.least_work_tables import save_least_work
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs
+    from printhammer.support.outputs import check_outputs
 
     wanted = out or []
     check_endings(wanted, (*_SUFFIXES, *PICTURES))
@@ -194,7 +194,7 @@ def _at_rates(hammer: Hammer, rates: list[float], options: dict[str, Any], wante
     from printhammer.cli.saving import write_found
     from printhammer.cli.terminal import complain, console, honesty, plain_table
     from printhammer.control.least_work_rates import FOUND, least_work_rates
-    from printhammer.outputs import write_dataset
+    from printhammer.support.outputs import write_dataset
 
     with counting("rates") as tell:
         found = least_work_rates(hammer, rates, progress=tell, **options)

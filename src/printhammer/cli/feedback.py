@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from printhammer.control.feedback import Feedback, FeedbackStrategy
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 EXAMPLE: Final = "Example: printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png"
 
@@ -84,9 +84,9 @@ def feedback(
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.control.feedback import feedback as compared
     from printhammer.control.feedback_tables import save_feedback
-    from printhammer.drive_file import save_drive
-    from printhammer.drive_input import read_number, read_positive
-    from printhammer.outputs import check_outputs
+    from printhammer.drive.file import save_drive
+    from printhammer.drive.input import read_number, read_positive
+    from printhammer.support.outputs import check_outputs
 
     wanted, shown = out or [], run or []
     check_endings(wanted, (".nc", *PICTURES))
@@ -171,7 +171,7 @@ def _sensor(given: dict[str, Any]) -> Any:
 
 def _driven(hammer: Hammer, supply: str, travel: str) -> Hammer:
     """Return the hammer that is driven, which may differ from the nominal one."""
-    from printhammer.drive_input import read_number, read_positive
+    from printhammer.drive.input import read_number, read_positive
     from printhammer.printing.perturbation import Perturbation, perturbed
 
     current = read_positive(number(supply, "supply") or 0.0, "1", "supply") - 1.0

@@ -24,7 +24,7 @@ def figure(
     from printhammer.cli.terminal import announce_compiling, console, load_checked
     from printhammer.errors import InputError
     from printhammer.figures import FIGURES, save
-    from printhammer.outputs import make_folder
+    from printhammer.support.outputs import make_folder
 
     entry = FIGURES.get(whole(number, "figure") or 0)
     if entry is None:

@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.identify.result import Fit
 
 EXAMPLE: Final = "Example: printhammer fit magnet magnet.csv --spring spring.csv --hammer hendriks-1983"
@@ -184,8 +184,8 @@ def backstop(
     results = _Results(out, into, plot, covariance, hammer, [file] if file else [])
 
     def found(known: Hammer | None) -> Fit:
-        from printhammer.identify.backstop import Stiffness, fit_backstop
         from printhammer.identify.fitting import fit
+        from printhammer.identify.static.backstop import Stiffness, fit_backstop
 
         bodies = (radius or [], modulus or [], poisson or [])
         stiffness = None
@@ -239,9 +239,9 @@ def motion(
     results = _Results(out, into, plot, covariance, hammer, [*files, *earlier.values()])
 
     def found(known: Hammer | None) -> Fit:
-        from printhammer.drive_input import read_number
+        from printhammer.drive.input import read_number
         from printhammer.errors import InputError
-        from printhammer.identify.motion import fit_motion
+        from printhammer.identify.shots.motion import fit_motion
 
         if known is None:
             raise InputError("the hammer is missing, expected --hammer with the constants known already")
@@ -291,8 +291,8 @@ class _Results:
         from printhammer.cli.saving import PICTURES, check_endings, say_written
         from printhammer.cli.terminal import console
         from printhammer.errors import InputError
-        from printhammer.hammer import load
-        from printhammer.outputs import check_outputs
+        from printhammer.hammer.hammer import load
+        from printhammer.support.outputs import check_outputs
 
         if self.into is not None and self.hammer is None:
             raise InputError(f"--into {self.into}: expected --hammer too, in which constants are replaced")
@@ -313,7 +313,7 @@ class _Results:
     def _write(self, fit: Fit, made: Hammer | None) -> list[Path]:
         from printhammer.cli.saving import write_picture
         from printhammer.identify.fragment import covariance_table
-        from printhammer.outputs import write_file
+        from printhammer.support.outputs import write_file
 
         written = []
         if self.plot is not None:
@@ -334,14 +334,14 @@ class _Results:
 
 
 def _length(text: str | None, flag: str) -> float | None:
-    from printhammer.drive_input import read_number
+    from printhammer.drive.input import read_number
 
     return None if text is None else read_number(text, "m", flag)
 
 
 def _with_error(text: str, flag: str, si: str) -> tuple[float, float]:
     """Read a value and its standard error, such as "3 GPa +- 0.2 GPa"; without one it is 0."""
-    from printhammer.drive_input import read_number
+    from printhammer.drive.input import read_number
 
     value, mark, error = text.replace("±", "+-").partition("+-")
     return (

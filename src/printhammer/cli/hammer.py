@@ -24,7 +24,7 @@ def show(
     """Show every constant with its status and source, and where the armature can rest."""
     from printhammer.cli import hammer_screen
     from printhammer.cli.terminal import console
-    from printhammer.hammer import load
+    from printhammer.hammer.hammer import load
 
     loaded = load(hammer)
     if toml:
@@ -39,7 +39,7 @@ def check(hammer: HammerArgument = HAMMER) -> None:
     from rich.markup import escape
 
     from printhammer.cli.terminal import console, honesty, warn
-    from printhammer.hammer import load
+    from printhammer.hammer.hammer import load
 
     loaded = load(hammer)
     told = loaded.warnings()
@@ -57,8 +57,8 @@ def schema(
     """Print the JSON schema of hammer files."""
     import json
 
-    from printhammer.hammer import Hammer
-    from printhammer.outputs import check_outputs, write_file
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.outputs import check_outputs, write_file
 
     text = json.dumps(Hammer.schema(), indent=2) + "\n"
     if out is None:
@@ -75,7 +75,7 @@ def list_shipped() -> None:
     from rich.markup import escape
 
     from printhammer.cli.terminal import console, plain_table
-    from printhammer.hammer import load, shipped
+    from printhammer.hammer.hammer import load, shipped
 
     table = plain_table(("name", "left"), ("title", "left"))
     for name in shipped():

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from printhammer.cli.units import Units
-    from printhammer.equilibrium import EquilibriumPicture
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.equilibrium import EquilibriumPicture
+    from printhammer.hammer.hammer import Hammer
 
 
 def show(hammer: Hammer, units: Units, screen: Console) -> None:
     """Print constants and statics of a hammer."""
-    from printhammer.equilibrium import equilibrium_picture
+    from printhammer.hammer.equilibrium import equilibrium_picture
 
     title = f"  {escape(hammer.title)}" if hammer.title else ""
     screen.print(f"[bold]{escape(hammer.name)}[/bold]{title}")
@@ -79,7 +79,7 @@ def sources_of(hammer: Hammer) -> list[str]:
 
 def statics_table(hammer: Hammer, picture: EquilibriumPicture, units: Units) -> Table:
     """Return rest state, equilibria, release current and holding margin."""
-    from printhammer.equilibrium import holding_margin
+    from printhammer.hammer.equilibrium import holding_margin
 
     table = plain_table(("statics, no current", "left"), ("", "left"))
     table.columns[0].style = "dim"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from printhammer.chaos import Lyapunov, LyapunovChart
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 EXAMPLE: Final = "Example: printhammer lyapunov hendriks-1983 --period '1.10 ms, 1.30 ms' --firings 300"
 
@@ -69,8 +69,8 @@ def lyapunov(
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
-    from printhammer.outputs import check_outputs
-    from printhammer.problem import TOLERANCE
+    from printhammer.run.problem import TOLERANCE
+    from printhammer.support.outputs import check_outputs
 
     wanted = out or []
     check_endings(wanted, (*SUFFIXES, *PICTURES))
@@ -112,7 +112,7 @@ def _periods(
     """Return the times between firings, s."""
     import numpy as np
 
-    from printhammer.drive_input import read_positive
+    from printhammer.drive.input import read_positive
     from printhammer.errors import InputError
 
     ranged = lowest is not None or highest is not None

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 EXAMPLE: Final = "Example: printhammer map hendriks-1983 --from '500 Hz' --to '2 kHz' --rates 64 --times 256"
 
@@ -68,12 +68,12 @@ def map_(
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import write_found
     from printhammer.cli.terminal import announce_compiling, console, load_checked
-    from printhammer.drive import PulseTrain
+    from printhammer.drive.trains import PulseTrain
     from printhammer.errors import InputError
-    from printhammer.map_layout import save_map
-    from printhammer.maps import frequency_map
-    from printhammer.measured_map import load_measured_map
-    from printhammer.problem import TOLERANCE
+    from printhammer.maps.frequency import frequency_map
+    from printhammer.maps.layout import save_map
+    from printhammer.maps.measured import load_measured_map
+    from printhammer.run.problem import TOLERANCE
 
     wanted = out or []
     number_of_figure = _checked(wanted, figure, measured, force)
@@ -109,7 +109,7 @@ def _checked(wanted: list[Path], figure: str | None, measured: Path | None, forc
     """Check the names of the files that are to be written; return the number of the figure that is drawn."""
     from printhammer.cli.saving import PICTURES, check_endings
     from printhammer.errors import InputError
-    from printhammer.map_layout import FILES, ZARR, need_zarr
+    from printhammer.maps.layout import FILES, ZARR, need_zarr
 
     check_endings(wanted, (*FILES, *PICTURES))
     for path in wanted:
@@ -132,8 +132,8 @@ def _checked(wanted: list[Path], figure: str | None, measured: Path | None, forc
 
 def _check_places(wanted: list[Path], inputs: list[Path]) -> None:
     """Check that the files can be written where they are to be; a Zarr store is a folder."""
-    from printhammer.map_layout import ZARR
-    from printhammer.outputs import check_outputs
+    from printhammer.maps.layout import ZARR
+    from printhammer.support.outputs import check_outputs
 
     stores = {path: path / "zarr.json" for path in wanted if path.suffix.lower() == ZARR and path.is_dir()}
     check_outputs([stores.get(path, path) for path in wanted], inputs)
@@ -149,9 +149,9 @@ def _axes(
     """Return the rates, Hz, and the times, s, or their number; those of a measured map unless given."""
     import numpy as np
 
-    from printhammer.drive_input import read_positive
+    from printhammer.drive.input import read_positive
     from printhammer.errors import InputError
-    from printhammer.maps import HIGHEST, LOWEST, MOST_CELLS, RATES, TIMES
+    from printhammer.maps.frequency import HIGHEST, LOWEST, MOST_CELLS, RATES, TIMES
 
     moments: FloatArray | int = TIMES if times is None else times
     if beside is not None and times is None:
@@ -182,7 +182,7 @@ def _show(chart: xr.Dataset, beside: xr.Dataset | None, seconds: float, hammer: 
     from rich.markup import escape
 
     from printhammer.cli.terminal import console, honesty
-    from printhammer.maps import rms_difference
+    from printhammer.maps.frequency import rms_difference
     from printhammer.units import from_si
 
     screen = console()
@@ -218,7 +218,7 @@ def _show(chart: xr.Dataset, beside: xr.Dataset | None, seconds: float, hammer: 
 def _complaints(chart: xr.Dataset) -> int:
     """Name the runs that did not reach their end on the standard error; return their number."""
     from printhammer.cli.terminal import complain
-    from printhammer.map_layout import failed_rates
+    from printhammer.maps.layout import failed_rates
 
     count = 0
     for status, rates in failed_rates(chart).items():

@@ -11,8 +11,8 @@ from printhammer.cli.numbers import whole
 from printhammer.cli.run import HAMMER, HammerArgument
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
-    from printhammer.identify.laboratory import Measurement
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.identify.bench.laboratory import Measurement
 
 EXAMPLE: Final = (
     "Example: printhammer measure magnet hendriks-1983 --out magnet.csv --noise 'force=1 %' --outliers '2 %'"
@@ -94,7 +94,7 @@ def measure(
     """
     from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, console, load_checked
-    from printhammer.identify.laboratory import measure as measured
+    from printhammer.identify.bench.laboratory import measure as measured
 
     kinds, paths = _places(kind, out, Path(hammer), force)
     chosen = {
@@ -122,7 +122,7 @@ def measure(
     announce_compiling()
     done = {one: measured(one, loaded, sensor=settings[one], seed=number, **options[one]) for one in kinds}
     if kind == ALL and out is not None:
-        from printhammer.outputs import make_folder
+        from printhammer.support.outputs import make_folder
 
         make_folder(out)
     screen = console()
@@ -135,8 +135,8 @@ def measure(
 def _places(kind: str, out: Path | None, hammer: Path, force: bool) -> tuple[list[str], dict[str, Path]]:
     """Return what is to be measured, and the files to write."""
     from printhammer.errors import InputError
-    from printhammer.identify.laboratory import KINDS
-    from printhammer.outputs import check_outputs
+    from printhammer.identify.bench.laboratory import KINDS
+    from printhammer.support.outputs import check_outputs
 
     if kind not in (*KINDS, ALL):
         raise InputError(f"KIND = {kind!r}, expected one of {', '.join((*KINDS, ALL))}")
@@ -163,8 +163,8 @@ def _places(kind: str, out: Path | None, hammer: Path, force: bool) -> tuple[lis
 def _settings(kinds: list[str], chosen: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the settings of the sensors of each kind; a setting must belong to one of them."""
     from printhammer.errors import InputError
-    from printhammer.identify.laboratory import SENSORS, SI
-    from printhammer.identify.sensor_settings import PARTS, applicable, by_quantity
+    from printhammer.identify.bench.laboratory import SENSORS, SI
+    from printhammer.identify.bench.sensor_settings import PARTS, applicable, by_quantity
 
     known = {name: SI[name] for kind in kinds for name in SENSORS[kind].channels}
     recorded = [kind for kind in kinds if SENSORS[kind].sampling_rate is not None]
@@ -183,9 +183,9 @@ def _options(kinds: list[str], bench: dict[str, str | None]) -> dict[str, dict[s
     """Return what is measured where, for each kind; an option must belong to one of them."""
     from inspect import signature
 
-    from printhammer.drive_input import read_number
+    from printhammer.drive.input import read_number
     from printhammer.errors import InputError
-    from printhammer.identify.benches import BENCHES
+    from printhammer.identify.bench.benches import BENCHES
 
     accepted = {kind: set(signature(BENCHES[kind]).parameters) for kind in kinds}
     found: dict[str, dict[str, Any]] = {kind: {} for kind in kinds}

@@ -69,7 +69,7 @@ def orbits(
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs
+    from printhammer.support.outputs import check_outputs
 
     wanted = out or []
     check_endings(wanted, (*SUFFIXES, *PICTURES))

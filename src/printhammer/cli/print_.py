@@ -125,12 +125,12 @@ def print_(
     from printhammer.cli.saving import PICTURES, check_endings, say_written, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs
     from printhammer.printing.limits import limits_named
     from printhammer.printing.nominal import rate_of
     from printhammer.printing.page import print_page
     from printhammer.printing.page_tables import save_page
     from printhammer.printing.pattern_file import BITMAPS, SUFFIXES
+    from printhammer.support.outputs import check_outputs
 
     if rate is None:
         raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'")
@@ -219,7 +219,7 @@ def _pattern(
 def _head(
     wires: int, pitch: str | None, wire_diameter: str | None, density: float | None, gap: float | None
 ) -> Any:
-    from printhammer.drive_input import read_positive
+    from printhammer.drive.input import read_positive
     from printhammer.printing.head import DENSITY, LINE_GAP, head_of
 
     return head_of(

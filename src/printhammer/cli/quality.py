@@ -14,7 +14,7 @@ from printhammer.cli.run import HAMMER, HammerArgument, UnitsOption
 from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.limits import Limits
 
 EXAMPLE: Final = "Example: printhammer quality hendriks-1983 --rate 900Hz --out quality.png"
@@ -105,10 +105,10 @@ def quality(
     from printhammer.cli.progress import counting, telling
     from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.drive import PulseTrain
+    from printhammer.drive.trains import PulseTrain
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs
     from printhammer.printing.quality_tables import SUFFIXES, save_result
+    from printhammer.support.outputs import check_outputs
 
     wanted = out or []
     check_endings(wanted, (*SUFFIXES, *PICTURES))
@@ -245,7 +245,7 @@ def _asked(task: str) -> str:
 def _limits(name: str | None, force: str | None, arrival: str | None) -> Limits:
     from dataclasses import replace
 
-    from printhammer.drive_input import read_number
+    from printhammer.drive.input import read_number
     from printhammer.printing.limits import limits_named
 
     found = limits_named("slots" if name is None else name)

@@ -54,10 +54,10 @@ def search(
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.cli.workers import worker_pool
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs
-    from printhammer.reconstruction.evaluation import WEIGHTS
-    from printhammer.reconstruction.search import Plan, starts_of
-    from printhammer.reconstruction.search import search as candidates
+    from printhammer.reconstruction.search.evaluation import WEIGHTS
+    from printhammer.reconstruction.search.search import Plan, starts_of
+    from printhammer.reconstruction.search.search import search as candidates
+    from printhammer.support.outputs import check_outputs
 
     check_outputs([log])
     if aim not in ("stated", "all"):
@@ -107,10 +107,10 @@ def judge(
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.cli.workers import worker_pool
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs
-    from printhammer.reconstruction.judged import STATED
-    from printhammer.reconstruction.search_log import read_search
-    from printhammer.reconstruction.shortlist import judge_candidates, rounded, shortlist
+    from printhammer.reconstruction.judging.judged import STATED
+    from printhammer.reconstruction.judging.shortlist import judge_candidates, rounded, shortlist
+    from printhammer.reconstruction.search.log import read_search
+    from printhammer.support.outputs import check_outputs
 
     check_outputs([judged], [log])
     _heading, rows = read_search(log)
@@ -147,8 +147,8 @@ def base_rates(
     from printhammer.cli.progress import counting
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.cli.workers import worker_pool
-    from printhammer.outputs import check_outputs
-    from printhammer.reconstruction.base_rates import base_rates as count
+    from printhammer.reconstruction.judging.base_rates import base_rates as count
+    from printhammer.support.outputs import check_outputs
 
     check_outputs([out])
     announce_compiling()
@@ -164,7 +164,7 @@ def _write_json(out: Path, table: dict[str, Any]) -> None:
 
     from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import console
-    from printhammer.outputs import write_file
+    from printhammer.support.outputs import write_file
 
     write_file(out, json.dumps(table, indent=1, allow_nan=False) + "\n")
     say_written(console(), out)
@@ -181,10 +181,10 @@ def predictions(
 ) -> None:
     """Tell what hammers found on the stated claims alone say about the claims that did not lead."""
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs
-    from printhammer.reconstruction.judged_log import read_judged
-    from printhammer.reconstruction.predictions import predictions as count
-    from printhammer.reconstruction.search_log import read_search
+    from printhammer.reconstruction.judging.log import read_judged
+    from printhammer.reconstruction.judging.predictions import predictions as count
+    from printhammer.reconstruction.search.log import read_search
+    from printhammer.support.outputs import check_outputs
 
     check_outputs([out], [log, judged])
     heading, rows = read_search(log)
@@ -202,7 +202,7 @@ def family(
 ) -> None:
     """Choose clearly different hammers that do equally well, and tell which conclusions hold for all."""
     from printhammer.cli.terminal import announce_compiling, console
-    from printhammer.reconstruction.family import write_family
+    from printhammer.reconstruction.family.family import write_family
 
     announce_compiling()
     members = write_family(judged, out, lambda text: console().print(f"[dim]{text}[/dim]", soft_wrap=True))
@@ -226,10 +226,10 @@ def ship(
     from printhammer.cli.progress import telling
     from printhammer.cli.terminal import announce_compiling, console
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs, make_folder
-    from printhammer.reconstruction.judged_log import read_judged
-    from printhammer.reconstruction.search_log import read_search
+    from printhammer.reconstruction.judging.log import read_judged
+    from printhammer.reconstruction.search.log import read_search
     from printhammer.reconstruction.shipping import best_of, search_json, shipped_hammer
+    from printhammer.support.outputs import check_outputs, make_folder
 
     if not math.isfinite(core_hours):
         raise InputError(f"--core-hours = {core_hours}, expected a finite number")

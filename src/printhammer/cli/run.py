@@ -12,9 +12,9 @@ from printhammer.cli.numbers import number, whole
 from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.motion import Motion
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.motion import Motion
 
 EXAMPLE = "Example: printhammer run hendriks-1983 --at '0 us, 700 us' --units inch"
 PULSES = 9
@@ -94,9 +94,9 @@ def run(
     from printhammer.cli import run_files, run_screen
     from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, complain, console, load_checked
-    from printhammer.drive_input import read_number
-    from printhammer.problem import TOLERANCE
-    from printhammer.simulate import simulate
+    from printhammer.drive.input import read_number
+    from printhammer.run.problem import TOLERANCE
+    from printhammer.run.simulate import simulate
 
     files = {"csv": csv, "parquet": parquet, "dots": dots, "contacts": contacts, "json": json, "plot": plot}
     wanted = {kind: path for kind, path in files.items() if path is not None}
@@ -130,8 +130,8 @@ def run(
 
 def _drive(hammer: Hammer, file: Path | None, options: dict[str, Any]) -> Drive:
     """Make the drive that the options describe."""
-    from printhammer.drive import PulseTrain
-    from printhammer.drive_file import load_drive
+    from printhammer.drive.file import load_drive
+    from printhammer.drive.trains import PulseTrain
     from printhammer.errors import InputError
 
     given = [name for name, value in options.items() if value is not None]

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.cli.saving import PICTURES, write_picture
 from printhammer.cli.tables import frame, named, named_energy
 from printhammer.errors import InputError
-from printhammer.outputs import check_outputs, write_file
+from printhammer.support.outputs import check_outputs, write_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.motion import Motion
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.motion import Motion
 
 _SUFFIXES: Final = {
     "dots": (".csv", ".parquet"),
@@ -55,8 +55,8 @@ def write(motion: Motion, wanted: Mapping[str, Path]) -> None:
     InputError
         A file cannot be written.
     """
-    from printhammer.contacts import Contact, Dot
-    from printhammer.export import write_csv, write_parquet
+    from printhammer.results.export import write_csv, write_parquet
+    from printhammer.run.contacts import Contact, Dot
 
     for kind, path in wanted.items():
         if kind == "csv":

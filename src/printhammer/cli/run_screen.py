@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from printhammer.cli.units import Units
-    from printhammer.motion import Motion
+    from printhammer.run.motion import Motion
 
 MOST_ROWS = 40
 """Dots shown; of more, the first and the last."""

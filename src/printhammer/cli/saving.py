@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 PICTURES: Final = (".svg", ".png", ".pdf")
 """Endings of the names of pictures."""
@@ -50,9 +50,9 @@ def load_fired(name: str, wanted: Iterable[Path]) -> Hammer:
     """
     from printhammer.cli import run_files
     from printhammer.cli.terminal import load_checked
-    from printhammer.drive import PulseTrain
+    from printhammer.drive.trains import PulseTrain
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs
+    from printhammer.support.outputs import check_outputs
 
     loaded = load_checked(name)
     if loaded.waveform is None:
@@ -102,8 +102,8 @@ def write_picture(path: Path, figure: Figure) -> None:
     InputError
         The file cannot be written.
     """
-    from printhammer.figures.save import picture
-    from printhammer.outputs import write_file
+    from printhammer.figures.elements.save import picture
+    from printhammer.support.outputs import write_file
 
     write_file(path, picture(figure, path.suffix.lower()[1:]))
 

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from printhammer.contacts import Contact, Dot
-    from printhammer.ledger import Ledger
+    from printhammer.run.contacts import Contact, Dot
+    from printhammer.run.ledger import Ledger
 
 UNITS: Final = {
     "fired_at": "s",

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 _WIDTH = 120
 
@@ -39,7 +39,7 @@ def load_checked(name: str) -> Hammer:
     InputError
         There is no such hammer, or it does not rest at its backstop.
     """
-    from printhammer.hammer import load
+    from printhammer.hammer.hammer import load
 
     hammer = load(name)
     for warning in hammer.warnings():
@@ -55,7 +55,7 @@ def warn(sentence: str) -> None:
 
 def announce_compiling() -> None:
     """Have the user told when machine code is made, which takes a while once."""
-    from printhammer.simulate import announce_compiling
+    from printhammer.run.simulate import announce_compiling
 
     announce_compiling(say)
 

@@ -76,7 +76,7 @@ def tune(
     from printhammer.control.table_report import judge_table
     from printhammer.control.table_tuning import tune as tuned
     from printhammer.errors import InputError
-    from printhammer.outputs import check_outputs, write_dataset
+    from printhammer.support.outputs import check_outputs, write_dataset
 
     wanted = out or []
     reports = [] if report is None else [report]

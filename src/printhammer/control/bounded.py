@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from printhammer.drive_sequence import PulseSequence
+from printhammer.drive.sequence import PulseSequence
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.waveforms import Switched
+    from printhammer.drive.waveforms.shapes import Switched
 
 
 class BoundedSequence(PulseSequence):

@@ -14,11 +14,11 @@ import numpy as np
 from printhammer.control.bounded import BoundedSequence
 from printhammer.control.learning import Learned, Touched
 from printhammer.control.sensor import run_key
-from printhammer.drive_sequence import PulseSequence
-from printhammer.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
-from printhammer.equilibrium import rest_state
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.waveforms.shapes import Switched
+from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.slots import slot_times
-from printhammer.waveforms import Switched
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from printhammer.control.controller import Controller, Printed
     from printhammer.control.driver import Driver
     from printhammer.control.sensor import PositionSensor
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
     _Shown = tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]
 

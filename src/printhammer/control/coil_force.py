@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from printhammer.static_force import StaticForce
+from printhammer.hammer.static_force import StaticForce
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 _PLACES: Final = 161
 _CURRENTS: Final = 33
@@ -23,7 +23,7 @@ class CoilForce:
     """Fm(x, I) - Fm(x, 0) as a smooth surface through values of the law, for searches.
 
     Its error is about 1e-8 of the largest force. What a search has found is computed anew with the law
-    itself, see `printhammer.coil_work`.
+    itself, see `printhammer.run.coil_work`.
 
     Parameters
     ----------

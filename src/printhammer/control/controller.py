@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from printhammer.control.policy import Choice
     from printhammer.control.sensor import PositionSensor
     from printhammer.control.swing_table import IntArray
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
 """Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from printhammer.drive_input import read_positive
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.nominal import pulse_of
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 LARGEST_CURRENT: Final = 2.0
 """Largest current unless told otherwise, A."""

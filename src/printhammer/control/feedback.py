@@ -18,8 +18,7 @@ from printhammer.control.closed_loop import closed_loops
 from printhammer.control.controller import Controller
 from printhammer.control.driver import LARGEST_CURRENT, driver_of
 from printhammer.control.sensor import PositionSensor
-from printhammer.drive_input import read_number, read_positive
-from printhammer.ensemble import DISPLAY_TOLERANCE
+from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.printing.limits import Limits
 from printhammer.printing.nominal import WAIT, rate_of
@@ -27,7 +26,8 @@ from printhammer.printing.safe_rate import from_rest
 from printhammer.printing.slots import slots_of
 from printhammer.printing.strategy import name_of, open_loop
 from printhammer.printing.trial import Case, attempt
-from printhammer.simulate import simulate
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.control.driver import Driver
-    from printhammer.drive_sequence import PulseSequence
-    from printhammer.hammer import Hammer
-    from printhammer.motion import Motion
+    from printhammer.drive.sequence import PulseSequence
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import Nominal
     from printhammer.printing.strategy import Strategy
-    from printhammer.segments import FloatArray
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
 
 BURST: Final = "11101101"
 """Pattern of the run that is shown."""
@@ -183,13 +183,13 @@ class Feedback:
         return feedback_dataset(self)
 
     def plot(self, **options: Any) -> Any:
-        """Draw the comparison; returns a matplotlib figure, see `printhammer.figures.feedback`."""
+        """Draw the comparison; returns a matplotlib figure, see `printhammer.figures.control.feedback`."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.feedback").plot(self, **options)
+        return import_module("printhammer.figures.control.feedback").plot(self, **options)
 
     def plot_run(self, **options: Any) -> Any:
         """Draw the run with what the controller saw; returns a matplotlib figure."""
-        return import_module("printhammer.figures.feedback_run").plot(self, **options)
+        return import_module("printhammer.figures.control.feedback_run").plot(self, **options)
 
 
 def feedback(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset
+from printhammer.support.outputs import write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.static_force import StaticForce
+from printhammer.hammer.static_force import StaticForce
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
     Accelerations = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 

@@ -14,17 +14,17 @@ import numpy as np
 from printhammer.control.bounded import BoundedSequence
 from printhammer.control.landing import landing
 from printhammer.control.swing_table import AHEAD, first_pulse, force_map, swing_table
-from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.printing.perturbation import Perturbation, perturbed
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
     from printhammer.control.driver import Driver
     from printhammer.control.landing import Landing
     from printhammer.control.launch import Launch
     from printhammer.control.swing_table import ForceMap, IntArray, SwingTable
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import Nominal
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)
 """By how much the fronts of the tables lie farther from the armature, in parts of the way to the pack; evenly

@@ -14,16 +14,16 @@ import numpy as np
 
 from printhammer.control.bounded import BoundedSequence
 from printhammer.control.swing_table import AHEAD, PUSHED
-from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
-from printhammer.equilibrium import rest_state
-from printhammer.waveforms import Switched
+from printhammer.drive.waveforms.shapes import Switched
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
     from printhammer.control.driver import Driver
     from printhammer.control.swing_table import ForceMap, IntArray
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import Nominal
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
 _WIDTHS: Final = np.linspace(0.1, 0.75, 20)

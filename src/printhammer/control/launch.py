@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.swing_table import AHEAD, FREE
-from printhammer.drive_sequence import PulseSequence
-from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.waveforms.shapes import Switched
 from printhammer.errors import InputError
-from printhammer.waveforms import Switched
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
     from printhammer.control.driver import Driver
     from printhammer.control.swing_table import ForceMap
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import Nominal
 
 _WIDTHS: Final = np.linspace(0.2, 1.0, 81)

@@ -20,16 +20,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.flight import least_squares
-from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.printing.perturbation import Perturbation, perturbed
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.closed_loop import Loop
     from printhammer.control.driver import Driver
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 FRONT_ERROR: Final = 0.04
 """Standard deviation of the front before the first contact, in parts of the way from backstop to pack."""

@@ -25,16 +25,16 @@ from printhammer.control.least_work_bound import Bound, bound
 from printhammer.control.least_work_pulses import PulsePlan
 from printhammer.control.least_work_search import Task, landing_current, printing_current
 from printhammer.control.least_work_slot import SlotState
-from printhammer.drive import PulseTrain
-from printhammer.drive_input import read_count, read_number, read_positive
-from printhammer.drive_sequence import PulseSequence
-from printhammer.equilibrium import rest_state
+from printhammer.drive.input import read_count, read_number, read_positive
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError, PrinthammerError
-from printhammer.ledger import stored_energy
+from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.nominal import Nominal, nominal, pulse_of, rate_of
-from printhammer.problem import TOLERANCE
-from printhammer.simulate import CYCLE, simulate
-from printhammer.waveforms import Sampled
+from printhammer.run.ledger import stored_energy
+from printhammer.run.problem import TOLERANCE
+from printhammer.run.simulate import CYCLE, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,14 +42,14 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.coil_work import CoilWork
-    from printhammer.contacts import Contact
     from printhammer.control.least_work_supply import SupplyCheck
-    from printhammer.hammer import Hammer
-    from printhammer.ledger import Ledger
-    from printhammer.motion import Motion
-    from printhammer.segments import FloatArray
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.coil_work import CoilWork
+    from printhammer.run.contacts import Contact
+    from printhammer.run.ledger import Ledger
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
 
 FORCE: Final = 0.9
 """Least force of an adequate dot, in parts of that of the single pulse."""
@@ -238,7 +238,7 @@ class LeastWork:
     def plot(self, **options: Any) -> Any:
         """Draw motion, current, power and ledger; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.energy").plot(self, **options)
+        return import_module("printhammer.figures.control.energy").plot(self, **options)
 
 
 def least_work(

@@ -19,18 +19,18 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.drive import PulseTrain
-from printhammer.ensemble import Ensemble
-from printhammer.equilibrium import rest_state
-from printhammer.ledger import stored_energy
-from printhammer.roots import bisect
-from printhammer.simulate import CYCLE
-from printhammer.static_force import StaticForce
+from printhammer.drive.trains import PulseTrain
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.static_force import StaticForce
+from printhammer.run.ensemble import Ensemble
+from printhammer.run.ledger import stored_energy
+from printhammer.run.simulate import CYCLE
+from printhammer.support.roots import bisect
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import Nominal
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _POINTS: Final = 4001
 _CURRENTS: Final = 17

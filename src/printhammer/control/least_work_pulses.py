@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.control.least_work_slot import SlotState
-from printhammer.drive_sequence import PulseSequence
-from printhammer.ensemble import Ensemble
+from printhammer.drive.sequence import PulseSequence
 from printhammer.errors import InputError
+from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.control.least_work_search import Task
-    from printhammer.segments import FloatArray
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.support.arrays import FloatArray
 
 GONE: Final = 1e-2
 """The current of a pulse has gone where less than this part of its peak is left."""

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 FOUND = "ok"
 NOT_FOUND = "no current found"
@@ -88,7 +88,7 @@ class LeastWorkRates:
     def plot(self, **options: Any) -> Any:
         """Draw the works against the rate; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.energy_rates").plot(self, **options)
+        return import_module("printhammer.figures.control.energy_rates").plot(self, **options)
 
 
 def least_work_rates(

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from printhammer.control.coil_force import CoilForce
     from printhammer.control.least_work_slot import Outcomes, SlotState
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 _DIFFERENCE: Final = 1e-5
 _ARRIVAL: Final = 20e-6

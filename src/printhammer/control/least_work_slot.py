@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 import numpy as np
 
-from printhammer.drive_base import Drive
-from printhammer.ensemble import MODE_NAMES, Ensemble
-from printhammer.segments import POLYNOMIAL, table
-from printhammer.waveforms import Waveform
+from printhammer.drive.base import Drive
+from printhammer.drive.segments import POLYNOMIAL, table
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.run.ensemble import MODE_NAMES, Ensemble
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.coil_force import CoilForce
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 _SAMPLES: Final = 301
 _IN_PACK: Final = {

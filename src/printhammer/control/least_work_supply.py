@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from printhammer.ensemble import Ensemble
 from printhammer.errors import InputError
+from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.least_work import LeastWork
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.coil_work import coil_power
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
+from printhammer.run.coil_work import coil_power
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,7 +95,7 @@ def least_work_dataset(found: LeastWork) -> xr.Dataset:
 
 
 def current_csv(found: LeastWork) -> str:
-    """Return the current of a burst as the text of a sampled waveform, see `printhammer.waveforms.Sampled`.
+    """Return the current of a burst as the text of a sampled waveform, see `printhammer.drive.waveforms.shapes.Sampled`.
 
     To be joined by straight lines; fired once, it does what the drive of the burst does.
     """

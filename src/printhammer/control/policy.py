@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.control.fronts import Fronts
     from printhammer.control.swing_table import IntArray, SwingTable
     from printhammer.printing.limits import Limits
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 NEVER: Final = 50.0
 """Cost of what leads nowhere."""

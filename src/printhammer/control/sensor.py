@@ -17,7 +17,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
     Words = npt.NDArray[np.uint64]
 

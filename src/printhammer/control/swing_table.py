@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.bounded import BoundedSequence
-from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
-from printhammer.waveforms import Switched
+from printhammer.drive.waveforms.shapes import Switched
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.driver import Driver
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import Nominal
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
     IntArray = npt.NDArray[np.int64]
 

@@ -17,7 +17,7 @@ from printhammer.control.histories import (
     number_of,
     shared_numbers,
 )
-from printhammer.drive_input import read_positive
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.control.table_drive import TableStrategy
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 COLUMNS: Final = ("advance", "width", "brake_delay", "brake_width")
 """What a table says of a dot."""
@@ -275,9 +275,9 @@ class CompensationTable:
         save_table(self, path)
 
     def plot(self, **options: Any) -> Any:
-        """Draw the table; returns a matplotlib figure, see `printhammer.figures.tables`."""
+        """Draw the table; returns a matplotlib figure, see `printhammer.figures.control.compensation`."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.tables").plot(self, **options)
+        return import_module("printhammer.figures.control.compensation").plot(self, **options)
 
 
 __all__ = ["COLUMNS", "MOST_GAPS", "MOST_REACH", "CompensationTable", "Settings"]

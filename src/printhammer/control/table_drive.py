@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.control.histories import histories_of
-from printhammer.drive_input import read_positive
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.nominal import pulse_of
 from printhammer.printing.slots import slot_times
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.table import CompensationTable, Settings
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 WIDEST: Final = 2.0
 """Largest width of a pulse, in parts of that of the hammer's own."""
@@ -97,7 +97,7 @@ def clearance(pulse: Waveform, widest: float, largest: float) -> float:
 
 def with_brake(pulse: Waveform, brake: Waveform | None, offset: float) -> Waveform:
     """Return a pulse followed by a brake pulse, s after its firing; without one the pulse itself."""
-    from printhammer.waveforms import Chain
+    from printhammer.drive.waveforms.shapes import Chain
 
     return pulse if brake is None else Chain(parts=((0.0, pulse), (offset, brake)))
 
@@ -200,7 +200,7 @@ def sequence(pulses: Pulses, pulse: Waveform, known: dict[tuple[float, float, fl
     known : dict
         Waveforms that were made before, by their three numbers; added to.
     """
-    from printhammer.drive_sequence import PulseSequence
+    from printhammer.drive.sequence import PulseSequence
 
     waveforms = []
     for row in np.column_stack([pulses.width, pulses.braked, pulses.offset]).tolist():

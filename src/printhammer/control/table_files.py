@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.constants import shown
 from printhammer.control.histories import (
     REST,
     checked_size,
@@ -27,7 +26,8 @@ from printhammer.control.histories import (
 )
 from printhammer.control.table import COLUMNS, CompensationTable
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
+from printhammer.support.constants import shown
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

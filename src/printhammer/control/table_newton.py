@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 LONGEST_STEP: Final = 25e-6
 """Longest change of either, s."""

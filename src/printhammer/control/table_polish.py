@@ -12,7 +12,7 @@ from printhammer.control.table import COLUMNS, Settings
 from printhammer.control.table_drive import pulses_of, sequence
 from printhammer.control.table_newton import changes
 from printhammer.control.table_ways import earliest, latest
-from printhammer.ensemble import Ensemble
+from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.table_single import Single
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.limits import Limits
-    from printhammer.segments import FloatArray
-    from printhammer.waveforms import Waveform
+    from printhammer.support.arrays import FloatArray
 
 ROUNDS: Final = 7
 """Steps of Newton's method for each length of history."""

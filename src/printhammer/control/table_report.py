@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.drive_input import read_positive
-from printhammer.ensemble import DISPLAY_TOLERANCE
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.limits import Limits
 from printhammer.printing.nominal import nominal
@@ -18,6 +17,7 @@ from printhammer.printing.safe_rate import from_rest
 from printhammer.printing.slots import LEAD_IN, cycle_with_lead_in, slots_of
 from printhammer.printing.strategy import open_loop
 from printhammer.printing.trial import Case, attempt
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.control.table import CompensationTable
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import Nominal
     from printhammer.printing.strategy import Strategy
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 PERTURBATIONS: Final = (
     Perturbation(),
@@ -150,9 +150,9 @@ class TableReport:
         )
 
     def plot(self, **options: Any) -> Any:
-        """Draw gain and loss; returns a matplotlib figure, see `printhammer.figures.tables`."""
+        """Draw gain and loss; returns a matplotlib figure, see `printhammer.figures.control.compensation`."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.tables").plot_report(self, **options)
+        return import_module("printhammer.figures.control.compensation").plot_report(self, **options)
 
 
 def judge_table(

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.table_polish import Work
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 SPACING: Final = 30e-6
 """Between the times at which all ways are looked for; between them those of the neighbours are tried, s."""

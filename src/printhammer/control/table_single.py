@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.drive import PulseTrain
-from printhammer.equilibrium import rest_state
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.nominal import Nominal, nominal
-from printhammer.simulate import simulate
+from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
 
 QUIET: Final = 2e-4
 """Distance from rest below which the hammer counts as settled, in parts of the way to the pack."""

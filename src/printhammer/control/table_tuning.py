@@ -20,18 +20,18 @@ from printhammer.control.table_polish import (
 from printhammer.control.table_refine import refined, table_of
 from printhammer.control.table_search import SPACING, chosen, spaced
 from printhammer.control.table_single import Single, single_of
-from printhammer.drive_input import read_count, read_positive
-from printhammer.ensemble import DISPLAY_TOLERANCE
+from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.printing.limits import Limits
 from printhammer.printing.perturbation import Perturbation, perturbed
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from printhammer.control.table import CompensationTable
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 FIRST: Final = 100.0
 """Lowest rate of a table over all rates, Hz: every dot is printed from rest."""

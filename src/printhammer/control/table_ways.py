@@ -9,9 +9,9 @@ import numpy as np
 
 from printhammer.control.table_drive import fading, of_width, with_brake
 from printhammer.control.table_newton import changes
-from printhammer.drive_sequence import PulseSequence
-from printhammer.ensemble import Ensemble
-from printhammer.waveform_chain import TAIL
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.waveforms.chain import TAIL
+from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.table_polish import Work
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 ROW: Final = 8
 """Number of dots of the row that decides."""

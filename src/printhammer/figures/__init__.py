@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.figures.save import FORMATS, save
+from printhammer.figures.elements.save import FORMATS, save
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from matplotlib.figure import Figure
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 __all__ = ["FIGURES", "FORMATS", "PaperFigure", "save"]
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.figures.marks import note
-from printhammer.figures.style import (
+from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.style import (
     BLUE,
     FAINT,
     FAMILY,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 _SHOWN: Final = {"s": ("ms", "ms"), "J": ("mJ", "mJ"), "Hz": ("Hz", "Hz"), "N": ("N", "N"), "m": ("um", "µm")}
 """SI unit to the unit drawn, and how it is written."""

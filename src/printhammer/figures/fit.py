@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final, cast
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.figures.marks import note
-from printhammer.figures.scales import Name, Scale, label, scale
-from printhammer.figures.style import (
+from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.scales import Name, Scale, label, scale
+from printhammer.figures.elements.style import (
     BLUE,
     FAINT,
     GREEN,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.identify.result import Fit
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _COLOURS: Final = (BLUE, GREEN, YELLOW, INK, "#56b4e9", "#cc79a7", MUTED)
 _KINDS: Final = {

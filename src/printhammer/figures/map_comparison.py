@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.figures.map_marks import (
+from printhammer.figures.elements.map_marks import (
     colour_bar,
     drawable,
     edges,
@@ -17,15 +17,15 @@ from printhammer.figures.map_marks import (
     scales_of,
     sign_map,
 )
-from printhammer.figures.style import BLUE, SMALL, new_figure, styled
-from printhammer.maps import rms_difference
+from printhammer.figures.elements.style import BLUE, SMALL, new_figure, styled
+from printhammer.maps.frequency import rms_difference
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.figures.map_marks import Scales
+    from printhammer.figures.elements.map_marks import Scales
 
 
 @styled
@@ -37,7 +37,7 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     computed : xarray.Dataset
         A map from `printhammer.frequency_map`.
     measured : xarray.Dataset
-        A map from `printhammer.measured_map.load_measured_map`, or another computed one.
+        A map from `printhammer.maps.measured.load_measured_map`, or another computed one.
 
     Returns
     -------

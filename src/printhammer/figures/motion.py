@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from printhammer.errors import InputError
-from printhammer.figures.timeline import timeline
+from printhammer.figures.elements.timeline import timeline
 from printhammer.units import parse
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.motion import Motion
+    from printhammer.run.motion import Motion
 
 
 def plot(motion: Motion, *, until: float | str | None = None, heading: str = "") -> Figure:

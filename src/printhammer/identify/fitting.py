@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.drive_input import read_number
+from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.identify.result import Fit
 
 KINDS: Final = ("magnet", "spring", "pack", "backstop", "motion")
@@ -43,7 +43,7 @@ def fit(
         left out. "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the
         reading of the displacement sensor at x = 0, or None to fit it. "spring": `position`. "pack":
         `thickness`; `exponents`, whether these are fitted too. "backstop": `stiffness`, N/m^1.5 or a
-        `printhammer.identify.backstop.Stiffness`. "motion": as `printhammer.identify.motion.fit_motion`.
+        `printhammer.identify.static.backstop.Stiffness`. "motion": as `printhammer.identify.shots.motion.fit_motion`.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def fit(
         raise InputError(f"kind = {kind!r}, expected one of {', '.join(KINDS)}")
     many = [path] if isinstance(path, str) or not hasattr(path, "__iter__") else list(path)
     if kind == "motion":
-        from printhammer.identify.motion import fit_motion
+        from printhammer.identify.shots.motion import fit_motion
 
         if hammer is None:
             raise InputError("the hammer is missing, expected one with the constants known already")
@@ -95,17 +95,17 @@ def _static(kind: str, table: Any, hammer: Hammer | None, options: dict[str, Any
     if kind in ("magnet", "spring") and options.get("position") is None:
         options["position"] = None if hammer is None else hammer.position
     if kind == "magnet":
-        from printhammer.identify.magnet import fit_magnet
+        from printhammer.identify.static.magnet import fit_magnet
 
         return fit_magnet(table, **options)
     if kind == "spring":
-        from printhammer.identify.spring import fit_spring
+        from printhammer.identify.static.spring import fit_spring
 
         if options["position"] is None:
             raise InputError("the position of the backstop is missing, expected it, or a hammer that has one")
         return fit_spring(table, **options)
     if kind == "pack":
-        from printhammer.identify.pack import fit_pack
+        from printhammer.identify.static.pack import fit_pack
 
         if options.get("thickness") is None:
             constant = None if hammer is None else hammer.constants.get("pack.thickness")
@@ -115,7 +115,7 @@ def _static(kind: str, table: Any, hammer: Hammer | None, options: dict[str, Any
                 )
             options["thickness"] = constant.si
         return fit_pack(table, **options)
-    from printhammer.identify.backstop import fit_backstop
+    from printhammer.identify.static.backstop import fit_backstop
 
     if options.get("stiffness") is None:
         options["stiffness"] = getattr(hammer.backstop, "k", None) if hammer is not None else None

@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.identify.result import Fit, FittedConstant
 
 LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
@@ -49,7 +49,7 @@ def source(fit: Fit, constant: FittedConstant) -> str:
 
 def fragment(fit: Fit) -> str:
     """Return the constants as TOML text for a hammer file, with comments on what they hold for."""
-    from printhammer.hammer_edit import changed_text
+    from printhammer.hammer.edit import changed_text
 
     files = f", fitted to {' and '.join(fit.source)}" if fit.source else ""
     remarks = [f"Constants of a hammer file{files}"]

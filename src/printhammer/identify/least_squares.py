@@ -23,7 +23,7 @@ import numpy as np
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _FALSE_OUTLIERS: Final = 0.01
 """How many rows of good data with normal noise are left out, on average, in one fit."""

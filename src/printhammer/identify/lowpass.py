@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from printhammer.segments import EXPONENTIAL, POLYNOMIAL
+from printhammer.drive.segments import EXPONENTIAL, POLYNOMIAL
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 
 def time_constant(bandwidth: float | None) -> float:
@@ -66,7 +66,7 @@ def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> Floa
     Parameters
     ----------
     segments : array
-        Segment table, see `printhammer.segments`; its support ends.
+        Segment table, see `printhammer.drive.segments`; its support ends.
     t : array, shape (n,)
         Ascending, s.
     tau : float

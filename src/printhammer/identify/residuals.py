@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 _MAD: Final = 1.482602218505602
 """Standard deviation of a normal distribution over its median absolute deviation."""

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
 
 CONFIDENCE: Final = 0.95
 """Probability with which an interval is meant to contain the constant."""

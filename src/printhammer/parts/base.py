@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from printhammer.constants import sentence
 from printhammer.errors import InputError
+from printhammer.support.constants import sentence
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

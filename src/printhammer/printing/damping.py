@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.drive_input import read_positive
-from printhammer.ensemble import DISPLAY_TOLERANCE
-from printhammer.equilibrium import rest_state
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.limits import Limits
 from printhammer.printing.materials import Material, materials
 from printhammer.printing.nominal import nominal, pulse_of, single_pulses
 from printhammer.printing.safe_rate import FIRST, LAST, rate_grid
 from printhammer.printing.safe_rates import safe_rates
 from printhammer.printing.settling import settle
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import Nominal
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 CURRENT: Final = 2.0
 """Largest current, A, unless told otherwise."""
@@ -143,7 +143,7 @@ class DampingStudy:
     def plot(self, **options: Any) -> Any:
         """Draw what each material buys; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.damping").plot(self, **options)
+        return import_module("printhammer.figures.printing.damping").plot(self, **options)
 
 
 def damping_study(

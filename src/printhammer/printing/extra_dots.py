@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.ensemble import Ensemble
+from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.drive import Drive
-    from printhammer.ensemble import DotTable
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.ensemble import DotTable
+    from printhammer.support.arrays import FloatArray
 
     IntArray = npt.NDArray[np.int64]
 

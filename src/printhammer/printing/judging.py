@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.ensemble import DotTable
     from printhammer.printing.limits import Limits
-    from printhammer.segments import FloatArray
+    from printhammer.run.ensemble import DotTable
+    from printhammer.support.arrays import FloatArray
 
     BoolArray = npt.NDArray[np.bool_]
 

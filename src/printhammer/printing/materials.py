@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
-from printhammer.parts.backstop_elastomer import ElastomerBackstop
-from printhammer.parts.backstop_hertz import HertzBackstop
-from printhammer.parts.pack_dashpot import DashpotPack
-from printhammer.parts.pack_power import PowerPack
+from printhammer.parts.backstop.elastomer import ElastomerBackstop
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.parts.pack.dashpot import DashpotPack
+from printhammer.parts.pack.power import PowerPack
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import Nominal
 
 KINDS: Final = ("as it is", "hard", "elastomer", "pack")

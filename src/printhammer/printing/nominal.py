@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from printhammer.drive import PulseTrain
-from printhammer.drive_input import read_positive
-from printhammer.ensemble import Ensemble
+from printhammer.drive.input import read_positive
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
-from printhammer.problem import TOLERANCE
-from printhammer.simulate import simulate
+from printhammer.run.ensemble import Ensemble
+from printhammer.run.problem import TOLERANCE
+from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.hammer import Hammer
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
 
 WAIT: Final = 4e-3
 """Time after the last firing of a run, s, within which its dot and extra contacts are waited for."""

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.errors import InputError
 from printhammer.printing.extra_dots import extra_dots
 from printhammer.printing.head import Head, head_of
@@ -28,6 +27,7 @@ from printhammer.printing.nominal import WAIT, Nominal, nominal, rate_of
 from printhammer.printing.pattern import Pattern
 from printhammer.printing.slots import slot_times, slots_of
 from printhammer.printing.strategy import Strategy, checked_drives, name_of, open_loop
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
     IntArray = npt.NDArray[np.int64]
     BoolArray = npt.NDArray[np.bool_]
@@ -222,9 +222,9 @@ class Page:
         return page_dataset(self)
 
     def plot(self, **options: Any) -> Any:
-        """Draw the page; returns a matplotlib figure, see `printhammer.figures.page`."""
+        """Draw the page; returns a matplotlib figure, see `printhammer.figures.printing.page`."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.page").plot(self, **options)
+        return import_module("printhammer.figures.printing.page").plot(self, **options)
 
 
 def darkness(density: npt.ArrayLike) -> FloatArray:

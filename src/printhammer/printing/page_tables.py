@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
 from printhammer.printing.judging import FAULTS
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd

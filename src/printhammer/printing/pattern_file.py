@@ -28,10 +28,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.constants import shown
 from printhammer.errors import InputError
-from printhammer.outputs import write_file
 from printhammer.printing import matrix_font
+from printhammer.support.constants import shown
+from printhammer.support.outputs import write_file
 
 if TYPE_CHECKING:
     import numpy.typing as npt

@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from printhammer.errors import InputError
-from printhammer.parts.backstop_elastomer import ElastomerBackstop
-from printhammer.parts.backstop_hertz import HertzBackstop
-from printhammer.parts.magnet_inverse_root import InverseRootMagnet
-from printhammer.parts.pack_power import PowerPack
+from printhammer.parts.backstop.elastomer import ElastomerBackstop
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.parts.magnet.inverse_root import InverseRootMagnet
+from printhammer.parts.pack.power import PowerPack
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.coil_work import squared_current
-from printhammer.drive_input import read_positive
-from printhammer.ensemble import DotTable
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.judging import judge
 from printhammer.printing.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
@@ -20,8 +18,10 @@ from printhammer.printing.nominal import nominal as single_pulse
 from printhammer.printing.settling import wear_of
 from printhammer.printing.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
 from printhammer.printing.strategy import checked_drives, name_of, open_loop
-from printhammer.problem import TOLERANCE
-from printhammer.simulate import simulate
+from printhammer.run.coil_work import squared_current
+from printhammer.run.ensemble import DotTable
+from printhammer.run.problem import TOLERANCE
+from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.contacts import Dot
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.ledger import Ledger
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.judging import Judgement
     from printhammer.printing.nominal import Nominal
     from printhammer.printing.settling import Wear
     from printhammer.printing.strategy import Strategy
-    from printhammer.segments import FloatArray
+    from printhammer.run.contacts import Dot
+    from printhammer.run.ledger import Ledger
+    from printhammer.support.arrays import FloatArray
 
 PITCH: Final = 25.4e-3 / 60.0
 """Distance of neighbouring slots on the paper, m, unless told otherwise: sixty to the inch."""
@@ -242,7 +242,7 @@ class Quality:
     def plot(self, **options: Any) -> Any:
         """Draw force and arrival of the dots; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.quality").plot(self, **options)
+        return import_module("printhammer.figures.printing.quality").plot(self, **options)
 
 
 def quality(

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.outputs import write_dataset, write_file
 from printhammer.printing.judging import FAULTS
+from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.limits import Limits
     from printhammer.printing.quality import Quality
     from printhammer.printing.safe_rate import SafeRate

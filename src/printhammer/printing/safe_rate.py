@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from printhammer.drive_input import read_positive
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.judging import FAULTS
 from printhammer.printing.limits import Limits
@@ -25,7 +25,7 @@ from printhammer.printing.nominal import nominal as single_pulse
 from printhammer.printing.slots import LEAD_IN, SLOTS, cycle_with_lead_in, eight_slot_patterns, slots_of
 from printhammer.printing.strategy import name_of, open_loop
 from printhammer.printing.trial import Case, attempt
-from printhammer.problem import TOLERANCE
+from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.nominal import SinglePulse
     from printhammer.printing.strategy import Strategy
     from printhammer.printing.trial import Trial
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 FIRST: Final = 100.0
 """First rate of the grid, Hz."""
@@ -173,7 +173,7 @@ class SafeRate:
     def plot(self, **options: Any) -> Any:
         """Draw the deviations against the rate; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.quality").plot_safe_rate(self, **options)
+        return import_module("printhammer.figures.printing.quality").plot_safe_rate(self, **options)
 
 
 class _Row(NamedTuple):

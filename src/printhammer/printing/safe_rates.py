@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.limits import Limits
     from printhammer.printing.nominal import SinglePulse
     from printhammer.printing.strategy import Strategy
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 _TOGETHER: Final = 32
 

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.drive import PulseTrain
-from printhammer.equilibrium import rest_state
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.nominal import pulse_of
-from printhammer.problem import TOLERANCE
-from printhammer.simulate import simulate
+from printhammer.run.problem import TOLERANCE
+from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.contacts import Contact
-    from printhammer.hammer import Hammer
-    from printhammer.motion import Motion
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.contacts import Contact
+    from printhammer.run.motion import Motion
 
 SETTLED: Final = 0.01
 """Distance from rest, in parts of the stroke, within which the armature counts as settled."""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 SLOTS: Final = 8
 """Number of slots of a pattern from rest, and order of the cycle."""

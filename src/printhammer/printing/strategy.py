@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from printhammer.drive import PulseTrain
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.printing.nominal import pulse_of
 from printhammer.printing.slots import slot_times
@@ -12,8 +12,8 @@ from printhammer.printing.slots import slot_times
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
 
 
 class Strategy(Protocol):

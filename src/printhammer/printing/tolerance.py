@@ -10,25 +10,25 @@ from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
 
-from printhammer.drive_input import read_count
-from printhammer.ensemble import DISPLAY_TOLERANCE
-from printhammer.equilibrium import rest_state
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.limits import Limits
 from printhammer.printing.nominal import nominal, rate_of, single_pulses
 from printhammer.printing.safe_rate import FIRST, LAST, rate_grid
 from printhammer.printing.safe_rates import all_pass, safe_rates
 from printhammer.printing.strategy import name_of, open_loop
 from printhammer.printing.trial import Case
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.strategy import Strategy
-    from printhammer.segments import FloatArray
-    from printhammer.threads import Progress
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 SPREAD: Final = 0.01
 """Relative spread of a constant, to either side, unless told otherwise."""
@@ -126,7 +126,7 @@ class ToleranceYield:
     def plot(self, **options: Any) -> Any:
         """Draw the distribution of safe rates, or which hammers pass; returns a matplotlib figure."""
         # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.tolerance").plot(self, **options)
+        return import_module("printhammer.figures.printing.tolerance").plot(self, **options)
 
 
 def tolerance_yield(

@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from printhammer.ensemble import Ensemble
 from printhammer.printing.judging import judge
 from printhammer.printing.nominal import WAIT
 from printhammer.printing.slots import FIRST_SLOT
 from printhammer.printing.strategy import checked_drives, open_loop
+from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.drive import Drive
-    from printhammer.ensemble import DotTable
-    from printhammer.hammer import Hammer
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
     from printhammer.printing.judging import Judgement
     from printhammer.printing.limits import Limits
     from printhammer.printing.nominal import SinglePulse
     from printhammer.printing.strategy import Strategy
+    from printhammer.run.ensemble import DotTable
 
 
 class Case(NamedTuple):

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from printhammer.claims.definition import KINDS, claims
-from printhammer.constants import shown
 from printhammer.errors import InputError
-from printhammer.reconstruction.shares import Share
+from printhammer.reconstruction.judging.shares import Share
+from printhammer.support.constants import shown
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable

@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import claims, judge_all
-from printhammer.reconstruction.candidates import TOLERANCE
-from printhammer.reconstruction.shortlist import standing
-from printhammer.reconstruction.space import BEYOND, CURRENT, PRINT_FORCE, hammer_of
+from printhammer.reconstruction.judging.shortlist import standing
+from printhammer.reconstruction.search.candidates import TOLERANCE
+from printhammer.reconstruction.search.space import BEYOND, CURRENT, PRINT_FORCE, hammer_of
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from printhammer.claims import Result
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 TITLE: Final = "The stored-energy print hammer of Hendriks (1983), reconstructed"
 NOTE: Final = """\

@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.claims import Context, Result, buzz_search, judge_all
 from printhammer.claims.verdicts import panel_strobes, printed_verdicts
 from printhammer.errors import InputError, PrinthammerError
-from printhammer.outputs import write_file
 from printhammer.reconstruction.results import Results, shipped_results
 from printhammer.report.citations import cited_figures
 from printhammer.report.publish import CLAIMS, PAGE, PDF, PICTURES, staged
+from printhammer.support.outputs import write_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     from matplotlib.figure import Figure
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.reconstruction.results import BaseRates
 
 _BUZZ: Final = 7

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import printed_verdicts
-from printhammer.reconstruction.robustness import STATEMENTS
+from printhammer.reconstruction.family.robustness import STATEMENTS
 from printhammer.report.quantities import split_name, value_text
 from printhammer.report.views import SAME
 

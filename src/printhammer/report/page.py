@@ -26,7 +26,7 @@ from printhammer.report.views import (
 
 if TYPE_CHECKING:
     from printhammer.claims import Result
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
     from printhammer.report.build import Report
 
 KINDS: Final = {

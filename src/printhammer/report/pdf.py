@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
-from printhammer.figures.style import INK, MUTED, in_style
+from printhammer.figures.elements.style import INK, MUTED, in_style
 from printhammer.report.page import KINDS, by_kind, judged_lines, statuses_of
 from printhammer.report.pdf_results import (
     BAD,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from printhammer.figures.style import BLUE, INK, MUTED
+from printhammer.figures.elements.style import BLUE, INK, MUTED
 from printhammer.report.family_views import claims_of_family, conclusions_view
 from printhammer.report.quantities import typeset
 from printhammer.report.sheet import LINE, MARGIN, SERIF, Sheet, Words

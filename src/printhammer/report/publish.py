@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from printhammer.errors import InputError
-from printhammer.outputs import make_folder
+from printhammer.support.outputs import make_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

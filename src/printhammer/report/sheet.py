@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.figures.style import INK, MUTED, ORANGE, TINY
+from printhammer.figures.elements.style import INK, MUTED, ORANGE, TINY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,9 +14,9 @@ from printhammer.report.quantities import band_text, percent, split_name, value_
 
 if TYPE_CHECKING:
     from printhammer.claims import Claim, Result
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.reconstruction.judging.shares import Share
     from printhammer.reconstruction.results import BestFor
-    from printhammer.reconstruction.shares import Share
     from printhammer.report.build import Report
 
 SAME: Final = 1e-9

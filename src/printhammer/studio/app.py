@@ -15,7 +15,7 @@ from printhammer.studio.bounds import MOST_TABS
 from printhammer.studio.files import KINDS, page_files
 from printhammer.studio.guard import HEADERS
 from printhammer.studio.session import Session
-from printhammer.studio.state import ProtocolError
+from printhammer.studio.states.state import ProtocolError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
     from printhammer.studio.guard import Guard
-    from printhammer.studio.shelf import Shelf
+    from printhammer.studio.states.shelf import Shelf
 
 REFUSED: Final = 1008
 BUSY: Final = 1013

@@ -11,7 +11,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 _SLICE = 5e-4
 
@@ -51,7 +51,7 @@ def serve(
         ) from None
     from printhammer.studio.bounds import LARGEST_MESSAGE
     from printhammer.studio.guard import HOSTS, Guard
-    from printhammer.studio.shelf import Shelf
+    from printhammer.studio.states.shelf import Shelf
 
     listening = _listen(HOSTS[0], port)
     guard = Guard(listening.getsockname()[1], token)

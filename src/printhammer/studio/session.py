@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
 from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE, LONGEST_REASON
-from printhammer.studio.chart import FULL, PREVIEW, map_frame, map_key, no_map, try_map
-from printhammer.studio.engine import dots_frame, motion_frame
 from printhammer.studio.frames import frame
-from printhammer.studio.printed import line_frame, line_key
-from printhammer.studio.section import (
+from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, map_key, no_map, try_map
+from printhammer.studio.pictures.engine import dots_frame, motion_frame
+from printhammer.studio.pictures.printed import line_frame, line_key
+from printhammer.studio.pictures.section import (
     AT_ONCE,
     LATER,
     VERDICT_WORK,
@@ -27,14 +27,14 @@ from printhammer.studio.section import (
     strobe_frame,
     strobe_key,
 )
-from printhammer.studio.shelf import Shelf
-from printhammer.studio.state import ProtocolError, State, read_state
+from printhammer.studio.states.shelf import Shelf
+from printhammer.studio.states.state import ProtocolError, State, read_state
 from printhammer.studio.work import GivenUp, Patience
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.motion import Motion
+    from printhammer.run.motion import Motion
 
 logger = logging.getLogger(__name__)
 
@@ -270,10 +270,10 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
 
 def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
     """Return the answer to a question: what a hammer is, what a dropped file holds, a state as texts."""
-    from printhammer.studio.controls import describe, vocabulary
-    from printhammer.studio.drops import dropped
-    from printhammer.studio.state import dropped_hammer
-    from printhammer.studio.texts import texts_of
+    from printhammer.studio.states.controls import describe, vocabulary
+    from printhammer.studio.states.drops import dropped
+    from printhammer.studio.states.state import dropped_hammer
+    from printhammer.studio.states.texts import texts_of
 
     try:
         if kind == "hammer":

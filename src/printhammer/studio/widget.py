@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
+    from printhammer.hammer.hammer import Hammer
 
 
 def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760px") -> Any:
@@ -41,8 +41,8 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
         ) from None
     from printhammer.studio.bundle import module, style
     from printhammer.studio.session import Session
-    from printhammer.studio.shelf import Shelf
-    from printhammer.studio.state import ProtocolError
+    from printhammer.studio.states.shelf import Shelf
+    from printhammer.studio.states.state import ProtocolError
 
     shelf = Shelf(hammer)
 

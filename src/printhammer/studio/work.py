@@ -9,18 +9,18 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Final
 
-from printhammer.ensemble import DISPLAY_TOLERANCE
 from printhammer.errors import InputError
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.studio import bounds
-from printhammer.studio.controls import fields_of
-from printhammer.studio.engine import limited_run
+from printhammer.studio.pictures.engine import limited_run
+from printhammer.studio.states.controls import fields_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.drive import Drive
-    from printhammer.motion import Motion
-    from printhammer.studio.state import State
+    from printhammer.drive.trains import Drive
+    from printhammer.run.motion import Motion
+    from printhammer.studio.states.state import State
 
 STEP_LIMIT: Final = "step limit"
 """Status of a run that was given up."""

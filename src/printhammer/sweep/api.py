@@ -7,11 +7,11 @@ from contextlib import ExitStack
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from printhammer.store import Store, open_store
+from printhammer.results.store import Store, open_store
+from printhammer.support.threads import thread_count
 from printhammer.sweep.local import run_local
 from printhammer.sweep.plan import make_plan
 from printhammer.sweep.spec import read_spec
-from printhammer.threads import thread_count
 
 if TYPE_CHECKING:
     from pathlib import Path

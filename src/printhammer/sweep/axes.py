@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.constants import Quantity, expected, quantities, shown
 from printhammer.errors import InputError
-from printhammer.hammer_file import SELECTORS, Body, kinds_of, model_of
+from printhammer.hammer.file import SELECTORS, Body, kinds_of, model_of
+from printhammer.support.constants import Quantity, expected, quantities, shown
 from printhammer.sweep.quantities import read_quantities, read_quantity
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
-    from printhammer.segments import FloatArray
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
     from printhammer.sweep.tables import AxisTable
 
 Target = Literal["hammer", "waveform", "drive", "at", "state"]

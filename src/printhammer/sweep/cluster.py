@@ -22,7 +22,7 @@ from printhammer.sweep.work import Results, run_chunk
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
     from printhammer.sweep.local import Index
     from printhammer.sweep.members import Base
     from printhammer.sweep.outputs import Outputs

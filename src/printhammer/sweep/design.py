@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
 
 
 def latin_hypercube(members: int, seed: int, axes: int) -> FloatArray:

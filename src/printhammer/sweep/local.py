@@ -6,8 +6,8 @@ import threading
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Final
 
+from printhammer.support.threads import thread_count
 from printhammer.sweep.work import Results, run_chunk
-from printhammer.threads import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

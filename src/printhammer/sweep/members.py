@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.drive_file import read_drive
-from printhammer.drive_text import FORMAT, document
-from printhammer.equilibrium import rest_state
+from printhammer.drive.file import read_drive
+from printhammer.drive.text import FORMAT, document
 from printhammer.errors import InputError
-from printhammer.simulate import CYCLE
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.run.simulate import CYCLE
 from printhammer.sweep.axes import COUNTS, Axis
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from printhammer.drive import Drive
-    from printhammer.hammer import Hammer
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
 
 KINDS: Final = ("train", "times", "burst", "sequence", "sine")
 """Tables of a drive file that say when it fires."""

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.constants import shown
 from printhammer.errors import InputError
+from printhammer.support.constants import shown
 from printhammer.sweep.quantities import read_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
     from printhammer.sweep.tables import OutputsTable
 
 STATUSES: Final = (

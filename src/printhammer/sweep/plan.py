@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.store import Layout, Variable
+from printhammer.results.store import Layout, Variable
 from printhammer.sweep.design import Blocks, between, latin_hypercube
 from printhammer.sweep.members import Maker
 from printhammer.sweep.outputs import FIRING, TIME
@@ -18,7 +18,7 @@ from printhammer.sweep.outputs import FIRING, TIME
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from printhammer.segments import FloatArray
+    from printhammer.support.arrays import FloatArray
     from printhammer.sweep.outputs import Output
     from printhammer.sweep.spec import Spec
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import WithJsonSchema
 
-from printhammer.constants import shown
 from printhammer.errors import InputError
+from printhammer.support.constants import shown
 from printhammer.units import describe, parse, to_si
 
 if TYPE_CHECKING:

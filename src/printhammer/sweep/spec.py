@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.constants import shown
-from printhammer.drive_file import read_drive
-from printhammer.drive_text import FORMAT as DRIVE_FORMAT
-from printhammer.drive_text import document
+from printhammer.drive.file import read_drive
+from printhammer.drive.text import FORMAT as DRIVE_FORMAT
+from printhammer.drive.text import document
 from printhammer.errors import InputError
-from printhammer.hammer import load, shipped
+from printhammer.hammer.hammer import load, shipped
+from printhammer.support.constants import shown
 from printhammer.sweep.axes import COUNTS, Axis, quantity_of, read_axis
 from printhammer.sweep.members import KINDS, Base
 from printhammer.sweep.outputs import Outputs, read_outputs
@@ -30,8 +30,8 @@ from printhammer.sweep.quantities import read_quantity
 from printhammer.sweep.tables import read_tables
 
 if TYPE_CHECKING:
-    from printhammer.hammer import Hammer
-    from printhammer.waveforms import Waveform
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
 
 
 @dataclass(frozen=True)

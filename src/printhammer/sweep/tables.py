@@ -6,9 +6,9 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from printhammer.constants import shown
 from printhammer.errors import InputError
-from printhammer.problem import LARGEST_TOLERANCE, LEAST_TOLERANCE, TOLERANCE
+from printhammer.run.problem import LARGEST_TOLERANCE, LEAST_TOLERANCE, TOLERANCE
+from printhammer.support.constants import shown
 from printhammer.sweep.quantities import ManyQuantities, OneQuantity
 
 FORMAT: Final = 1

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.ensemble import Ensemble
 from printhammer.errors import InputError
+from printhammer.run.ensemble import Ensemble
+from printhammer.support.threads import in_threads
 from printhammer.sweep.members import Maker, check_tables
 from printhammer.sweep.outputs import (
     DISPLACEMENT,
@@ -21,14 +22,13 @@ from printhammer.sweep.outputs import (
     STATUSES,
     STROBES,
 )
-from printhammer.threads import in_threads
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.ensemble import DotTable
-    from printhammer.motion import Motion
-    from printhammer.segments import FloatArray
+    from printhammer.run.ensemble import DotTable
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
     from printhammer.sweep.members import Base, Member
     from printhammer.sweep.outputs import Outputs
 

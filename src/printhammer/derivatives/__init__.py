@@ -1,0 +1,1 @@
+"""Derivatives of states and dots, with respect to states and constants."""

@@ -1,0 +1,388 @@
+"""The tangent flow of constants: how a motion changes with the constants of hammer and drive.
+
+The columns of `printhammer.kernel.influence` carried along a recorded run, in a second pass as for the
+tangent flow of the state (`printhammer.derivatives.states`). docs/tangent.md has the derivation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.derivatives.parameters import as_arrays, parameters, rest_changes
+from printhammer.errors import InputError
+from printhammer.kernel.influence import (
+    BACKSTOP_MOVES,
+    FIELD_MOVES,
+    MIDDLE,
+    PACK_MOVES,
+    ROWS,
+    SPACING,
+    VARIED,
+    width,
+)
+from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING
+from printhammer.kernel.modes import HELD_UNLOADING, LOADING, OK, RELOADING, RESTING, STATUS_NAMES, UNLOADING
+from printhammer.kernel.specialise_sensitivity import with_sensitivity
+from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
+from printhammer.run.start import initial_state
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.derivatives.parameters import Parameter
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.kernel.specialise import Kernel
+    from printhammer.run.problem import Record
+    from printhammer.support.arrays import FloatArray
+
+_STAGES: Final = 15
+_VALUE_SPACING: Final = 1e-3
+
+
+@dataclass(frozen=True)
+class ConstantMap:
+    """The derivative of the state at one time with respect to constants.
+
+    Attributes
+    ----------
+    matrix : array, shape (2 or 3, n)
+        d(state at the end) / d(constant), SI, the state at the start staying as it is; NaN if the run did
+        not get to the end. The state is displacement, m, velocity, m/s, and on the unloading branch of a
+        pack with memory the displacement of the latest local maximum, m.
+    constants : tuple of str
+        Names of the constants, in the order of the columns.
+    values : array, shape (n,)
+        Their values, SI.
+    start, end : float
+        Times, s.
+    state_at_start, state_at_end : tuple of float
+        Displacement, m, velocity, m/s, and latest local maximum, m (0 where it is not part of the state).
+    rate_at_start, rate_at_end : array, shape (2 or 3,)
+        Rates of the state in time, just after any switch there.
+    smooth : bool
+        False where the motion in between passes a touch without velocity.
+    status : str
+        How the run ended.
+    """
+
+    matrix: FloatArray
+    constants: tuple[str, ...]
+    values: FloatArray
+    start: float
+    end: float
+    state_at_start: tuple[float, float, float]
+    state_at_end: tuple[float, float, float]
+    rate_at_start: FloatArray = field(repr=False)
+    rate_at_end: FloatArray = field(repr=False)
+    smooth: bool
+    status: str
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run went as asked."""
+        return self.status == STATUS_NAMES[OK]
+
+    def moving(
+        self, state_map: FloatArray, start_moves: npt.ArrayLike = 0.0, end_moves: npt.ArrayLike = 0.0
+    ) -> FloatArray:
+        """Return the matrix for a start and an end that move with the constants themselves.
+
+        The state z at a start that moves is held: d(state) = matrix - M z' ds + y' de, with M the tangent map
+        of the state, z' and y' its rates at start and end. For the strobe map over one period that begins
+        at firing n of a train, with the period as the constant, ds = n and de = n + 1.
+
+        Parameters
+        ----------
+        state_map : array
+            Matrix of `printhammer.derivatives.states.tangent_map` between the same times.
+        start_moves, end_moves : array, shape (n,) or ()
+            d(start) / d(constant) and d(end) / d(constant), s per unit of the constant.
+
+        Returns
+        -------
+        array, shape (2 or 3, n)
+            The derivative of the state at the moving end.
+        """
+        begin = np.broadcast_to(np.asarray(start_moves, dtype=np.float64), self.values.shape)
+        finish = np.broadcast_to(np.asarray(end_moves, dtype=np.float64), self.values.shape)
+        return np.asarray(
+            self.matrix - np.outer(state_map @ self.rate_at_start, begin) + np.outer(self.rate_at_end, finish)
+        )
+
+
+def constant_map(
+    hammer: Hammer,
+    drive: Drive,
+    start: float,
+    end: float,
+    constants: Sequence[str],
+    *,
+    state: tuple[float, float] | None = None,
+    tolerance: float = TOLERANCE,
+) -> ConstantMap:
+    """Return the derivative of the state at `end` with respect to constants, the state at `start` held.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    drive : Drive
+        The drive.
+    start, end : float
+        Times, s, anywhere in a run from time 0. At the instant of a switch: the state after it.
+    constants : sequence of str
+        Names such as "pack.stiffness", "waveform.width", "period", "rate" or "firing.1"; see
+        `printhammer.derivatives.parameters`.
+    state : tuple of float, optional
+        Displacement, m, and velocity, m/s, at time 0; by default the rest state.
+    tolerance : float, optional
+        Error allowed in one step of the run.
+
+    Returns
+    -------
+    ConstantMap
+        With a status; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        Times that are not ascending, an impossible state or tolerance, a constant that is not known or at
+        whose value nothing is differentiable.
+    """
+    if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
+        raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
+    check_tolerance(tolerance)
+    wanted = parameters(hammer, drive, constants)
+    problem = Problem(hammer, drive, initial_state(hammer, state), 0.0, tolerance)
+    record = problem.run(end)
+    marks = np.array([start, end])
+    found = flow(problem, record, wanted, marks, np.zeros((3, len(wanted))))
+    ok = record.status == OK
+    scales = np.array([parameter.scale for parameter in wanted])
+    three = [code in (UNLOADING, RELOADING, HELD_UNLOADING) for code in found.states[:, 2]]
+    rows = 3 if three[1] else 2
+    changes = found.changes[1, :rows] / scales if ok else np.full((2, len(wanted)), np.nan)
+    rates = _rates(problem, record, marks, found.states) if ok else np.full((2, 3), np.nan)
+    return ConstantMap(
+        matrix=changes,
+        constants=tuple(constants),
+        values=np.array([parameter.value for parameter in wanted]),
+        start=start,
+        end=end,
+        state_at_start=_state(found.states[0]),
+        state_at_end=_state(found.states[1]),
+        rate_at_start=rates[0, : 3 if three[0] else 2],
+        rate_at_end=rates[1, :rows],
+        smooth=found.smooth,
+        status=record.status_name,
+    )
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Columns of constants along a run, per ``value / scale`` of each.
+
+    Attributes
+    ----------
+    states : array, shape (m, 4)
+        Displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks; NaN beyond the run.
+    changes : array, shape (m, 7, n)
+        Changes at the marks: displacement, m; velocity, m/s; latest local maximum, m; work of coil and of a
+        drive force, loss in pack and backstop, J, since the first mark.
+    passed : array, shape (q, 2, 7, n)
+        The same at chosen nodes of the record, before and after the switch there.
+    smooth : bool
+        Whether the motion is differentiable from the first mark to the last.
+    """
+
+    states: FloatArray
+    changes: FloatArray
+    passed: FloatArray
+    smooth: bool
+
+
+def flow(
+    problem: Problem,
+    record: Record,
+    wanted: Sequence[Parameter],
+    marks: FloatArray,
+    initial: FloatArray,
+    nodes: Sequence[int] = (),
+) -> Flow:
+    """Carry the columns of constants along a recorded run.
+
+    Parameters
+    ----------
+    problem, record : Problem, Record
+        The run.
+    wanted : sequence of Parameter
+        The constants.
+    marks : array, shape (m,)
+        Ascending times, s; the columns begin at the first.
+    initial : array, shape (3, n)
+        Changes of displacement, m, velocity, m/s, and latest local maximum, m, at the first mark.
+    nodes : sequence of int, optional
+        Ascending numbers of nodes of the record at which to look as well.
+
+    Returns
+    -------
+    Flow
+        NaN where the run did not get.
+    """
+    count, arrays = len(wanted), as_arrays(wanted)
+    away = SPACING * (np.arange(VARIED) - MIDDLE)
+    varied = problem.constants + away[:, np.newaxis] * arrays["hammer"][:, np.newaxis, :]
+    states = np.full((len(marks), 4), np.nan)
+    changes = np.full((len(marks), ROWS, count), np.nan)
+    passed = np.full((len(nodes), 2, ROWS, count), np.nan)
+    smooth = kernel_of(problem).sensitivity(
+        record.nodes,
+        *problem.drive_arrays(),
+        problem.constants,
+        problem.scales,
+        problem.bounds,
+        varied,
+        arrays["hammer"],
+        _laws_moved(arrays["hammer"]),
+        arrays["firings"],
+        arrays["pieces"],
+        np.zeros((count, 5 * problem.firings.size)),
+        np.zeros((count, VARIED)),
+        _VALUE_SPACING * (problem.drive.largest_pulse or 1.0),
+        np.ascontiguousarray(marks, np.float64),
+        np.asarray(nodes, dtype=np.int64),
+        np.ascontiguousarray(initial, np.float64),
+        np.zeros((ROWS, count)),
+        np.zeros((_STAGES, width(count))),
+        states,
+        changes,
+        passed,
+    )
+    return Flow(states, changes, passed, bool(smooth))
+
+
+def _laws_moved(moves: FloatArray) -> npt.NDArray[np.int64]:
+    """Tell which laws each constant changes, as the kernel wants it."""
+    pack = moves[:, PACK:BACKSTOP_PART].any(axis=1) | (moves[:, FRONT] != 0.0)
+    return np.asarray(
+        FIELD_MOVES * (moves[:, SPRING:PACK].any(axis=1) | moves[:, MAGNET:].any(axis=1))
+        + PACK_MOVES * pack
+        + BACKSTOP_MOVES * moves[:, BACKSTOP_PART:MAGNET].any(axis=1),
+        dtype=np.int64,
+    )
+
+
+def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
+    """Return the changes of a start from rest at time 0 with constants, shape (3, n): m, m/s, m.
+
+    A pulse fired at that time with a sharp edge begins to act later if its firing does.
+    """
+    found = np.zeros((3, len(wanted)))
+    found[0] = rest_changes(problem.hammer, wanted)
+    begun = problem.firings == 0.0
+    if begun.any():
+        from printhammer.hammer.static_force import StaticForce
+
+        value = float(problem.drive.value(0.0))
+        static, x = StaticForce(problem.hammer), problem.state[0]
+        push = value if problem.drive.quantity == "force" else static.free(x, value) - static.free(x, 0.0)
+        for k, parameter in enumerate(wanted):
+            found[1, k] = -push / problem.hammer.mass * float(parameter.firings[begun].sum())
+    return found
+
+
+def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
+    """Return the changes [m] of the front of the pack and of the position of the backstop, by surface."""
+    moves = as_arrays(wanted)["hammer"]
+    return {"pack": moves[:, FRONT], "backstop": moves[:, POSITION]}
+
+
+def pack_push_changes(
+    problem: Problem, wanted: Sequence[Parameter], state: FloatArray, changes: FloatArray
+) -> FloatArray:
+    """Return the changes [N] of the push of the pack on the armature, shape (n,).
+
+    Parameters
+    ----------
+    problem : Problem
+        A hammer with a pack.
+    wanted : sequence of Parameter
+        The constants.
+    state : array, shape (4,)
+        Displacement, m, velocity, m/s, mode inside the pack, latest local maximum, m.
+    changes : array, shape (3 or more, n)
+        Changes of displacement, velocity and latest local maximum.
+    """
+    moves = as_arrays(wanted)["hammer"]
+    return np.array(
+        [_push_change(problem, moves[k], state, changes[:3, k]) for k in range(len(wanted))], dtype=np.float64
+    )
+
+
+def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
+    """Return the rate [N/s] of the push of the pack at a time of a run, s; NaN but on the loading branch."""
+    row = problem.resample(record, np.array([t]))[0]
+    if int(row[8]) != LOADING:
+        return math.nan
+    drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
+    a = (float(row[3:8].sum()) + drive) / problem.hammer.mass
+    still = np.zeros_like(problem.constants)
+    # In the time of the motion, so that the changes are of the size of the state.
+    time = problem.scales[0] / problem.scales[1]
+    direction = np.array([float(row[1]), a, 0.0]) * time
+    return _push_change(problem, still, np.array([row[0], row[1], row[8], 0.0]), direction) / time
+
+
+def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change: FloatArray) -> float:
+    """Return the change [N] of the push of the pack with constants, displacement, velocity and memory."""
+    x, v, mode, peak = (float(number) for number in state)
+    dx, dv, dp = (float(number) for number in change)
+    # No point may leave the pack, and no depth may change much.
+    sink = max(abs(dx - moves[FRONT]), abs(dp - moves[FRONT]))
+    depth = x - problem.constants[FRONT]
+    share = SPACING * min(1.0, depth / sink if sink > 0.0 and depth > 0.0 else 1.0)
+    share *= min(1.0, problem.scales[1] / abs(dv) if dv else 1.0)
+
+    def moved(e: float) -> float:
+        c = (problem.constants + e * moves)[PACK:BACKSTOP_PART]
+        return _push(problem, c, (x + e * dx, v + e * dv, mode, peak + e * dp))
+
+    near, far = moved(share) - moved(-share), moved(2.0 * share) - moved(-2.0 * share)
+    return (8.0 * near - far) / (12.0 * share)
+
+
+def _push(problem: Problem, c: FloatArray, state: tuple[float, float, float, float]) -> float:
+    x, v, mode, peak = state
+    part: Any = import_module(problem.laws.pack)
+    if mode == LOADING or not getattr(part, "MEMORY", False):
+        return -float(part.pack_loading(c, x, v))
+    return -float(part.pack_unloading(c, x, v, part.pack_memory(c, peak)))
+
+
+def kernel_of(problem: Problem) -> Kernel:
+    """Return the kernel that carries columns of constants for the laws of a problem."""
+    return with_sensitivity(problem.kernel)
+
+
+def _rates(problem: Problem, record: Record, times: FloatArray, states: FloatArray) -> FloatArray:
+    """Return the rates of the state at times of a run, shape (m, 3)."""
+    table: Any = problem.resample(record, times)
+    drive = table[:, 2] if problem.drive.quantity == "force" else 0.0
+    acceleration = (table[:, 3:8].sum(axis=1) + drive) / problem.hammer.mass
+    found = np.zeros((len(times), 3))
+    moving = states[:, 2] != RESTING
+    found[:, 0] = np.where(moving, table[:, 1], 0.0)
+    found[:, 1] = np.where(moving, acceleration, 0.0)
+    return found
+
+
+def _state(row: FloatArray) -> tuple[float, float, float]:
+    return float(row[0]), float(row[1]), float(row[3])

@@ -1,0 +1,279 @@
+"""Constants by which a motion can be differentiated, and what each changes in what the kernel works with.
+
+A constant is named as in a hammer file, "pack.stiffness"; those of the pulse are the drive's own,
+"waveform.width". Beside them there are "period" and "rate" of an even train or of a sinusoidal force, and
+"firing.3", the time of a single firing, counted from 0. A sampled waveform has the one constant
+"waveform.amplitude", its largest value.
+
+Changes are taken by differences of fourth order of the packed arrays, one-sided where a constant is at an end
+of its range. A part need not know of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.drive.waveforms.shapes import Sine
+from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.run.problem import constants_of, scales_of
+from printhammer.support.constants import quantities
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+_SPACING: Final = 2e-4
+"""Share of a constant, or of its scale, by which it is moved in what is packed."""
+_STENCILS: Final = (
+    ((-2, -1, 1, 2), (1.0, -8.0, 8.0, -1.0)),
+    ((0, 1, 2, 3, 4), (-25.0, 48.0, -36.0, 16.0, -3.0)),
+    ((0, -1, -2, -3, -4), (25.0, -48.0, 36.0, -16.0, 3.0)),
+)
+"""Offsets and weights, times 12: central, forward, backward; Abramowitz and Stegun (1964), table 25.2."""
+_MOST_SINGLE: Final = 20
+"""Largest number of uneven firings whose times are listed one by one."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A constant of a hammer under a drive, and the changes that it makes.
+
+    Attributes
+    ----------
+    name : str
+        Such as "pack.stiffness", "waveform.width", "period", "firing.1".
+    value : float
+        In SI.
+    scale : float
+        Unit in which it is changed, SI: its absolute value, or what is typical of its dimension for the
+        motion where that is zero.
+    unit : str
+        SI unit.
+    meaning : str
+        One phrase.
+    hammer : array, shape (h,)
+        Change of the packed constants with ``value / scale``.
+    firings : array, shape (f,)
+        Change of the firing times [s].
+    pieces : array, shape (m, 6)
+        Change of the tables of the waveforms, see `Drive.kernel_arrays`.
+    """
+
+    name: str
+    value: float
+    scale: float
+    unit: str
+    meaning: str
+    hammer: FloatArray = field(repr=False)
+    firings: FloatArray = field(repr=False)
+    pieces: FloatArray = field(repr=False)
+
+
+def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
+    """List the constants of a hammer and a drive: those of the hammer, of the pulse, of the firing times.
+
+    A train of even spacing has its period, others up to 20 firings the time of each but the first. A drive
+    whose firings have waveforms of their own has no constants of the pulse.
+    """
+    names = [key for key in hammer.constants if not key.startswith("waveform.")]
+    if drive.uniform:
+        names += [f"waveform.{name}" for name in _of_waveform(drive.waveform)]
+    count = len(drive.times)
+    if drive.period is not None and count > 1:
+        names.append("period")
+    elif count <= _MOST_SINGLE:
+        names += [f"firing.{number}" for number in range(1, count)]
+    return names
+
+
+def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Parameter]:
+    """Return constants by name, with the changes that they make.
+
+    Parameters
+    ----------
+    hammer, drive : Hammer, Drive
+        Whose constants they are.
+    names : sequence of str
+        Such as `parameter_names` lists, or "rate".
+
+    Returns
+    -------
+    list of Parameter
+        One for each name.
+
+    Raises
+    ------
+    InputError
+        There is no such constant, or nothing is differentiable with it at its value, such as a rise time of
+        zero.
+    """
+    return [_parameter(hammer, drive, name) for name in names]
+
+
+def rest_changes(hammer: Hammer, wanted: Sequence[Parameter]) -> FloatArray:
+    """Return the changes [m] of the rest state with ``value / scale`` of constants, shape (n,).
+
+    Raises
+    ------
+    InputError
+        The hammer has no rest state.
+    """
+    found = np.zeros(len(wanted))
+    for k, parameter in enumerate(wanted):
+        if parameter.hammer.any():
+            found[k] = _rest_change(hammer, parameter)
+    return found
+
+
+def _rest_change(hammer: Hammer, parameter: Parameter) -> float:
+    def rest(value: float) -> FloatArray:
+        return np.array(rest_state(hammer.replace(parameter.name, value)))
+
+    return float(_difference(rest, parameter.value, parameter.scale, parameter.name))
+
+
+def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
+    section, _, last = name.rpartition(".")
+    firings = np.zeros(len(drive.times))
+    pieces = np.zeros(drive.kernel_arrays()[2].shape)
+    packed = np.zeros(len(constants_of(hammer)))
+    if section == "waveform":
+        waveform = drive.waveform
+        fields = _of_waveform(waveform)
+        if drive.uniform and last in fields:
+            value, unit, meaning = fields[last]
+            scale = abs(value) or _natural(unit, hammer, drive)
+            pieces = _table_change(lambda moved: _changed(waveform, last, moved), value, scale, name)
+            return Parameter(name, value, scale, unit, meaning, packed, firings, pieces)
+    elif name in ("period", "rate"):
+        return _spacing(drive, name, packed)
+    elif section == "firing":
+        number = int(last) if last.isdecimal() else -1
+        if 0 <= number < len(firings) and not isinstance(drive.waveform, Sine):
+            value = float(drive.times[number])
+            gaps = np.diff(drive.times)
+            scale = abs(value) or (float(gaps.min()) if len(gaps) else _natural("s", hammer, drive))
+            firings[number] = scale
+            return Parameter(name, value, scale, "s", f"time of firing {number}", packed, firings, pieces)
+    elif name in hammer.constants:
+        constant = hammer.constants[name]
+        scale = abs(constant.si) or _natural(constant.si_unit, hammer, drive)
+        packed = _difference(
+            lambda value: constants_of(hammer.replace(name, value)), constant.si, scale, name
+        )
+        return Parameter(
+            name, constant.si, scale, constant.si_unit, constant.meaning, packed, firings, pieces
+        )
+    known = ", ".join(parameter_names(hammer, drive))
+    raise InputError(f"constant = {name!r} is not known, expected one of {known}")
+
+
+def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
+    """Return the period or rate of an even train, its first firing staying where it is, or of a sine."""
+    period, count = drive.period, len(drive.times)
+    if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
+        raise InputError(f"constant = {name!r}, expected a drive with a single period and several firings")
+    value, unit, sign = (period, "s", 1.0) if name == "period" else (1.0 / period, "Hz", -1.0)
+    firings, pieces = np.zeros(count), np.zeros(drive.kernel_arrays()[2].shape)
+    waveform = drive.waveform
+    if isinstance(waveform, Sine):
+        frequency = waveform.frequency
+        table = _table_change(
+            lambda moved: _changed(waveform, "frequency", moved), frequency, frequency, name
+        )
+        pieces = -sign * table
+    else:
+        firings = sign * (drive.times - drive.times[0])
+    meaning = "time between firings" if name == "period" else "firings per second"
+    return Parameter(name, value, value, unit, meaning, packed, firings, pieces)
+
+
+def _of_waveform(waveform: Waveform) -> dict[str, tuple[float, str, str]]:
+    """Return value, unit and meaning of the constants of a waveform."""
+    fields = {
+        name: (float(getattr(waveform, name)), note.si, note.meaning)
+        for name, note in quantities(type(waveform)).items()
+    }
+    if "amplitude" in fields:
+        fields["amplitude"] = (fields["amplitude"][0], waveform.unit, fields["amplitude"][2])
+        return fields
+    return {"amplitude": (waveform.peak, waveform.unit, "largest value of the pulse"), **fields}
+
+
+def _changed(waveform: Waveform, name: str, value: float) -> Waveform:
+    if name in quantities(type(waveform)):
+        return type(waveform)(**{**waveform.model_dump(), name: value})
+    return waveform.scaled(value / waveform.peak)
+
+
+def _table_change(made: Callable[[float], Waveform], value: float, scale: float, name: str) -> FloatArray:
+    """Return the change of a segment table whose segments stay of one kind."""
+    kinds = made(value).segments()[:, 1]
+
+    def table(moved: float) -> FloatArray:
+        found = made(moved).segments()
+        if len(found) != len(kinds) or (found[:, 1] != kinds).any():
+            raise InputError(f"constant = {name!r}: the waveform has other segments beside {value!r}")
+        return found
+
+    return _difference(table, value, scale, name)
+
+
+def _difference(function: Callable[[float], FloatArray], value: float, scale: float, name: str) -> FloatArray:
+    """Return the change of an array with ``value / scale``; zero where it is infinite."""
+    for offsets, weights in _STENCILS:
+        try:
+            middle = function(value)
+            found = [function(value + offset * _SPACING * scale) for offset in offsets]
+        except InputError:
+            continue
+        # From the middle, so that what does not depend on the constant is exactly zero.
+        with np.errstate(invalid="ignore"):
+            change = sum(weight * (array - middle) for weight, array in zip(weights, found, strict=True))
+        change = np.asarray(change) / (12.0 * _SPACING)
+        return np.where(np.isfinite(change), change, 0.0)
+    raise InputError(
+        f"constant = {name!r} has the value {value!r}, at which nothing is differentiable with it"
+    )
+
+
+def _natural(unit: str, hammer: Hammer, drive: Drive) -> float:
+    """Return what is typical for the motion in an SI unit such as "N s/m^2.5"."""
+    way, speed = scales_of(hammer, drive, (hammer.origin, 0.0))
+    time, force = way / speed, hammer.mass * speed * speed / way
+    known = {
+        "m": way,
+        "s": time,
+        "N": force,
+        "kg": hammer.mass,
+        "Hz": 1.0 / time,
+        "Pa": force / (way * way),
+        "A": drive.largest_pulse or 1.0,
+    }
+    result, divides = 1.0, False
+    for factor in unit.replace("/", " / ").split():
+        if factor == "/":
+            divides = True
+            continue
+        symbol, _, power = factor.partition("^")
+        size = known.get(symbol, 1.0) ** float(power or 1.0)
+        result = result / size if divides else result * size
+        divides = False
+    return result if math.isfinite(result) and result > 0.0 else 1.0
+
+
+def as_arrays(wanted: Sequence[Parameter]) -> dict[str, Any]:
+    """Return the changes of several constants side by side: `hammer`, `firings`, `pieces`."""
+    return {
+        name: np.ascontiguousarray([getattr(parameter, name) for parameter in wanted], dtype=np.float64)
+        for name in ("hammer", "firings", "pieces")
+    }

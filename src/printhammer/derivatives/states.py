@@ -1,0 +1,458 @@
+"""The tangent flow: how a small change of the state grows through all contacts, and the exponents of a train.
+
+A neighbouring motion meets every switch a little earlier or later; the jumps that follow are derived in
+docs/tangent.md. The flow is taken from the record of a run in a second pass, so that runs which do not ask
+for it pay nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.drive.trains import Drive, PulseTrain
+from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.kernel import carry
+from printhammer.kernel.modes import HELD_UNLOADING, OK, PAUSED, RELOADING, STATUS_NAMES, UNLOADING
+from printhammer.run.problem import MAX_STEPS, TOLERANCE, Problem, check_tolerance
+from printhammer.run.start import initial_state
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+_NODES: Final = 4096
+_CONTACTS: Final = 16
+_WORK: Final = (15, 9)
+_WARM_UP: Final = 100
+"""Firings over which the directions of growth settle before growth counts."""
+_FEWEST: Final = 8
+"""Growths below which their scatter says nothing."""
+
+
+@dataclass(frozen=True)
+class TangentMap:
+    """The derivative of the state at one time with respect to the state at an earlier one.
+
+    The state is displacement, m, and velocity, m/s; on the unloading branch of a pack with memory also the
+    displacement of the latest local maximum, m.
+
+    Attributes
+    ----------
+    matrix : array, shape (2 or 3, 2 or 3)
+        d(state at the end) / d(state at the start); NaN if the run did not get to the end.
+    start, end : float
+        Times, s.
+    state_at_start, state_at_end : tuple of float
+        Displacement, m, velocity, m/s, and latest local maximum, m (0 where it is not part of the state).
+    branch_at_start, branch_at_end : int
+        Codes of the modes, see `printhammer.kernel.modes`; -1 where the run did not get.
+    smooth : bool
+        False where the motion in between passes a touch without velocity, where the state has no derivative.
+    status : str
+        How the run ended.
+    """
+
+    matrix: FloatArray
+    start: float
+    end: float
+    state_at_start: tuple[float, float, float]
+    state_at_end: tuple[float, float, float]
+    branch_at_start: int
+    branch_at_end: int
+    smooth: bool
+    status: str
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run went as asked."""
+        return self.status == STATUS_NAMES[OK]
+
+    @property
+    def determinant(self) -> float:
+        """Factor by which volumes of states grow; 0 where the state loses its memory on the way.
+
+        Raises
+        ------
+        ValueError
+            The end has a memory that the start has not.
+        """
+        rows, columns = self.matrix.shape
+        if rows > columns:
+            raise ValueError("the state at the end has more components than that at the start")
+        if rows < columns:
+            return 0.0
+        return float(np.linalg.det(self.matrix))
+
+
+@dataclass(frozen=True)
+class Exponent:
+    """Exponents of a strobe map: mean logarithms of the growth of small changes from firing to firing.
+
+    Attributes
+    ----------
+    value : float
+        The largest exponent, per firing; minus infinity where the motion forgets its past altogether, NaN if
+        the run did not get through.
+    standard_error : float
+        Of the value, from the scatter of overlapping batch means; infinite for fewer than eight firings.
+    second : float
+        The other exponent of the plane of displacement and velocity, per firing. A third one, that of the
+        memory of the pack, is minus infinity: every contact meets fresh paper.
+    period : float
+        Time between firings, s.
+    factors : array
+        Logarithm of the growth from each firing to the next.
+    smooth : bool
+        False where the motion passes a touch without velocity, where it has no derivative.
+    status : str
+        How the run ended.
+    second_factors : array
+        As `factors`, for the second exponent.
+    states : array, shape (number of factors + 1, 4)
+        Displacement, m, velocity, m/s, mode, and displacement of the latest local maximum, m, at the firings;
+        NaN where the run did not get.
+    """
+
+    value: float
+    standard_error: float
+    second: float
+    period: float
+    factors: FloatArray
+    smooth: bool
+    status: str
+    second_factors: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    states: FloatArray = field(default_factory=lambda: np.zeros((0, 4)), repr=False)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run went as asked."""
+        return self.status == STATUS_NAMES[OK]
+
+    @property
+    def per_second(self) -> float:
+        """The largest exponent per second, 1/s."""
+        return self.value / self.period
+
+    @property
+    def total(self) -> float:
+        """Sum of both exponents: mean logarithm of the growth of areas, per firing."""
+        return self.value + self.second
+
+
+def tangent_map(
+    hammer: Hammer,
+    drive: Drive,
+    start: float,
+    end: float,
+    *,
+    state: tuple[float, float] | None = None,
+    tolerance: float = TOLERANCE,
+) -> TangentMap:
+    """Return the derivative of the state at `end` with respect to the state at `start`.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    drive : Drive
+        The drive.
+    start, end : float
+        Times, s, anywhere in a run from time 0. At the instant of a switch: the state after it.
+    state : tuple of float, optional
+        Displacement, m, and velocity, m/s, at time 0; by default the rest state.
+    tolerance : float, optional
+        Error allowed in one step of the run.
+
+    Returns
+    -------
+    TangentMap
+        With a status; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        Times that are not ascending, an impossible state or tolerance, a hammer without a rest state where
+        no state is given.
+    """
+    if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
+        raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
+    problem = _problem(hammer, drive, state, tolerance)
+    followed = follow(problem, np.array([start, end]), np.eye(3), renormalise=False)
+    found, status = followed.found, followed.status
+    branches = [int(code) if code >= 0.0 else -1 for code in found[:, 2]]
+    shape = [3 if branch in (UNLOADING, RELOADING, HELD_UNLOADING) else 2 for branch in branches]
+    matrix = (
+        followed.columns[: shape[1], : shape[0]].copy() if status == OK else np.full((2, shape[0]), np.nan)
+    )
+    return TangentMap(
+        matrix=matrix,
+        start=start,
+        end=end,
+        state_at_start=(float(found[0, 0]), float(found[0, 1]), float(found[0, 3])),
+        state_at_end=(float(found[1, 0]), float(found[1, 1]), float(found[1, 3])),
+        branch_at_start=branches[0],
+        branch_at_end=branches[1],
+        smooth=followed.smooth,
+        status=STATUS_NAMES[status],
+    )
+
+
+def strobe_exponent(
+    hammer: Hammer,
+    waveform_or_drive: Waveform | Drive,
+    period: float | None = None,
+    *,
+    first: int = 1,
+    last: int,
+    state: tuple[float, float] | None = None,
+    tolerance: float = TOLERANCE,
+) -> Exponent:
+    """Return the largest exponent of the strobe map, with its standard error.
+
+    Two changes of the state, orthonormal at first, are carried along with the motion and made orthonormal
+    again at every step (G. Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and
+    21). The standard error is that of the mean of an autocorrelated series, from overlapping batch means of
+    length sqrt(n) (M. S. Meketon and B. Schmeiser, Proc. Winter Simulation Conf. 1984, 227; J. M. Flegal and
+    G. L. Jones, Ann. Statist. 38 (2010) 1034).
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    waveform_or_drive : Waveform or Drive
+        What is fired every `period`; or a drive, whose firings are taken if it has several, and else the
+        multiples of the period after its first.
+    period : float, optional
+        Time between firings, s; for a drive by default its own.
+    first, last : int
+        Numbers of the firings between which growth counts, the very first firing being 1.
+    state : tuple of float, optional
+        Displacement, m, and velocity, m/s, at time 0; by default the rest state.
+    tolerance : float, optional
+        Error allowed in one step of the run.
+
+    Returns
+    -------
+    Exponent
+        With a status; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above.
+    """
+    drive, times, spacing = _strobes(waveform_or_drive, period, first, last)
+    problem = _problem(hammer, drive, state, tolerance)
+    before = max(first - 1 - _WARM_UP, 0)
+    scale, speed = problem.scales
+    initial = np.array([[scale, 0.0], [0.0, speed], [0.0, 0.0]])
+    followed = follow(problem, times[before:], initial, renormalise=True)
+    growth = followed.found[first - before :, 4:]
+    factors = growth[:, 0].copy()
+    if followed.status == OK:
+        value, second = (float(mean) for mean in growth.mean(axis=0))
+        error = standard_error(factors)
+    else:
+        value = error = second = math.nan
+    return Exponent(
+        value=value,
+        standard_error=error,
+        second=second,
+        period=spacing,
+        factors=factors,
+        smooth=followed.smooth,
+        status=STATUS_NAMES[followed.status],
+        second_factors=growth[:, 1].copy(),
+        states=followed.found[first - 1 - before :, :4].copy(),
+    )
+
+
+def strobe_exponents(
+    hammers: Hammer | Sequence[Hammer],
+    waveform: Waveform,
+    periods: npt.ArrayLike,
+    *,
+    first: int = 1,
+    last: int,
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[Exponent]:
+    """Return the exponents of many trains, computed on all cores; see `strobe_exponent`.
+
+    Parameters
+    ----------
+    hammers : Hammer or sequence of Hammer
+        One for all trains, or one for each; all start from rest.
+    waveform : Waveform
+        What every firing does.
+    periods : array
+        Times between firings, s.
+    first, last : int
+        As for `strobe_exponent`.
+    tolerance : float, optional
+        Error allowed in one step of a run.
+    threads : int, optional
+        Number of threads; by default that of the cores.
+    progress : callable, optional
+        Called now and then with the number of trains that are done and their number.
+
+    Returns
+    -------
+    list of Exponent
+        One for each period; they do not depend on the number of threads.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above.
+    """
+    spacings = np.atleast_1d(np.asarray(periods, dtype=np.float64))
+    many = [hammers] * len(spacings) if isinstance(hammers, Hammer) else list(hammers)
+    if len(many) != len(spacings):
+        raise InputError(f"hammers: {len(many)} are given, expected 1 or {len(spacings)}")
+    found: dict[int, Exponent] = {}
+
+    def work(begin: int, stop: int) -> None:
+        for i in range(begin, stop):
+            found[i] = strobe_exponent(
+                many[i], waveform, float(spacings[i]), first=first, last=last, tolerance=tolerance
+            )
+
+    in_threads([work], [len(many)], thread_count(threads), progress)
+    return [found[i] for i in range(len(many))]
+
+
+def standard_error(series: npt.ArrayLike) -> float:
+    """Return the standard error of the mean of an autocorrelated series, from overlapping batch means.
+
+    With n numbers, batches of b = floor(sqrt(n)) and their means m_j, its square is
+    b / ((n - b)(n - b + 1)) sum (m_j - m)^2. Infinite for fewer than eight numbers, or infinite ones.
+    """
+    numbers = np.asarray(series, dtype=np.float64)
+    n = numbers.size
+    if n < _FEWEST or not np.isfinite(numbers).all():
+        return math.inf
+    b = math.isqrt(n)
+    mean = numbers.mean()
+    sums = np.cumsum(np.concatenate([[0.0], numbers - mean]))
+    means = (sums[b:] - sums[:-b]) / b
+    return float(math.sqrt(b / ((n - b) * (n - b + 1.0)) * float(means @ means)))
+
+
+def _problem(hammer: Hammer, drive: Drive, state: tuple[float, float] | None, tolerance: float) -> Problem:
+    check_tolerance(tolerance)
+    return Problem(hammer, drive, initial_state(hammer, state), 0.0, tolerance)
+
+
+def _strobes(
+    waveform_or_drive: Waveform | Drive, period: float | None, first: int, last: int
+) -> tuple[Drive, FloatArray, float]:
+    """Return the drive, the times of the firings 1 to `last`, and the time between them."""
+    if not 1 <= first < last:
+        raise InputError(f"first = {first!r} and last = {last!r}, expected numbers of firings, ascending")
+    drive = waveform_or_drive
+    if not isinstance(drive, Drive):
+        if period is None:
+            raise InputError("period is missing, expected the time between the firings of the waveform")
+        drive = PulseTrain(drive, period=period, pulses=last)
+    spacing = drive.period if period is None else period
+    if spacing is None or not (math.isfinite(spacing) and spacing > 0.0):
+        raise InputError(f"period = {spacing!r} s, expected a positive number")
+    times = np.array(drive.times, dtype=np.float64)
+    if times.size == 1:
+        times = times[0] + spacing * np.arange(last)
+    if times.size < last:
+        raise InputError(f"last = {last}, expected at most {times.size}, the number of firings of the drive")
+    return drive, times[:last], float(spacing)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Status code, differentiability, the kernel's `found` at the marks (NaN beyond), columns at the last."""
+
+    status: int
+    smooth: bool
+    found: FloatArray
+    columns: FloatArray
+
+    @property
+    def status_name(self) -> str:
+        """Name of the status."""
+        return STATUS_NAMES[self.status]
+
+
+def follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> Followed:
+    """Run a problem to the last mark and carry columns along from the first.
+
+    The record is kept in stretches: memory does not grow with the length of the run.
+    """
+    capacity = _NODES
+    while True:
+        followed = _stretches(problem, marks, initial, renormalise, capacity)
+        if followed is not None:
+            return followed
+        capacity *= 4
+
+
+def _stretches(
+    problem: Problem, marks: FloatArray, initial: FloatArray, renormalise: bool, capacity: int
+) -> Followed | None:
+    """Do as `follow` with a record of at most `capacity` nodes; None where one contact alone needs more."""
+    count = initial.shape[1]
+    columns = np.zeros((3, count))
+    found = np.full((len(marks), 4 + count), np.nan)
+    track = np.zeros(2 + count)
+    track[1] = 1.0
+    work = np.zeros(_WORK)
+    nodes, contacts = np.empty((capacity, 5)), np.empty((_CONTACTS, 7))
+    state = np.zeros(carry.SIZE)
+    state[carry.PAUSE_AFTER] = capacity // 2
+    arrays: tuple[Any, ...] = problem.drive_arrays()
+    own: tuple[Any, ...] = problem.drive_arrays()
+    status = PAUSED
+    while status == PAUSED:
+        status, used, _touched, _steps = problem.kernel.run(
+            *arrays[:4],
+            problem.constants,
+            problem.start,
+            float(problem.state[0]),
+            float(problem.state[1]),
+            float(marks[-1]),
+            problem.control,
+            problem.bounds,
+            MAX_STEPS,
+            *arrays[4:],
+            nodes,
+            contacts,
+            state,
+        )
+        if used > capacity:
+            return None
+        problem.kernel.tangent(
+            nodes[:used],
+            *own,
+            problem.constants,
+            problem.scales,
+            problem.bounds,
+            marks,
+            renormalise,
+            status != PAUSED,
+            initial,
+            columns,
+            work,
+            track,
+            found,
+        )
+    return Followed(status, bool(track[1]), found, columns)

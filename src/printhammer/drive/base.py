@@ -1,0 +1,208 @@
+"""What every drive is: a waveform, the times at which it is fired, and a rule for overlapping pulses."""
+
+from __future__ import annotations
+
+import hashlib
+from copy import copy
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args
+
+import numpy as np
+
+from printhammer.drive.input import checked_times, read_number
+from printhammer.drive.segments import evaluate, largest, largest_sum, stacked
+from printhammer.drive.text import FORMAT, column_text, document, waveform_text
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.drive.waveforms.base import QuantityName
+    from printhammer.support.arrays import FloatArray
+
+    IntArray = npt.NDArray[np.int64]
+
+Overlap = Literal["add", "replace"]
+OVERLAPS: Final = get_args(Overlap)
+
+
+class Drive:
+    """A waveform and its firing times; see `printhammer.drive.trains` for the kinds. A drive never changes.
+
+    Two drives are equal if they do the same: equal segment tables, firing times, overlap rule and quantity.
+    """
+
+    bounded: ClassVar[bool] = False
+    """Whether `largest_pulse` is a bound that is stated, and does not follow from the pieces."""
+
+    def __init__(
+        self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap = "add", period: float | None = None
+    ) -> None:
+        if not isinstance(waveform, Waveform):
+            raise InputError(f"waveform = {waveform!r} is expected to be a waveform, the drive has none")
+        if overlap not in OVERLAPS:
+            raise InputError(f"overlap = {overlap!r} is expected to be 'add' or 'replace'")
+        self._waveform = waveform
+        self._overlap: Overlap = overlap
+        self._period = period
+        self._times = checked_times(times)
+        self._segments = waveform.segments()
+        self._pieces = stacked([self._segments])[1]
+
+    @property
+    def waveform(self) -> Waveform:
+        """What every firing does."""
+        return self._waveform
+
+    @property
+    def times(self) -> FloatArray:
+        """Firing times, s, ascending, read-only."""
+        return self._times
+
+    @property
+    def uniform(self) -> bool:
+        """Whether every firing does the same."""
+        return True
+
+    @property
+    def overlap(self) -> Overlap:
+        """Rule for overlapping pulses: "add" or "replace"."""
+        return self._overlap
+
+    @property
+    def period(self) -> float | None:
+        """Time between firings, or period of the force, s; None where there is no single one."""
+        return self._period
+
+    @property
+    def quantity(self) -> QuantityName:
+        """What is driven: "current" (A) or "force" (N)."""
+        return self._waveform.quantity
+
+    @property
+    def end(self) -> float:
+        """Time from which on the drive is zero, s; possibly infinite."""
+        return float(self._ends().max())
+
+    @property
+    def fingerprint(self) -> str:
+        """Hexadecimal digest of what the drive does; equal for equal drives."""
+        digest = hashlib.sha256(f"{self.quantity} {self.overlap} {self._segments.shape}".encode())
+        # Adding 0.0 makes -0.0 and 0.0, which are equal, digest alike.
+        for array in (self._segments, self._times):
+            digest.update((array + 0.0).tobytes())
+        return digest.hexdigest()
+
+    def segments(self) -> FloatArray:
+        """Return the segment table of the waveform (see `printhammer.drive.segments`), SI, read-only."""
+        return self._segments
+
+    def kernel_arrays(self) -> tuple[FloatArray, IntArray, FloatArray, bool, bool]:
+        """Return the drive as the kernel wants it.
+
+        Firing times, s; the row at which the segment table of each firing begins; the tables one after the
+        other (see `printhammer.drive.segments.stacked`); whether pulses replace; whether the drive is a force.
+        """
+        return self._times, self._begins(), self._pieces, self._overlap == "replace", self.quantity == "force"
+
+    @property
+    def overlapping(self) -> int:
+        """Largest number of pulses that are under way at once; 1 where the latest replaces the others."""
+        if self._overlap == "replace":
+            return 1
+        ended = np.searchsorted(np.sort(self._ends()), self._times, side="right")
+        return int((np.arange(len(self._times)) - ended).max()) + 1
+
+    def value(self, t: npt.ArrayLike) -> FloatArray:
+        """Total current, A, or force, N, at times t, s; right-continuous, zero before the first firing."""
+        time = np.asarray(t, dtype=np.float64)
+        latest = np.searchsorted(self._times, time, side="right") - 1
+        total = np.where(np.isnan(time), np.nan, 0.0)
+        for lag in range(self._reach()):
+            pulse = latest - lag
+            total = np.where(pulse >= 0, total + self._values(time, np.maximum(pulse, 0)), total)
+        return total
+
+    @property
+    def largest_pulse(self) -> float:
+        """Largest absolute value of any one pulse, A or N."""
+        return largest(self._segments)
+
+    @property
+    def peak(self) -> float:
+        """Largest absolute value of the total current, A, or force, N; exact where pulses do not overlap."""
+        several = self.overlapping
+        if several == 1:
+            return self.largest_pulse
+        # From the time when `several` pulses are under way, an even train repeats itself until it ends.
+        count = several + 1 if self._period is not None else len(self._times)
+        shortest = Drive(self._waveform, self._times[:count], self._overlap)
+        return largest_sum(np.unique(np.add.outer(shortest.times, self._segments[:, 0])), shortest.value)
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same drive with every value multiplied by a factor.
+
+        Raises
+        ------
+        InputError
+            The factor is not a finite number.
+        """
+        return self._with_waveform(self._waveform.scaled(read_number(factor, "1", "factor")))
+
+    def to_toml(self) -> str:
+        """Return the text of a drive file; reading it back gives an equal drive."""
+        name, table = self._table()
+        tables = {name: table}
+        if name != "sine":
+            tables["waveform"] = waveform_text(self._waveform)
+        return document({"format": FORMAT, "overlap": self._overlap}, tables)
+
+    def _table(self) -> tuple[str, dict[str, Any]]:
+        return "times", {"at": column_text(self._times, "s")}
+
+    def _with_waveform(self, waveform: Waveform) -> Self:
+        result = copy(self)
+        result._waveform = waveform
+        result._segments = waveform.segments()
+        result._pieces = stacked([result._segments])[1]
+        return result
+
+    def _begins(self) -> IntArray:
+        """Return the row of the kernel's tables at which that of each firing begins."""
+        return np.zeros(len(self._times), np.int64)
+
+    def _ends(self) -> FloatArray:
+        """Return the times at which the pulses end, s."""
+        ends: FloatArray = self._times + self._segments[-1, 0]
+        return ends
+
+    def _reach(self) -> int:
+        """Return how many of the latest firings may be under way, with all between them."""
+        return self.overlapping
+
+    def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:
+        """Return the values at given times, s, of the pulses with given numbers."""
+        return evaluate(self._segments, time, self._times[pulse])
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Drive):
+            return NotImplemented
+        return (
+            (self.quantity, self.overlap) == (other.quantity, other.overlap)
+            and np.array_equal(self._times, other._times)
+            and np.array_equal(self._begins(), other._begins())
+            and np.array_equal(self._pieces, other._pieces)
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.fingerprint)
+
+    def __repr__(self) -> str:
+        count, first, last = len(self._times), self._times[0], self._times[-1]
+        fired = (
+            f"{count} firings from {first:.6g} s to {last:.6g} s"
+            if count > 1
+            else f"1 firing at {first:.6g} s"
+        )
+        shape = f"{self._waveform.shape} {self.quantity}"
+        return f"<{type(self).__name__}: {shape}, {fired}, overlap {self._overlap}>"

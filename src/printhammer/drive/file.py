@@ -1,0 +1,365 @@
+"""Drive files: a drive as TOML, read and written back.
+
+A file has ``format = 1``, optionally ``overlap = "add"`` or ``"replace"``, and exactly one of five tables::
+
+    [train]                       # rate or period, with pulses; start
+    rate = "1.2 kHz"
+    pulses = 9
+
+    [times]                       # explicit firing times
+    at = ["0 us", "700 us"]       # or { values = [0, 700], unit = "us" }
+
+    [burst]                       # rate or period, pulses of one burst, bursts, gap between them; start
+    rate = "1.2 kHz"
+    pulses = 9
+    bursts = 4
+    gap = "3 ms"
+
+    [sequence]                    # a waveform for each firing, by its name
+    at = ["0 us", "700 us", "1.4 ms"]
+    waveforms = ["print", "soft", "print"]
+
+    [sine]                        # a sinusoidal force; phase is optional
+    amplitude = "0.5 N"
+    frequency = "300 Hz"
+    phase = "90 deg"
+
+Train, times and burst fire a waveform: the table ``[waveform]`` of the file, or else the hammer's. The
+waveforms of a sequence are the tables ``[waveforms.print]``, ``[waveforms.soft]`` and so on. The keys of a
+waveform are ``shape`` and the constants of the shape; a sampled one names a CSV file (``file``, relative to
+the drive file) or holds the samples as ``time`` and ``current`` or ``force``, each ``{ values = [...], unit =
+"us" }``; one of the shape "chain" has ``parts``, a list of waveforms, each with its offset ``at`` from the
+firing; one of the shape "switched" lists times ``at``, ``levels``, and the time constant of its ``edge``.
+Every quantity is written with its unit, as a string or as ``{ value = 1.2, unit = "kHz" }``.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from pydantic import ValidationError
+
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.text import FORMAT
+from printhammer.drive.trains import Burst, Drive, PulseTrain, SineForce
+from printhammer.drive.waveforms.base import QUANTITY_UNITS, Waveform
+from printhammer.drive.waveforms.shapes import SHAPES, Chain, Sampled, Switched
+from printhammer.errors import InputError
+from printhammer.support.constants import quantities, sentence, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+_PLAIN: Final = {"pulses", "bursts", "waveforms"}
+_KEYS: Final[dict[str, dict[str, str]]] = {
+    "train": {"rate": "Hz", "period": "s", "pulses": "", "start": "s"},
+    "times": {"at": "s", "start": "s"},
+    "burst": {"rate": "Hz", "period": "s", "pulses": "", "bursts": "", "gap": "s", "start": "s"},
+    "sequence": {"at": "s", "waveforms": "", "start": "s"},
+    "sine": {"amplitude": "N", "frequency": "Hz", "phase": "rad"},
+}
+_MAKERS: Final[dict[str, Callable[..., Drive]]] = {"train": PulseTrain, "times": PulseTrain, "burst": Burst}
+
+
+def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
+    """Read a drive file.
+
+    Parameters
+    ----------
+    path
+        TOML file.
+    waveform
+        What to fire if the file has no ``[waveform]`` table: the hammer's waveform.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is not TOML, has an unknown key, lacks one, or has a value of the wrong kind,
+        unit or range; the sentence names file, key and value.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: the drive file is expected to be UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: the drive file cannot be read ({reason})") from None
+    return read_drive(text, waveform, name=str(path), folder=path.parent)
+
+
+def read_drive(
+    text: str, waveform: Waveform | None = None, *, name: str = "drive", folder: Path | None = None
+) -> Drive:
+    """Read the text of a drive file; `name` stands in messages, `folder` is where sampled waveforms lie.
+
+    Raises
+    ------
+    InputError
+        As for `load_drive`.
+    """
+    try:
+        return _drive(tomllib.loads(text), waveform, folder or Path())
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+    except (ValueError, RecursionError) as error:
+        # tomllib raises a bare ValueError for a number of thousands of digits.
+        raise InputError(f"{name}: expected TOML ({' '.join(str(error).split())})") from None
+
+
+def save_drive(drive: Drive, path: str | Path) -> None:
+    """Write a drive file; reading it back gives an equal drive.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    try:
+        Path(path).write_text(drive.to_toml(), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: the drive file cannot be written ({error.strerror})") from None
+
+
+def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Drive:
+    _known(data, {"format", "overlap", "waveform", "waveforms", *_KEYS}, "")
+    if data.get("format") != FORMAT or isinstance(data["format"], (bool, float)):
+        raise InputError(f"format = {shown(data.get('format'))} is expected to be {FORMAT}")
+    kinds = [kind for kind in _KEYS if kind in data]
+    if len(kinds) != 1:
+        given = " and ".join(f"[{kind}]" for kind in kinds) or "none"
+        raise InputError(
+            f"{given} given, expected one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}"
+        )
+    kind = kinds[0]
+    arguments = _arguments(_table(data[kind], kind), kind)
+    for key, others in (("waveform", ("sine", "sequence")), ("waveforms", set(_KEYS) - {"sequence"})):
+        if key in data and kind in others:
+            raise InputError(f"{key} is expected to be left out beside [{kind}]")
+    if kind == "sine":
+        if data.get("overlap", "add") != "add":
+            raise InputError("overlap is expected to be left out beside [sine]")
+        _required(arguments, ("amplitude", "frequency"), kind)
+        return _named(kind, SineForce, arguments)
+    overlap = data.get("overlap", "add")
+    if overlap not in ("add", "replace"):
+        raise InputError(f"overlap = {shown(overlap)} is expected to be 'add' or 'replace'")
+    if kind == "sequence":
+        _required(arguments, ("at", "waveforms"), kind)
+        waveforms = _waveforms(arguments.pop("waveforms"), data, folder)
+        return _named(kind, PulseSequence, {"waveforms": waveforms, "overlap": overlap, **arguments})
+    if kind == "times":
+        _required(arguments, ("at",), kind)
+    elif "rate" not in arguments and "period" not in arguments:
+        raise InputError(f"{kind}.rate is missing, expected a rate or a period")
+    else:
+        _required(arguments, ("pulses",), kind)
+    if "waveform" in data:
+        waveform: Waveform | None = _waveform(_table(data["waveform"], "waveform"), folder, "waveform")
+    else:
+        waveform = standard
+    if waveform is None:
+        raise InputError("[waveform] is missing, and there is no hammer with a waveform")
+    return _named(kind, _MAKERS[kind], {"waveform": waveform, "overlap": overlap, **arguments})
+
+
+def _named(kind: str, maker: Callable[..., Drive], arguments: Mapping[str, Any]) -> Drive:
+    try:
+        return maker(**arguments)
+    except InputError as error:
+        raise InputError(f"{kind}: {error}") from None
+
+
+def _table(value: Any, name: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(f"{name} = {shown(value)} is expected to be a table")
+    return value
+
+
+def _known(table: Mapping[str, Any], keys: set[str], name: str) -> None:
+    for key in table:
+        if key not in keys:
+            where = f"{name}.{key}" if name else key
+            where = where if where.isprintable() else shown(where)
+            known = ", ".join(sorted(keys))
+            raise InputError(f"{where} = {shown(table[key])} is not known, expected one of {known}")
+
+
+def _required(table: Mapping[str, Any], keys: tuple[str, ...], name: str) -> None:
+    for key in keys:
+        if key not in table:
+            raise InputError(f"{name}.{key} is missing")
+
+
+def _arguments(table: dict[str, Any], kind: str) -> dict[str, Any]:
+    """Read the keys of a timing table into SI."""
+    _known(table, set(_KEYS[kind]), kind)
+    result: dict[str, Any] = {}
+    for key, value in table.items():
+        where = f"{kind}.{key}"
+        if key in _PLAIN:
+            result[key] = value
+        elif key == "at":
+            result[key] = _column(value, "s", where)
+        else:
+            result[key] = _quantity(value, (_KEYS[kind][key],), where)[0]
+    return result
+
+
+def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, str]:
+    """Read one quantity of one of the given SI units, and tell which it is."""
+    from printhammer.units import split, to_si
+
+    if isinstance(value, str):
+        try:
+            number, unit = split(value, units[0])
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+    elif isinstance(value, dict):
+        _known(value, {"value", "unit"}, where)
+        _required(value, ("value", "unit"), where)
+        number, unit = value["value"], value["unit"]
+        if not isinstance(unit, str):
+            raise InputError(f"{where}.unit = {shown(unit)} is expected to be a unit, such as {units[0]!r}")
+    else:
+        raise InputError(f"{where} = {shown(value)} has no unit, expected a string such as '1 {units[0]}'")
+    for si in units[1:]:
+        try:
+            return to_si(number, unit, si), si
+        except InputError:
+            continue
+    try:
+        return to_si(number, unit, units[0]), units[0]
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _column(value: Any, si: str, where: str) -> list[float]:
+    """Read several quantities: a list of strings with units, or values with one unit."""
+    if isinstance(value, list):
+        return [_quantity(entry, (si,), where)[0] for entry in value]
+    if not isinstance(value, dict):
+        raise InputError(f"{where} = {shown(value)} is expected to be a list, or values with a unit")
+    _known(value, {"values", "unit"}, where)
+    _required(value, ("values", "unit"), where)
+    values, unit = value["values"], value["unit"]
+    if not isinstance(values, list):
+        raise InputError(f"{where}.values = {shown(values)} is expected to be a list of numbers")
+    return [_quantity({"value": entry, "unit": unit}, (si,), where)[0] for entry in values]
+
+
+def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]:
+    """Return the waveforms of a sequence, which name the tables of a file."""
+    tables = _table(data.get("waveforms", {}), "waveforms")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"sequence.waveforms = {shown(names)} is expected to be a list of names")
+    made = {
+        name: _waveform(_table(table, f"waveforms.{name}"), folder, f"waveforms.{name}")
+        for name, table in tables.items()
+    }
+    for name in names:
+        if name not in made:
+            known = (
+                ", ".join(f"[waveforms.{known}]" for known in made)
+                or "a table [waveforms.NAME] for each name"
+            )
+            raise InputError(
+                f"sequence.waveforms: {shown(name)} is no waveform of the file, expected {known}"
+            )
+    return [made[name] for name in names]
+
+
+def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
+    shape = table.get("shape")
+    known: dict[str, type[Waveform]] = {**SHAPES, Chain.shape: Chain, Switched.shape: Switched}
+    if not isinstance(shape, str) or shape not in known:
+        raise InputError(f"{where}.shape = {shown(shape)} is expected to be one of {', '.join(known)}")
+    model = known[shape]
+    data = {key: value for key, value in table.items() if key != "shape"}
+    if model is Chain:
+        return _chain(data, folder, where)
+    if model is Switched:
+        return _switched(data, where)
+    if model is Sampled and "file" not in data:
+        return _samples(data, where)
+    notes = quantities(model)
+    _known(data, {*notes, *({"file", "interpolation"} if model is Sampled else ())}, where)
+    fields: dict[str, Any] = {}
+    for key, value in data.items():
+        if key not in notes:
+            fields[key] = value
+            continue
+        fields[key], si = _quantity(value, (notes[key].si, *notes[key].also), f"{where}.{key}")
+        if notes[key].also:
+            fields["quantity"] = QUANTITY_UNITS[si]
+    try:
+        return model.model_validate(fields, context={"folder": folder})
+    except ValidationError as error:
+        raise InputError(sentence(error, model, f"{where}.")) from None
+
+
+def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
+    """Read a chain: a list of waveforms, each with its offset."""
+    _known(data, {"parts"}, where)
+    _required(data, ("parts",), where)
+    if not isinstance(data["parts"], list) or not data["parts"]:
+        raise InputError(f"{where}.parts = {shown(data['parts'])} is expected to be a list of waveforms")
+    parts = []
+    for number, entry in enumerate(data["parts"]):
+        own = f"{where}.parts[{number}]"
+        table = dict(_table(entry, own))
+        _required(table, ("at",), own)
+        parts.append((_quantity(table.pop("at"), ("s",), f"{own}.at")[0], _waveform(table, folder, own)))
+    try:
+        return Chain(parts=parts)
+    except InputError as error:
+        raise InputError(f"{where}.{error}") from None
+
+
+def _switched(data: dict[str, Any], where: str) -> Switched:
+    """Read a switched waveform; the unit of its levels decides what is driven."""
+    _known(data, {"at", "levels", "edge", "initial"}, where)
+    _required(data, ("at", "levels", "edge"), where)
+    levels, refused = None, None
+    for si, driven in QUANTITY_UNITS.items():
+        try:
+            levels, unit, quantity = _column(data["levels"], si, f"{where}.levels"), si, driven
+            break
+        except InputError as error:
+            refused = refused or error
+    if levels is None:
+        assert refused is not None
+        raise refused
+    fields: dict[str, Any] = {
+        "at": tuple(_column(data["at"], "s", f"{where}.at")),
+        "levels": tuple(levels),
+        "edge": _quantity(data["edge"], ("s",), f"{where}.edge")[0],
+        "quantity": quantity,
+    }
+    if "initial" in data:
+        fields["initial"] = _quantity(data["initial"], (unit,), f"{where}.initial")[0]
+    try:
+        return Switched.model_validate(fields)
+    except ValidationError as error:
+        told = sentence(error, Switched, f"{where}.")
+        raise InputError(told if told.startswith(where) else f"{where}.{told}") from None
+
+
+def _samples(data: dict[str, Any], where: str) -> Waveform:
+    """Read a sampled waveform whose samples the file holds."""
+    si = {name: unit for unit, name in QUANTITY_UNITS.items()}
+    _known(data, {"interpolation", "time", *si}, where)
+    driven = [name for name in si if name in data]
+    if "time" not in data or len(driven) != 1:
+        raise InputError(f"{where} is expected to have a file, or time and either current or force")
+    interpolation = data.get("interpolation", "pchip")
+    if interpolation not in ("pchip", "linear"):
+        raise InputError(
+            f"{where}.interpolation = {shown(interpolation)} is expected to be 'pchip' or 'linear'"
+        )
+    name = driven[0]
+    times = _column(data["time"], "s", f"{where}.time")
+    values = _column(data[name], si[name], f"{where}.{name}")
+    return Sampled.from_samples(times, values, quantity=QUANTITY_UNITS[si[name]], interpolation=interpolation)

@@ -1,0 +1,142 @@
+"""What a drive accepts: numbers in SI or strings with a unit, counts, firing times."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import TYPE_CHECKING, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import numpy.typing as npt
+
+    from printhammer.support.arrays import FloatArray
+
+MOST_PULSES: Final = 10_000_000
+"""Number of firings above which a drive is refused."""
+
+SPACING_UNITS: Final = {"rate": "Hz", "period": "s"}
+"""The two ways to say how far firings lie apart, and their SI units."""
+
+
+def read_number(value: float | str, si: str, name: str) -> float:
+    """Read a number in SI or a string with a unit.
+
+    Raises
+    ------
+    InputError
+        It is not finite, or of another dimension than the unit `si`.
+    """
+    if isinstance(value, str):
+        from printhammer.units import parse
+
+        try:
+            return parse(value, si)
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from None
+    try:
+        number = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        what = "a finite number" if si == "1" else f"a finite number in {si} or a string with a unit"
+        raise InputError(f"{name} = {value!r} is expected to be {what}")
+    return number
+
+
+def _written(si: str) -> str:
+    """Return a unit as it follows a number, nothing for pure numbers."""
+    return "" if si == "1" else f" {si}"
+
+
+def read_positive(value: float | str, si: str, name: str) -> float:
+    """Read a number above 0 whose inverse is finite; errors as for `read_number`."""
+    number = read_number(value, si, name)
+    if number <= 0.0 or not math.isfinite(1.0 / number):
+        raise InputError(f"{name} = {value!r} is expected to be greater than 0{_written(si)}")
+    return number
+
+
+def read_start(value: float | str) -> float:
+    """Read the time of a first firing, s; errors as for `read_number`, or it is negative."""
+    number = read_number(value, "s", "start")
+    if number < 0.0:
+        raise InputError(f"start = {value!r} is expected to be 0 s or later")
+    return number
+
+
+def read_count(value: SupportsIndex | None, name: str) -> int:
+    """Read a whole number of firings or bursts; InputError below 1 and above `MOST_PULSES`."""
+    try:
+        count = 0 if value is None or isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        count = 0
+    if not 1 <= count <= MOST_PULSES:
+        raise InputError(f"{name} = {value!r} is expected to be a whole number from 1 to {MOST_PULSES}")
+    return count
+
+
+def even_times(
+    rate: float | str | None, period: float | str | None, count: int
+) -> tuple[FloatArray, tuple[str, float], float]:
+    """Make the firing times of an even train that starts at 0.
+
+    Returns
+    -------
+    Firing times, s; "rate" or "period" with its value, as given; time between firings, s.
+
+    Raises
+    ------
+    InputError
+        Neither rate nor period is given, or it is not above 0.
+    """
+    steps = np.arange(count, dtype=np.float64)
+    if rate is not None:
+        often = read_positive(rate, "Hz", "rate")
+        return steps / often, ("rate", often), 1.0 / often
+    if period is None:
+        raise InputError("a train of pulses is expected to have a rate or a period")
+    spacing = read_positive(period, "s", "period")
+    return steps * spacing, ("period", spacing), spacing
+
+
+def read_times(at: Iterable[float | str]) -> FloatArray:
+    """Read firing times given as an array, s, or one by one; errors as for `read_number`."""
+    if isinstance(at, np.ndarray) and at.dtype.kind in "fiu":
+        return at.astype(np.float64)
+    try:
+        entries = [] if isinstance(at, str) else list(at)
+    except TypeError:
+        entries = []
+    if not entries:
+        raise InputError(f"at = {at!r} is expected to be a list of firing times")
+    return np.array([read_number(entry, "s", "firing time") for entry in entries], dtype=np.float64)
+
+
+def checked_times(times: npt.ArrayLike) -> FloatArray:
+    """Check firing times, s, and return them read-only.
+
+    Raises
+    ------
+    InputError
+        There is none or more than `MOST_PULSES`, one is negative or not finite, or not above the one before.
+    """
+    result = np.array(times, dtype=np.float64)
+    if result.ndim != 1 or not 1 <= result.size <= MOST_PULSES:
+        raise InputError(f"{result.size} firing times are expected to be a list of 1 to {MOST_PULSES}")
+    if not np.isfinite(result).all():
+        raise InputError(f"firing time {result[~np.isfinite(result)][0]} is expected to be finite")
+    if result[0] < 0.0:
+        raise InputError(f"firing time {result[0]:.9g} s is expected to be 0 s or later")
+    bad = np.flatnonzero(np.diff(result) <= 0.0)
+    if len(bad):
+        k = int(bad[0]) + 1
+        order = f"{result[k]:.9g} s (firing {k + 1}) follows {result[k - 1]:.9g} s"
+        raise InputError(f"firing times are expected to increase strictly, but {order}")
+    result.flags.writeable = False
+    return result

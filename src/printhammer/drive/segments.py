@@ -1,0 +1,190 @@
+"""Segment tables: how every waveform is written down for the kernel.
+
+A table is a float64 array of shape (segments + 1, 6) with rows ``[start, kind, p0, p1, p2, p3]``. With tau
+the time since the firing and s = tau - start, a segment's value is
+
+====  ==================================  =================
+kind  value                               used by
+====  ==================================  =================
+0     p0 + s (p1 + s (p2 + s p3))         plateaus, ramps, sampled records
+1     p0 + p1 exp(-p2 s)                  rise and decay of a coil current
+2     p0 + p1 sin(p2 s + p3)              half sine, sinusoidal force
+====  ==================================  =================
+
+The first row starts at 0, starts ascend strictly, and the last row ``[end, 0, 0, 0, 0, 0]`` marks the end
+of the support (possibly infinite); the value is zero before 0 and from the end on. Values are
+right-continuous at every start.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from printhammer.support.arrays import FloatArray
+
+POLYNOMIAL: Final = 0
+EXPONENTIAL: Final = 1
+SINE: Final = 2
+END: Final = 3
+"""Kind that the last row has where the kernel gets several tables in one array."""
+COLUMNS: Final = 6
+
+_CHUNK: Final = 1024
+_REFINED: Final = 16
+_ROUNDS: Final = 9
+
+
+def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:
+    """Build a segment table, leaving out segments that rounding has made empty.
+
+    Parameters
+    ----------
+    rows
+        ``(start, kind, p0, p1, p2, p3)`` in ascending order of start; a first start above 0 gets a zero
+        segment before it.
+    end
+        End of the support, s; ``inf`` for a drive that never ends.
+
+    Returns
+    -------
+    Array of shape (segments + 1, 6), read-only.
+    """
+    given = [[float(entry) for entry in row] for row in rows]
+    if given and given[0][0] > 0.0:
+        given.insert(0, [0.0] * COLUMNS)
+    given.append([float(end), 0.0, 0.0, 0.0, 0.0, 0.0])
+    kept = [row for row, after in itertools.pairwise(given) if row[0] < after[0]]
+    result = np.array([*kept, given[-1]], dtype=np.float64)
+    result.flags.writeable = False
+    return result
+
+
+def stacked(tables: Sequence[FloatArray]) -> tuple[list[int], FloatArray]:
+    """Put segment tables one after the other for the kernel, the longest support last, each end marked.
+
+    Returns
+    -------
+    The row at which each table begins; all rows, shape (all rows, 6), read-only.
+    """
+    order = sorted(range(len(tables)), key=lambda number: float(tables[number][-1, 0]))
+    begins, row = [0] * len(tables), 0
+    for number in order:
+        begins[number] = row
+        row += len(tables[number])
+    pieces = np.concatenate([tables[number] for number in order])
+    pieces[[begins[number] + len(tables[number]) - 1 for number in order], 1] = END
+    pieces.flags.writeable = False
+    return begins, pieces
+
+
+def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0) -> FloatArray:
+    """Evaluate a segment table at times t for pulses fired at the times ``fired``.
+
+    The two are broadcast together, both in s. Right-continuous; an edge lies at the rounded sum of fired and
+    start, where the kernel has it. NaN gives NaN.
+    """
+    time, fire = np.broadcast_arrays(np.asarray(t, dtype=np.float64), np.asarray(fired, dtype=np.float64))
+    starts = segments[:, 0]
+    last = len(starts) - 1
+    tau = time - fire
+    index = np.searchsorted(starts, tau, side="right") - 1
+    # (fired + start) - fired may round below start, so the edges themselves decide.
+    late = (index < last) & (fire + starts[np.minimum(index + 1, last)] <= time)
+    index = np.where(late, index + 1, index)
+    early = (index >= 0) & (fire + starts[np.maximum(index, 0)] > time)
+    index = np.where(early, index - 1, index)
+    active = (index >= 0) & (index < last) & np.isfinite(tau)
+    _, kind, p0, p1, p2, p3 = np.moveaxis(segments[np.where(active, index, last)], -1, 0)
+    s = np.where(active, np.maximum(tau - starts[np.where(active, index, 0)], 0.0), 0.0)
+    polynomial = p0 + s * (p1 + s * (p2 + s * p3))
+    exponential = p0 + p1 * np.exp(np.where(kind == EXPONENTIAL, -p2 * s, 0.0))
+    sine = p0 + p1 * np.sin(p2 * s + p3)
+    value = np.where(kind == EXPONENTIAL, exponential, np.where(kind == SINE, sine, polynomial))
+    value = np.where(active, value, 0.0)
+    return np.where(np.isnan(tau), np.nan, value)
+
+
+def _inner_extremes(row: FloatArray, length: float) -> list[float]:
+    """Return the places s in (0, length) where the slope of one segment vanishes."""
+    _, kind, _, p1, p2, p3 = (float(entry) for entry in row)
+    if kind == SINE:
+        if not math.isfinite(length):
+            length = 4.0 * math.pi / abs(p2)
+        first, last = sorted((p3, p3 + p2 * length))
+        steps = range(math.ceil(first / math.pi - 0.5), math.floor(last / math.pi - 0.5) + 1)
+        # Three turning points hold both the largest and the smallest value.
+        return [((k + 0.5) * math.pi - p3) / p2 for k in list(steps)[:3]] if p2 != 0.0 else []
+    if kind == EXPONENTIAL:
+        return []
+    a, b, c = 3.0 * p3, 2.0 * p2, p1
+    if a == 0.0:
+        return [-c / b] if b != 0.0 else []
+    root = b * b - 4.0 * a * c
+    if root < 0.0:
+        return []
+    q = -0.5 * (b + math.copysign(math.sqrt(root), b))
+    return [q / a] + ([c / q] if q != 0.0 else [])
+
+
+def largest(segments: FloatArray) -> float:
+    """Return the largest absolute value that a segment table takes or approaches."""
+    best = 0.0
+    for row, after in itertools.pairwise(segments):
+        start, kind, p0, p1, p2, p3 = (float(entry) for entry in row)
+        length = float(after[0]) - start
+        places = [0.0, *(s for s in _inner_extremes(row, length) if 0.0 < s < length)]
+        if math.isfinite(length):
+            places.append(length)
+        elif kind == EXPONENTIAL:
+            best = max(best, abs(p0))
+        for s in places:
+            if kind == EXPONENTIAL:
+                value = p0 + p1 * math.exp(-p2 * s)
+            elif kind == SINE:
+                value = p0 + p1 * math.sin(p2 * s + p3)
+            else:
+                value = p0 + s * (p1 + s * (p2 + s * p3))
+            best = max(best, abs(value))
+    return best
+
+
+def largest_sum(edges: FloatArray, value: Callable[[FloatArray], FloatArray]) -> float:
+    """Find the largest absolute value of a sum of pulses.
+
+    Every interval between neighbouring edges, inside which the sum is smooth, is sampled (densely near its
+    start, where exponentials change), and the intervals with the largest samples are refined until the
+    place of their largest value is known to 1e-9 of the interval.
+
+    Parameters
+    ----------
+    edges
+        Times at which a segment of one of them begins or ends, s, ascending, at least two.
+    value
+        The sum at given times.
+    """
+    fractions = np.union1d(np.linspace(0.0, 1.0, 33), np.geomspace(1e-6, 1.0, 31))
+    starts, ends = edges[:-1], np.nextafter(edges[1:], -np.inf)
+    sampled = np.empty(len(starts))
+    for k in range(0, len(starts), _CHUNK):
+        part = slice(k, k + _CHUNK)
+        grid = starts[part, np.newaxis] + (ends - starts)[part, np.newaxis] * fractions
+        sampled[part] = np.abs(value(np.minimum(grid, ends[part, np.newaxis]))).max(axis=1)
+    best = float(sampled.max())
+    highest = np.argsort(sampled)[-_REFINED:]
+    every, first, last = np.arange(len(highest)), starts[highest], ends[highest, np.newaxis]
+    grid = np.minimum(first[:, np.newaxis] + (ends[highest] - first)[:, np.newaxis] * fractions, last)
+    for _ in range(_ROUNDS):
+        heights = np.abs(value(grid))
+        best = max(best, float(heights.max()))
+        top = heights.argmax(axis=1)
+        low, high = grid[every, np.maximum(top - 1, 0)], grid[every, np.minimum(top + 1, grid.shape[1] - 1)]
+        grid = np.minimum(np.linspace(low, high, 33, axis=1), last)
+    return best

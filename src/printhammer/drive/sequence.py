@@ -1,0 +1,225 @@
+"""A drive whose firings each have a waveform of their own: harder, softer, longer, with a brake pulse."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from copy import copy
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from printhammer.drive.base import Drive, Overlap
+from printhammer.drive.input import read_number, read_start, read_times
+from printhammer.drive.segments import evaluate, largest, largest_sum, stacked
+from printhammer.drive.text import FORMAT, column_text, document, waveform_text
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from printhammer.drive.base import IntArray
+    from printhammer.support.arrays import FloatArray
+
+__all__ = ["PulseSequence"]
+
+
+class PulseSequence(Drive):
+    """Pulses at given times, each with its own waveform.
+
+    A sequence of equal waveforms is equal to the `PulseTrain` with the same times. Where the exponentials of
+    all waveforms have at most two different rates, as with rectangles of common rise and decay, an ensemble
+    runs as fast as with one waveform; widths and amplitudes may differ.
+
+    Parameters
+    ----------
+    waveforms
+        What each firing does, all of them currents or all of them forces.
+    at
+        Firing times, s, ascending, one for each waveform.
+    overlap
+        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
+    start
+        Shift of the firing times, s.
+
+    Raises
+    ------
+    InputError
+        No waveforms, something else among them, one that never ends, currents and forces together; not as
+        many times as waveforms; times negative, not finite, duplicate or descending.
+    """
+
+    _largest: float
+
+    def __init__(
+        self,
+        waveforms: Iterable[Waveform],
+        at: Iterable[float | str],
+        overlap: Overlap = "add",
+        start: float | str = 0.0,
+    ) -> None:
+        given = _checked(waveforms)
+        times = read_times(at) + read_start(start)
+        if times.size != len(given):
+            raise InputError(
+                f"{times.size} firing times are expected to be as many as the waveforms, {len(given)}"
+            )
+        super().__init__(given[0], times, overlap, None)
+        self._place(given)
+
+    @property
+    def waveform(self) -> Waveform:
+        """What the first firing does."""
+        return self._waveform
+
+    @property
+    def waveforms(self) -> tuple[Waveform, ...]:
+        """What each firing does."""
+        return self._waveforms
+
+    @property
+    def uniform(self) -> bool:
+        """Whether every firing does the same."""
+        return len(self._tables) == 1
+
+    @property
+    def fingerprint(self) -> str:
+        """Hexadecimal digest of what the drive does; equal for equal drives."""
+        plain = super().fingerprint
+        if len(self._tables) == 1:
+            return plain
+        digest = hashlib.sha256(plain.encode())
+        for table in self._tables:
+            digest.update(f"{table.shape}".encode())
+            digest.update((table + 0.0).tobytes())
+        digest.update(self._which.tobytes())
+        return digest.hexdigest()
+
+    @property
+    def largest_pulse(self) -> float:
+        """Largest absolute value of any one pulse, A or N."""
+        if math.isnan(self._largest):
+            self._largest = max(largest(table) for table in self._tables)
+        return self._largest
+
+    @property
+    def peak(self) -> float:
+        """Largest absolute value of the total current, A, or force, N; exact where pulses do not overlap."""
+        if self.overlapping == 1:
+            return self.largest_pulse
+        edges = [np.add.outer(self._times[self._which == k], t[:, 0]) for k, t in enumerate(self._tables)]
+        return largest_sum(np.unique(np.concatenate([some.ravel() for some in edges])), self.value)
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same drive with every value multiplied by a factor.
+
+        Raises
+        ------
+        InputError
+            The factor is not a finite number.
+        """
+        number = read_number(factor, "1", "factor")
+        scaled = {id(waveform): waveform.scaled(number) for waveform in self._waveforms}
+        result = copy(self)
+        result._place([scaled[id(waveform)] for waveform in self._waveforms])
+        return result
+
+    def with_times(self, times: Iterable[float | str]) -> PulseSequence:
+        """Return a drive that fires the same waveforms in the same order at as many other times, s.
+
+        Raises
+        ------
+        InputError
+            Not as many times as waveforms; times negative, not finite, duplicate or descending.
+        """
+        return PulseSequence(self._waveforms, times, self._overlap)
+
+    def to_toml(self) -> str:
+        """Return the text of a drive file; reading it back gives an equal drive."""
+        names = [f"pulse-{number + 1}" for number in range(len(self._tables))]
+        first = np.unique(self._which, return_index=True)[1]
+        shapes = {names[k]: waveform_text(self._waveforms[i]) for k, i in enumerate(first.tolist())}
+        table = {"at": column_text(self._times, "s"), "waveforms": [names[k] for k in self._which]}
+        tables = {"sequence": table, **{f"waveforms.{name}": shape for name, shape in shapes.items()}}
+        return document({"format": FORMAT, "overlap": self._overlap}, tables)
+
+    def _place(self, waveforms: Sequence[Waveform]) -> None:
+        """Take over the waveforms of the firings: which segment tables there are, and whose is which."""
+        numbers: dict[bytes, int] = {}
+        tables: list[FloatArray] = []
+        known: dict[int, int] = {}
+        for waveform in waveforms:
+            if id(waveform) in known:
+                continue
+            segments = waveform.segments()
+            # Adding 0.0 makes -0.0 and 0.0 the same.
+            content = (segments + 0.0).tobytes()
+            if content not in numbers:
+                numbers[content] = len(tables)
+                tables.append(segments)
+            known[id(waveform)] = numbers[content]
+        self._waveforms = tuple(waveforms)
+        self._waveform = self._waveforms[0]
+        self._segments = tables[0]
+        self._tables = tables
+        # Looked for when first asked for.
+        self._largest = math.nan
+        self._which = np.array([known[id(waveform)] for waveform in waveforms], dtype=np.int64)
+        rows, self._pieces = stacked(tables)
+        self._rows = np.array(rows, dtype=np.int64)[self._which]
+        self._rows.flags.writeable = False
+
+    def _begins(self) -> IntArray:
+        return self._rows
+
+    def _ends(self) -> FloatArray:
+        ends: FloatArray = self._times + np.array([table[-1, 0] for table in self._tables])[self._which]
+        return ends
+
+    def _reach(self) -> int:
+        if self._overlap == "replace":
+            return 1
+        after = np.searchsorted(self._times, self._ends(), side="left")
+        return int((after - np.arange(len(self._times))).max())
+
+    def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:
+        moments, numbers = np.ravel(time), np.ravel(pulse)
+        result = np.zeros(moments.shape)
+        # Pulses of the same waveform side by side: each table is evaluated once.
+        order = np.argsort(self._which[numbers], kind="stable")
+        bounds = np.searchsorted(self._which[numbers[order]], np.arange(len(self._tables) + 1))
+        for k in np.flatnonzero(np.diff(bounds)):
+            own = order[bounds[k] : bounds[k + 1]]
+            result[own] = evaluate(self._tables[k], moments[own], self._times[numbers[own]])
+        return result.reshape(np.shape(time))
+
+    def __repr__(self) -> str:
+        count, first, last = len(self._times), self._times[0], self._times[-1]
+        kinds = f"{len(self._tables)} waveform{'s' if len(self._tables) > 1 else ''}"
+        fired = (
+            f"{count} firings from {first:.6g} s to {last:.6g} s"
+            if count > 1
+            else f"1 firing at {first:.6g} s"
+        )
+        return f"<PulseSequence: {kinds} of {self.quantity}, {fired}, overlap {self._overlap}>"
+
+
+def _checked(waveforms: Any) -> list[Waveform]:
+    """Return the waveforms of a sequence, all of one quantity and with an end."""
+    try:
+        given = [] if isinstance(waveforms, Waveform) else list(waveforms)
+    except TypeError:
+        given = []
+    if not given:
+        raise InputError(f"waveforms = {waveforms!r} is expected to be a list of waveforms, one a firing")
+    for number, waveform in enumerate(given):
+        if not isinstance(waveform, Waveform):
+            raise InputError(f"waveforms[{number}] = {waveform!r} is expected to be a waveform")
+        if not math.isfinite(waveform.support):
+            raise InputError(f"waveforms[{number}] is a {waveform.shape}, expected a waveform that ends")
+        if waveform.quantity != given[0].quantity:
+            raise InputError(
+                f"waveforms[{number}] is a {waveform.quantity}, expected a {given[0].quantity} like the first"
+            )
+    return given

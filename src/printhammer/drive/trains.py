@@ -1,0 +1,234 @@
+"""The drive: a waveform fired as a train of pulses, in bursts, at given times; or a sinusoidal force.
+
+A drive is a current through the coil or, for hammers of the textbook kind, a force on the armature. Pulses
+may overlap: with ``overlap="add"`` what they do adds up, with ``overlap="replace"`` only the latest pulse
+counts from its firing on. Every number is SI; a string with a unit ("1.2 kHz") is taken as well.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Self, SupportsIndex
+
+import numpy as np
+
+from printhammer.drive.base import Drive, Overlap
+from printhammer.drive.input import (
+    MOST_PULSES,
+    SPACING_UNITS,
+    even_times,
+    read_count,
+    read_number,
+    read_positive,
+    read_start,
+    read_times,
+)
+from printhammer.drive.text import quantity_text, waveform_text
+from printhammer.drive.waveforms.shapes import Sine, Waveform
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import numpy.typing as npt
+
+__all__ = ["Burst", "Drive", "Overlap", "PulseTrain", "SineForce"]
+
+
+class _Pulsed(Drive):
+    """A drive of pulses that end."""
+
+    def __init__(
+        self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap, period: float | None
+    ) -> None:
+        super().__init__(waveform, times, overlap, period)
+        self._refuse_endless(waveform)
+
+    @staticmethod
+    def _refuse_endless(waveform: Waveform) -> None:
+        if not math.isfinite(waveform.support):
+            raise InputError(f"a {waveform.shape} waveform is expected to end in a train of pulses")
+
+    def with_waveform(self, waveform: Waveform) -> Self:
+        """Return a drive that fires another waveform at the same times.
+
+        Raises
+        ------
+        InputError
+            It is not a waveform, or never ends.
+        """
+        if not isinstance(waveform, Waveform):
+            raise InputError(f"waveform = {waveform!r} is expected to be a waveform")
+        self._refuse_endless(waveform)
+        return self._with_waveform(waveform)
+
+    def with_times(self, times: Iterable[float | str]) -> PulseTrain:
+        """Return a drive that fires the same waveform, under the same overlap rule, at the given times, s.
+
+        Raises
+        ------
+        InputError
+            Times negative, not finite, duplicate or descending.
+        """
+        return PulseTrain(self._waveform, at=times, overlap=self._overlap)
+
+
+class PulseTrain(_Pulsed):
+    """Pulses at a constant rate, at given times, or a single one.
+
+    Parameters
+    ----------
+    waveform
+        What every firing does.
+    rate, period
+        Firings per second, Hz, or the time between them, s; one of the two, with `pulses`.
+    at
+        Instead: firing times, s, ascending.
+    pulses
+        Number of firings; without rate, period and times it is 1.
+    overlap
+        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
+    start
+        First firing, or shift of the given times, s.
+
+    Raises
+    ------
+    InputError
+        A rate or period not positive, fewer than 1 pulses, times negative, not finite, duplicate or
+        descending, contradictory arguments, a quantity of the wrong dimension.
+    """
+
+    def __init__(
+        self,
+        waveform: Waveform,
+        *,
+        rate: float | str | None = None,
+        period: float | str | None = None,
+        at: Iterable[float | str] | None = None,
+        pulses: SupportsIndex | None = None,
+        overlap: Overlap = "add",
+        start: float | str = 0.0,
+    ) -> None:
+        given = [
+            name for name, value in (("rate", rate), ("period", period), ("at", at)) if value is not None
+        ]
+        if len(given) > 1:
+            raise InputError(f"{given[0]} and {given[1]} are given, expected one of rate, period and at")
+        first = read_start(start)
+        self._spacing: tuple[str, float] | None = None
+        if at is not None:
+            if pulses is not None:
+                raise InputError(
+                    f"pulses = {pulses!r} is expected to be left out where the firing times are given"
+                )
+            super().__init__(waveform, read_times(at) + first, overlap, None)
+            return
+        count = read_count(1 if pulses is None and not given else pulses, "pulses")
+        if not given and count > 1:
+            raise InputError(f"pulses = {count} is expected to come with a rate, a period or firing times")
+        steps, self._spacing, spacing = (
+            even_times(rate, period, count) if given else (np.zeros(1), None, None)
+        )
+        super().__init__(waveform, first + steps, overlap, spacing)
+
+    def _table(self) -> tuple[str, dict[str, Any]]:
+        if self._spacing is None:
+            return super()._table()
+        spacing = {self._spacing[0]: quantity_text(self._spacing[1], SPACING_UNITS[self._spacing[0]])}
+        start = quantity_text(self._times[0], "s")
+        return "train", {**spacing, "pulses": len(self._times), "start": start}
+
+
+class Burst(_Pulsed):
+    """Bursts of pulses at a constant rate, with a pause between the bursts.
+
+    Parameters
+    ----------
+    waveform
+        What every firing does.
+    rate, period
+        Firings per second within a burst, Hz, or the time between them, s; one of the two.
+    pulses
+        Firings of one burst.
+    bursts
+        Number of bursts.
+    gap
+        Time from the last firing of a burst to the first of the next, s.
+    overlap, start
+        As for `PulseTrain`.
+
+    Raises
+    ------
+    InputError
+        As for `PulseTrain`; or the gap is not positive.
+    """
+
+    def __init__(
+        self,
+        waveform: Waveform,
+        rate: float | str | None = None,
+        pulses: SupportsIndex | None = None,
+        bursts: SupportsIndex = 1,
+        gap: float | str | None = None,
+        *,
+        period: float | str | None = None,
+        overlap: Overlap = "add",
+        start: float | str = 0.0,
+    ) -> None:
+        if (rate is None) == (period is None):
+            raise InputError("a burst is expected to have either a rate or a period")
+        count, repeats = read_count(pulses, "pulses"), read_count(bursts, "bursts")
+        if count * repeats > MOST_PULSES:
+            raise InputError(
+                f"{repeats} bursts of {count} pulses are expected to be at most {MOST_PULSES} firings"
+            )
+        steps, self._spacing, spacing = even_times(rate, period, count)
+        if gap is None and repeats > 1:
+            raise InputError(f"bursts = {repeats} is expected to come with a gap between them")
+        self._gap = None if gap is None else read_positive(gap, "s", "gap")
+        self._counts = (count, repeats)
+        begin = read_start(start) + np.arange(repeats) * (steps[-1] + (self._gap or 0.0))
+        times = (begin[:, np.newaxis] + steps).ravel()
+        super().__init__(waveform, times, overlap, spacing if repeats == 1 else None)
+
+    def _table(self) -> tuple[str, dict[str, Any]]:
+        name, value = self._spacing
+        table: dict[str, Any] = {name: quantity_text(value, SPACING_UNITS[name])}
+        table["pulses"], table["bursts"] = self._counts
+        if self._gap is not None:
+            table["gap"] = quantity_text(self._gap, "s")
+        return "burst", {**table, "start": quantity_text(self._times[0], "s")}
+
+
+class SineForce(Drive):
+    """A sinusoidal force on the armature from t = 0 on, amplitude sin(2 pi frequency t + phase).
+
+    Parameters
+    ----------
+    amplitude
+        N.
+    frequency
+        Hz.
+    phase
+        At t = 0, rad.
+
+    Raises
+    ------
+    InputError
+        A number not finite, a frequency not positive, a quantity of the wrong dimension.
+    """
+
+    def __init__(self, amplitude: float | str, frequency: float | str, phase: float | str = 0.0) -> None:
+        often = read_positive(frequency, "Hz", "frequency")
+        sine = Sine(
+            amplitude=read_number(amplitude, "N", "amplitude"),
+            frequency=often,
+            phase=read_number(phase, "rad", "phase"),
+            quantity="force",
+        )
+        super().__init__(sine, [0.0], "add", 1.0 / often)
+
+    def _table(self) -> tuple[str, dict[str, Any]]:
+        table = waveform_text(self._waveform)
+        del table["shape"]
+        return "sine", table

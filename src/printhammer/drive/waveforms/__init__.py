@@ -1,0 +1,1 @@
+"""Waveforms: what one firing does, current or force against time."""

@@ -1,0 +1,108 @@
+"""What every current or force waveform has in common; the shapes are in `waveforms`."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+from printhammer.drive.segments import evaluate, largest
+from printhammer.errors import InputError
+from printhammer.support.constants import quantities, sentence
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.support.arrays import FloatArray
+
+QuantityName = Literal["current", "force"]
+QUANTITY_UNITS: Final[dict[str, QuantityName]] = {"A": "current", "N": "force"}
+"""What a waveform drives, by the SI unit of its amplitude."""
+
+DECAY_TIMES: Final = 27.6310211159
+"""Number of decay time constants after which a decaying current is zero by definition: 1e-12 is left then."""
+
+
+class Waveform(BaseModel):
+    """What one fired pulse does, as a function of tau, the time since its firing.
+
+    Numbers are SI; a string with a unit ("350 us") is taken as well. An amplitude in N makes it a force
+    waveform.
+
+    Raises
+    ------
+    InputError
+        A constant is missing, unknown, not finite, of the wrong dimension or out of bounds.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    shape: ClassVar[str]
+    quantity: QuantityName = "current"
+
+    if not TYPE_CHECKING:
+
+        def __init__(self, /, **data: Any) -> None:
+            try:
+                super().__init__(**data)
+            except ValidationError as error:
+                raise InputError(sentence(error, type(self), f"{self.shape} waveform: ")) from None
+
+        # Lets model_validate keep its context (the folder of the file), which a custom __init__ would lose.
+        __init__.__pydantic_base_init__ = True
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_units(cls, data: Any) -> Any:
+        """Turn strings with units into SI numbers; the amplitude's unit decides what is driven."""
+        if not isinstance(data, dict) or not any(isinstance(data.get(name), str) for name in quantities(cls)):
+            return data
+        from printhammer.units import parse
+
+        result = dict(data)
+        for name, note in quantities(cls).items():
+            text = data.get(name)
+            if not isinstance(text, str):
+                continue
+            for unit in note.also:
+                try:
+                    result[name] = parse(text, unit)
+                except InputError:
+                    continue
+                result.setdefault("quantity", QUANTITY_UNITS[unit])
+                break
+            else:
+                result[name] = parse(text, note.si)
+        return result
+
+    @abstractmethod
+    def segments(self) -> FloatArray:
+        """Return the segment table (see `printhammer.drive.segments`), shape (segments + 1, 6), SI."""
+
+    @abstractmethod
+    def scaled(self, factor: float) -> Self:
+        """Return the same waveform with every value multiplied by a factor."""
+
+    def value(self, tau: npt.ArrayLike) -> FloatArray:
+        """Value, A or N, at times tau since the firing, s; right-continuous, zero outside the support."""
+        return evaluate(self.segments(), tau)
+
+    @property
+    def peak(self) -> float:
+        """Largest absolute value, A or N."""
+        return largest(self.segments())
+
+    @property
+    def support(self) -> float:
+        """Time from the firing to the end of the waveform, s; possibly infinite."""
+        return float(self.segments()[-1, 0])
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the values, "A" or "N"."""
+        return "A" if self.quantity == "current" else "N"
+
+    def content(self) -> dict[str, FloatArray]:
+        """Return the arrays that identify the waveform beside its fields: none for a formula."""
+        return {}

@@ -1,0 +1,118 @@
+"""A waveform made of several that follow one another, such as a print pulse and a later brake pulse."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from printhammer.drive.segments import evaluate, largest, table
+from printhammer.drive.waveforms.base import Waveform
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from printhammer.support.arrays import FloatArray
+
+TAIL: Final = 1e-3
+"""What may be cut off of a decaying part where the next one begins, in parts of its peak."""
+
+_SAMPLES: Final = 257
+_ROUNDING: Final = 1e-14
+
+
+class Chain(Waveform):
+    """Several waveforms in one firing, each begun at an offset from it; between them the drive is zero.
+
+    `parts` holds pairs of the offset, s or a string with a unit, and the waveform. They ascend, and all are
+    currents or all are forces. None begins before the one before it has ended, or decayed to `TAIL` of its
+    peak: what is left of that is cut off then. The part of a chain fired at an offset has its edges at the
+    rounded sums of offset and edge.
+    """
+
+    shape: ClassVar[str] = "chain"
+    parts: tuple[tuple[float, Waveform], ...]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_parts(cls, data: Any) -> Any:
+        """Check the parts one by one; what they drive, the chain drives."""
+        if not isinstance(data, dict) or "parts" not in data:
+            return data
+        parts = _checked(data["parts"])
+        driven = parts[0][1].quantity
+        if data.get("quantity", driven) != driven:
+            raise InputError(
+                f"quantity = {data['quantity']!r} is expected to be that of the parts, {driven!r}"
+            )
+        return {**data, "parts": parts, "quantity": driven}
+
+    def segments(self) -> FloatArray:
+        """Return the segment table: those of the parts one after the other, zero in between."""
+        rows: list[tuple[float, ...]] = []
+        for offset, part in self.parts:
+            own = [tuple(float(number) for number in row) for row in part.segments()]
+            while rows and offset <= rows[-1][0]:
+                # The end of the part before gives way to what begins there.
+                rows.pop()
+            rows += [(offset + start, *rest) for start, *rest in own]
+        return table(rows[:-1], rows[-1][0])
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same chain with every value multiplied by a factor."""
+        return type(self)(parts=tuple((offset, part.scaled(factor)) for offset, part in self.parts))
+
+
+def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
+    """Return offsets, s, and waveforms of a chain, none beginning before the one before it is over."""
+    try:
+        pairs = [tuple(pair) for pair in parts]  # type: ignore[attr-defined]
+    except TypeError:
+        pairs = []
+    if not pairs or any(len(pair) != 2 for pair in pairs):
+        raise InputError(f"parts = {parts!r} is expected to be pairs of an offset and a waveform")
+    found: list[tuple[float, Waveform]] = []
+    for number, (given, waveform) in enumerate(pairs):
+        if not isinstance(waveform, Waveform):
+            raise InputError(f"parts[{number}]: {waveform!r} is expected to be a waveform")
+        if waveform.quantity != pairs[0][1].quantity:
+            raise InputError(
+                f"parts[{number}] is a {waveform.quantity}, expected a {pairs[0][1].quantity} like the first"
+            )
+        if not math.isfinite(waveform.support):
+            raise InputError(f"parts[{number}] is a {waveform.shape}, expected a waveform that ends")
+        offset = _offset(given, number)
+        if not (_over(*found[-1], offset) if found else offset >= 0.0):
+            sooner = f"parts[{number - 1}] is over" if found else "the firing"
+            raise InputError(f"parts[{number}] begins at {offset:.9g} s, expected a time not before {sooner}")
+        found.append((offset, waveform))
+    return tuple(found)
+
+
+def _over(begun: float, waveform: Waveform, time: float) -> bool:
+    """Tell whether a waveform that has begun has ended or decayed to its tail at a time, both in s."""
+    segments = waveform.segments()
+    end = float(segments[-1, 0])
+    # Two parts may meet, by rounding a little early.
+    if time >= begun + end or math.isclose(time, begun + end, rel_tol=_ROUNDING):
+        return True
+    if time <= begun:
+        return False
+    edges, tau = segments[:, 0], time - begun
+    times = np.concatenate([np.linspace(tau, end, _SAMPLES), edges[edges > tau]])
+    return bool(np.abs(evaluate(segments, times)).max() <= TAIL * largest(segments))
+
+
+def _offset(given: object, number: int) -> float:
+    """Read the offset of a part: a number in s, or a string with a unit."""
+    if isinstance(given, str):
+        from printhammer.units import parse
+
+        try:
+            return parse(given, "s")
+        except InputError as error:
+            raise InputError(f"parts[{number}]: {error}") from None
+    if isinstance(given, bool) or not isinstance(given, float | int) or not math.isfinite(given):
+        raise InputError(f"parts[{number}]: offset {given!r} is expected to be a finite number in s")
+    return float(given)

@@ -1,0 +1,1 @@
+"""Pictures of strobes, exponents, orbits, branches and basins."""

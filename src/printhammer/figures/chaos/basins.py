@@ -1,0 +1,120 @@
+"""Basins in the plane of the initial states, each in a colour, with the attractors drawn in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.figures.chaos.strobe import shown_period
+from printhammer.figures.elements.map_marks import edges
+from printhammer.figures.elements.marks import place_lines
+from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.style import INK, SMALL, new_figure, sign, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos.basins import Basins
+
+SHADES: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00", "#999933")
+"""Colours of the basins, of M. Okabe and K. Ito (2008); further ones begin anew, lighter."""
+
+OTHERS: Final = {0: ("undecided", "#ffffff"), -1: ("run ended early", "#1a1a1a"), -2: ("no state", "#d9d9d9")}
+"""Names and colours of the cells that lead to no known attractor, by label."""
+
+_MARKS: Final = "os^Dvph*"
+_LIGHTER: Final = 0.5
+_MOST: Final = 12
+_FEW: Final = 4
+
+
+def shade(number: int) -> str:
+    """Return the colour of the basin of an attractor, numbered from 1 on."""
+    turn, place = divmod(number - 1, len(SHADES))
+    parts = [int(SHADES[place][k : k + 2], 16) for k in (1, 3, 5)]
+    for _ in range(min(turn, 2)):
+        parts = [round(255 - _LIGHTER * (255 - part)) for part in parts]
+    return "#" + "".join(f"{part:02x}" for part in parts)
+
+
+@styled
+def plot(basins: Basins, *, attractors: bool = True) -> Figure:
+    """Draw basins.
+
+    Parameters
+    ----------
+    basins : Basins
+        From `printhammer.basins`.
+    attractors : bool, optional
+        Whether the attractors are drawn in, where they lie in the plane.
+
+    Returns
+    -------
+    Figure
+        The figure. Marks are the points of the attractors at the firings.
+    """
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    figure = new_figure(5.0)
+    ax = figure.add_subplot()
+    way = scale("displacement", float(np.abs(basins.x).max()))
+    speed = scale("velocity")
+    count = len(basins.attractors)
+    numbers = [-2, -1, 0, *range(1, count + 1)]
+    colours = [OTHERS[k][1] if k in OTHERS else shade(k) for k in numbers]
+    mesh = ax.pcolormesh(
+        edges(way.shown(basins.x)),
+        edges(speed.shown(basins.v)),
+        basins.labels,
+        cmap=ListedColormap(colours),
+        norm=BoundaryNorm(np.arange(-2.5, count + 1.0), len(colours)),
+        rasterized=True,
+        zorder=0.0,
+    )
+    mesh.set_gid("basins")
+    place_lines(ax, basins.regime.hammer, way, "x")
+    share, error = basins.shares
+    handles: list[Any] = []
+    for number, attractor in enumerate(basins.attractors, 1):
+        strange = attractor.period is None
+        mark = "." if strange else _MARKS[(number - 1) % len(_MARKS)]
+        style: dict[str, Any] = {
+            "ls": "none",
+            "marker": mark,
+            "ms": 1.2 if strange else 5.0,
+            "mew": 0.0 if strange else 0.8,
+            "mec": INK,
+            "mfc": INK if strange else shade(number),
+        }
+        if attractors:
+            x, v = way.shown(attractor.states[:, 0]), speed.shown(attractor.states[:, 1])
+            ax.plot(x, v, **style, zorder=4.0, gid=f"attractor {number}", scalex=False, scaley=False)
+        if number <= _MOST:
+            told = (
+                f"{number}: {attractor.name.replace('-', ' ')},"
+                f" {100.0 * share[number - 1]:.1f} ± {100.0 * error[number - 1]:.1f} %"
+            )
+            handles.append((Patch(color=shade(number)), Line2D([], [], **{**style, "ms": 4.0}), told))
+    for number, (name, colour) in OTHERS.items():
+        cells = basins.counts[number]
+        if cells:
+            patch = Patch(facecolor=colour, edgecolor=INK, lw=0.5)
+            handles.append((patch, patch, f"{name}: {cells} cells"))
+    figure.legend(
+        [pair[:2] for pair in handles],
+        [pair[2] for pair in handles],
+        loc="outside lower left",
+        fontsize=SMALL,
+        frameon=False,
+        ncols=1 + (len(handles) > _FEW),
+        handlelength=1.2,
+    )
+    ax.set_title(f"Every {shown_period(basins.regime.period)}", loc="left", fontsize=SMALL)
+    label(ax, "x", way, "Displacement at the first firing")
+    label(ax, "y", speed, "Velocity at the first firing")
+    more = count - _MOST
+    sign(figure, basins.regime.hammer, f"{more} more attractors are not named." if more > 0 else "")
+    return figure

@@ -1,0 +1,289 @@
+"""A bifurcation diagram: the states at the firings against a parameter, and the verdicts below."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+
+from printhammer.chaos.bifurcation_tables import meaning_of
+from printhammer.chaos.bifurcation_windows import cells, hysteresis, windows_of
+from printhammer.chaos.regime import PERIOD
+from printhammer.errors import InputError
+from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.scales import Scale, label, scale
+from printhammer.figures.elements.style import (
+    BLUE,
+    GREEN,
+    HAIR,
+    INK,
+    MUTED,
+    ORANGE,
+    SMALL,
+    THIN,
+    YELLOW,
+    new_figure,
+    sign,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos.bifurcation import Bifurcation
+    from printhammer.support.arrays import FloatArray
+
+SHADES: Final = {
+    "period-1": BLUE,
+    "period-2": YELLOW,
+    "period-3": GREEN,
+    "period-4": "#56b4e9",
+    "other period": "#cc79a7",
+    "strange": "#4d4d4d",
+    "no period": "#c4c4c4",
+    "run ended early": ORANGE,
+}
+"""Colour of the band of a verdict; "no period" is what is not known to be strange."""
+
+WAYS: Final = {"from rest": INK, "up": BLUE, "down": ORANGE}
+"""Colours of points that one direction alone leads to."""
+
+_POINT: Final = 0.7
+_MOST: Final = 3_000_000
+"""Number of points above which they are drawn smaller."""
+_SPARSE: Final = 150
+"""Number of values up to which points are drawn larger."""
+_FEW: Final = 1e-3
+
+
+@styled
+def plot(
+    diagram: Bifurcation,
+    *,
+    show: Literal["x", "v"] = "x",
+    orbits: Iterable[Any] = (),
+    limits: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw a bifurcation diagram.
+
+    Parameters
+    ----------
+    diagram : Bifurcation
+        From `printhammer.bifurcation`.
+    show : str, optional
+        "x": displacements at the firings; "v": velocities.
+    orbits : iterable, optional
+        Drawn over in green: periodic orbits of `printhammer.orbits`, filled circles for stable and open ones
+        for unstable ones, and branches of `printhammer.continuation`, drawn out for stable and dotted for
+        unstable orbits; also collections of them.
+    limits : tuple of float, optional
+        Least and largest displacement or velocity shown, SI; by default all but one in a thousand at
+        either end are shown, and the others counted.
+
+    Returns
+    -------
+    Figure
+        The figure. Black: points to which all directions lead; blue and orange: points to which only rising
+        or falling values do. The bands below tell the verdicts.
+
+    Raises
+    ------
+    InputError
+        There is nothing to draw, or an orbit belongs to another parameter or phase.
+    """
+    if show not in ("x", "v"):
+        raise InputError(f"show = {show!r}, expected 'x' or 'v'")
+    states = getattr(diagram, show)
+    if not np.isfinite(states).any():
+        raise InputError(
+            "the diagram has no states to draw, expected at least one run that got to its points"
+        )
+    figure = new_figure(4.8)
+    bands = len(diagram.directions)
+    grid = figure.add_gridspec(2, 1, height_ratios=(10.0, 0.55 * bands), hspace=0.02)
+    ax = figure.add_subplot(grid[0])
+    strip = figure.add_subplot(grid[1], sharex=ax)
+    across = parameter_scale(diagram)
+    up = scale("displacement", float(np.nanmax(np.abs(states)))) if show == "x" else scale("velocity")
+    _points(ax, diagram, states, across, up)
+    for orbit in _each(orbits):
+        _orbit(ax, diagram, orbit, show, across, up)
+    low, high = limits or _most(states)
+    ax.set_ylim(float(up.shown(low)), float(up.shown(high)))
+    outside = int(((states < low) | (states > high)).sum())
+    if outside:
+        note(ax, f"{outside} of {int(np.isfinite(states).sum())} points outside", (0.98, 0.97), ha="right")
+    if show == "x" and diagram.regime.hammer.position is not None:
+        position = diagram.regime.hammer.position
+        if low < position < high:
+            ax.axhline(float(up.shown(position)), color=MUTED, lw=HAIR, zorder=1.0, gid="backstop")
+    values = across.shown(diagram.values)
+    ax.set_xlim(float(values[0]), float(values[-1]) if len(values) > 1 else float(values[0]) * 1.02 + 1e-9)
+    label(ax, "y", up, f"{up.label} at the firing" if not diagram.phase else up.label)
+    ax.tick_params(axis="x", labelbottom=False, top=True, bottom=True)
+    _bands(strip, diagram, across)
+    label(strip, "x", across)
+    _key(figure, diagram)
+    bad = int((diagram.status != "ok").sum())
+    sign(figure, diagram.regime.hammer, f"{bad} of {diagram.status.size} runs ended early." if bad else "")
+    return figure
+
+
+def parameter_scale(diagram: Bifurcation) -> Scale:
+    """Return how the parameter is shown."""
+    unit, meaning = meaning_of(diagram.regime, diagram.parameter)
+    if diagram.parameter == PERIOD:
+        found = scale("time", float(np.abs(diagram.values).max()))
+        return Scale(meaning.capitalize(), found.si, found.unit)
+    name = meaning.capitalize() if diagram.parameter == "rate" else f"{diagram.parameter}: {meaning}"
+    return Scale(name, unit, unit)
+
+
+def _most(states: FloatArray) -> tuple[float, float]:
+    """Return limits that hold all but a few of the states."""
+    known = states[np.isfinite(states)]
+    low, high = (float(end) for end in np.quantile(known, [_FEW, 1.0 - _FEW]))
+    room = 0.06 * (high - low) or 0.01 * abs(high) or 1.0
+    return low - room, high + room
+
+
+def _points(ax: Axes, diagram: Bifurcation, states: FloatArray, across: Scale, up: Scale) -> None:
+    values = across.shown(diagram.values)
+    apart = hysteresis(diagram)
+    size = _POINT * (2.0 if len(values) <= _SPARSE else 1.0 if states.size <= _MOST else 0.5)
+    several = len(diagram.directions) > 1
+    for way, name in enumerate(diagram.directions):
+        kinds = [(apart, WAYS[name], 3.0 + way)] if several else []
+        if way == 0:
+            kinds.append((~apart, INK, 2.0))
+        for chosen, color, zorder in kinds:
+            y = up.shown(states[way][chosen])
+            ax.plot(
+                np.repeat(values[chosen], y.shape[1]),
+                y.reshape(-1),
+                ls="none",
+                marker="o",
+                ms=size,
+                mew=0.0,
+                color=color,
+                alpha=0.6,
+                # Hundreds of thousands of points would make a vector picture useless.
+                rasterized=True,
+                zorder=zorder,
+                gid=f"points {name}" if chosen is apart else "points",
+            )
+
+
+def _each(orbits: Iterable[Any]) -> Iterable[Any]:
+    """Return orbits and branches one by one, whatever collections they come in."""
+    for entry in [orbits] if hasattr(orbits, "multipliers") else orbits:
+        if hasattr(entry, "multipliers"):
+            yield entry
+        else:
+            yield from _each(entry)
+
+
+def _orbit(ax: Axes, diagram: Bifurcation, found: Any, show: str, across: Scale, up: Scale) -> None:
+    """Draw a periodic orbit as circles, or a branch of them as curves."""
+    states = up.shown(getattr(found, show))
+    if states.ndim == 2:
+        if found.parameter != diagram.parameter or found.phase != diagram.phase:
+            raise InputError(
+                f"orbits: a branch in {found.parameter} at phase {found.phase:g}, expected one in"
+                f" {diagram.parameter} at phase {diagram.phase:g}"
+            )
+        values, states, size = _crossed(across.shown(found.values), states, np.abs(found.multipliers[:, 0]))
+        for kind, style in (("stable", "-"), ("unstable", (0, (1.5, 1.5)))):
+            shown = size <= 1.0 if kind == "stable" else size >= 1.0
+            line = np.where(shown[:, np.newaxis], states, np.nan)
+            ax.plot(values, line, color=GREEN, lw=THIN, ls=style, zorder=5.0, gid=f"{kind} branch")
+        return
+    if diagram.phase:
+        raise InputError(
+            f"orbits: their states are at the firings, expected a diagram of phase 0 for {found!r}"
+        )
+    stable = found.kind == "stable"
+    ax.plot(
+        np.full(len(states), float(across.shown(found.regime.value(diagram.parameter)))),
+        states,
+        ls="none",
+        marker="o",
+        ms=3.2,
+        mew=0.8,
+        mec=GREEN,
+        mfc=GREEN if stable else "white",
+        zorder=6.0,
+        gid="stable orbit" if stable else "unstable orbit",
+    )
+
+
+def _crossed(
+    values: FloatArray, states: FloatArray, size: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Put points on a branch where, by a straight line, the absolute value of the multiplier passes 1."""
+    at = np.flatnonzero((size[1:] < 1.0) != (size[:-1] < 1.0))
+    share = (1.0 - size[at]) / (size[at + 1] - size[at])
+    middle = values[at] + share * (values[at + 1] - values[at])
+    between = states[at] + share[:, np.newaxis] * (states[at + 1] - states[at])
+    return (
+        np.insert(values, at + 1, middle),
+        np.insert(states, at + 1, between, axis=0),
+        np.insert(size, at + 1, 1.0),
+    )
+
+
+def _bands(strip: Axes, diagram: Bifurcation, across: Scale) -> None:
+    """Draw a band of verdicts for each direction."""
+    starts = np.concatenate([[0.0], np.cumsum(cells(diagram.values))]) + diagram.values[0]
+    for way, name in enumerate(diagram.directions):
+        place = 0
+        level = len(diagram.directions) - 1 - way
+        for window in windows_of(diagram, name):
+            stopped = diagram.status[way, place : place + window.columns] != "ok"
+            ends = across.shown([starts[place], starts[place + window.columns]])
+            shade = SHADES[_kind(window.verdict, bool(stopped.all()))]
+            strip.barh(level, ends[1] - ends[0], left=ends[0], height=0.9, color=shade, lw=0.0)
+            place += window.columns
+    strip.set_yticks(range(len(diagram.directions)), list(reversed(diagram.directions)), fontsize=SMALL)
+    strip.set_ylim(-0.5, len(diagram.directions) - 0.5)
+    strip.tick_params(axis="y", length=0.0)
+
+
+def _kind(verdict: str, stopped: bool) -> str:
+    if stopped:
+        return "run ended early"
+    if verdict == "undecided":
+        return "no period"
+    return verdict if verdict in SHADES else "other period"
+
+
+def _key(figure: Figure, diagram: Bifurcation) -> None:
+    """Write below what the colours mean: of the bands that are there, and of points of one direction."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    kinds = {
+        _kind(verdict, status != "ok")
+        for verdict, status in zip(diagram.verdicts.flat, diagram.status.flat, strict=True)
+    }
+    handles: list[Any] = [
+        Patch(color=shade, label=kind.replace("-", " ")) for kind, shade in SHADES.items() if kind in kinds
+    ]
+    if len(diagram.directions) > 1 and hysteresis(diagram).any():
+        handles += [
+            Line2D([], [], ls="none", marker="o", ms=3.0, mew=0.0, color=WAYS[name], label=f"{name} only")
+            for name in diagram.directions
+        ]
+    figure.legend(
+        handles=handles,
+        loc="outside lower left",
+        fontsize=SMALL,
+        frameon=False,
+        ncols=5,
+        handlelength=1.0,
+        handletextpad=0.4,
+        columnspacing=1.2,
+    )

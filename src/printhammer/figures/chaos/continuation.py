@@ -1,0 +1,214 @@
+"""Branches of periodic orbits along a constant: stable solid, unstable dashed, branch points marked."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.figures.elements.style import (
+    BLUE,
+    GREEN,
+    HAIR,
+    INK,
+    LINE,
+    MUTED,
+    ORANGE,
+    SMALL,
+    THIN,
+    TINY,
+    YELLOW,
+    new_figure,
+    sign,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos.continuation_branch import Branch
+    from printhammer.chaos.continuation_regimes import Branches
+    from printhammer.support.arrays import FloatArray
+
+_COLOURS: Final = {1: BLUE, 2: ORANGE, 3: GREEN, 4: YELLOW}
+_SHOWN: Final = {
+    "x": ("Displacement at the section", "m", "µm", 1e6),
+    "v": ("Velocity at the section", "m/s", "m/s", 1.0),
+    "flight_time": ("Flight time", "s", "µs", 1e6),
+    "impact_speed": ("Impact speed", "m/s", "m/s", 1.0),
+    "peak_force": ("Peak force", "N", "N", 1.0),
+}
+_MARKS: Final[dict[str, dict[str, Any]]] = {
+    "fold": {"marker": "o", "ms": 4.5, "mfc": "white"},
+    "period doubling": {"marker": "s", "ms": 4.5, "mfc": "white"},
+    "Neimark-Sacker": {"marker": "D", "ms": 4.5, "mfc": "white"},
+    "branching": {"marker": "x", "ms": 5.0},
+    "grazing": {"marker": "|", "ms": 5.0},
+}
+_UNSTABLE: Final[dict[str, Any]] = {"lw": HAIR, "ls": (0, (4, 2)), "zorder": 2.0}
+_AXIS: Final = {"s": ("ms", 1e3), "1": ("", 1.0)}
+
+
+@styled
+def plot(
+    branches: Branch | Branches,
+    *,
+    show: str = "v",
+    grazings: bool = True,
+    limits: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw branches against their constant.
+
+    Parameters
+    ----------
+    branches : Branch or Branches
+        From `printhammer.continuation` or `printhammer.regimes`.
+    show : str, optional
+        What is drawn upward: "x", "v", "flight_time", "impact_speed" or "peak_force".
+    grazings : bool, optional
+        Whether grazings are marked beside folds, period doublings and the like.
+    limits : tuple of float, optional
+        Ends of the upward axis, SI.
+
+    Returns
+    -------
+    Figure
+        The figure; a colour for each number of firings.
+
+    Raises
+    ------
+    InputError
+        There is nothing to draw, or no such quantity.
+    """
+    found: list[Branch] = list(getattr(branches, "found", [branches]))
+    if not found:
+        raise InputError("branches: expected at least one to draw")
+    if show not in _SHOWN:
+        raise InputError(f"show = {show!r}, expected one of {', '.join(_SHOWN)}")
+    figure = new_figure(4.4)
+    ax = figure.add_subplot()
+    unit, factor = _AXIS.get(found[0].unit, (found[0].unit, 1.0))
+    name, _, shown, times = _SHOWN[show]
+    for branch in found:
+        draw(ax, branch, show, (factor, times))
+    marked = _mark(ax, found, show, (factor, times), grazings)
+    ax.set_xlim(*(factor * end for end in found[0].bounds))
+    if limits is not None:
+        ax.set_ylim(*(times * end for end in limits))
+    else:
+        ax.margins(y=0.04)
+    parameter = found[0].parameter
+    title = parameter[:1].upper() + parameter[1:] if "." not in parameter else parameter
+    ax.set_xlabel(f"{title}  [{unit}]" if unit else title)
+    ax.set_ylabel(f"{name}  [{shown}]")
+    _legend(ax, found, marked)
+    sign(figure, found[0].regime.hammer, *_remarks(found))
+    return figure
+
+
+def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> None:
+    """Draw the lines of one branch; factors by which the constant and the quantity are multiplied."""
+    values, table, stable = _with_points(branch, show)
+    colour = colour_of(branch.firings)
+    begin = 0
+    for i in range(1, len(stable) + 1):
+        if i < len(stable) and stable[i] == stable[begin]:
+            continue
+        part = slice(begin, i + 1)
+        style: dict[str, Any] = {"lw": LINE, "ls": "-", "zorder": 3.0} if stable[begin] else dict(_UNSTABLE)
+        for k in range(branch.firings):
+            (line,) = ax.plot(factors[0] * values[part], factors[1] * table[part, k], color=colour, **style)
+            line.set_gid("stable" if stable[begin] else "unstable")
+        begin = i
+
+
+def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, list[bool]]:
+    """Return constant and quantity with the branch points put in, and the stability of each piece of line."""
+    table = getattr(branch, show)
+    values, rows, stable = [branch.values[0]], [table[0]], []
+    inside: dict[int, list[Any]] = {}
+    for event in branch.events:
+        if event.kind != "grazing":
+            inside.setdefault(event.after, []).append(event)
+    for i in range(len(branch) - 1):
+        here, ahead = branch.curve.nodes[i].arc, branch.curve.nodes[i + 1].arc
+        for event in inside.get(i, []):
+            share = (event.point.node.arc - here) / (ahead - here) if ahead > here else 0.5
+            values.append(event.value)
+            rows.append(table[i] + min(max(share, 0.0), 1.0) * (table[i + 1] - table[i]))
+            stable.append(bool(branch.stable[i]))
+        values.append(branch.values[i + 1])
+        rows.append(table[i + 1])
+        stable.append(bool(branch.stable[i + 1]) if i in inside else bool(branch.stable[i]))
+    return np.array(values), np.array(rows), stable
+
+
+def _mark(
+    ax: Axes, found: Sequence[Branch], show: str, factors: tuple[float, float], grazings: bool
+) -> list[str]:
+    """Mark what happens on the way; return which kinds there are."""
+    kinds: list[str] = []
+    for branch in found:
+        table = getattr(branch, show)
+        for event in branch.events:
+            if event.kind == "grazing" and not grazings:
+                continue
+            i, nodes = event.after, branch.curve.nodes
+            span = nodes[i + 1].arc - nodes[i].arc
+            share = min(max((event.point.node.arc - nodes[i].arc) / span, 0.0), 1.0) if span > 0.0 else 0.5
+            row = table[i] + share * (table[i + 1] - table[i])
+            colour = MUTED if event.kind == "grazing" else colour_of(branch.firings)
+            places = np.full(branch.firings, factors[0] * event.value)
+            style = {"ls": "none", "mec": colour, "mew": THIN, "zorder": 4.0, **_MARKS[event.kind]}
+            ax.plot(places, factors[1] * row, gid=event.kind, **style)
+            if event.kind not in kinds:
+                kinds.append(event.kind)
+    return kinds
+
+
+def colour_of(firings: int) -> str:
+    """Return the colour of orbits of so many firings."""
+    return _COLOURS.get(firings, INK)
+
+
+def _legend(ax: Axes, found: Sequence[Branch], kinds: Sequence[str]) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=colour_of(firings), lw=LINE, label=f"period {firings}, stable")
+        for firings in sorted({branch.firings for branch in found})
+    ]
+    handles.append(Line2D([], [], color=MUTED, lw=HAIR, ls=_UNSTABLE["ls"], label="unstable"))
+    for kind, style in _MARKS.items():
+        if kind in kinds:
+            colour = MUTED if kind == "grazing" else INK
+            handles.append(Line2D([], [], ls="none", mec=colour, mew=THIN, label=kind, **style))
+    columns = 3 if len(handles) > 4 else len(handles)
+    ax.legend(
+        handles=handles,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=columns,
+        fontsize=TINY + 0.5 if len(handles) > 6 else SMALL,
+        frameon=False,
+    )
+
+
+def _remarks(found: Sequence[Branch]) -> list[str]:
+    """Return what a reader must know of ends that are none of the bounds."""
+    told = {
+        "length": "where the number of steps was used up",
+        "lost": "where Newton's method does not converge",
+        "no value": "where there is no strobe map",
+        "grazing": "in a grazing of the rigid backstop",
+    }
+    counts = Counter(stop.reason for branch in found for stop in branch.stops if stop.reason in told)
+    if not counts:
+        return []
+    ends = ", ".join(f"{number} {told[reason]}" for reason, number in sorted(counts.items()))
+    return [f"Branches end before the bounds: {ends}."]

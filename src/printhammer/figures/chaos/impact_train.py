@@ -1,0 +1,82 @@
+"""Impact trains: histogram, return map and autocorrelation of the intervals between impacts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.scales import scale
+from printhammer.figures.elements.style import BLUE, FAINT, HAIR, MUTED, SMALL, THIN, new_figure, sign, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos import ImpactTrain
+    from printhammer.figures.elements.scales import Scale
+
+
+@styled
+def plot(train: ImpactTrain) -> Figure:
+    """Draw the statistics of an impact train.
+
+    Parameters
+    ----------
+    train : ImpactTrain
+        From `printhammer.impact_train`.
+
+    Returns
+    -------
+    Figure
+        Histogram of the intervals, each interval against the one before, and their autocorrelation; what
+        independent intervals would not exceed in 19 of 20 lags lies between the broken lines.
+    """
+    figure = new_figure(2.9)
+    bars, returns, lags = figure.subplots(1, 3)
+    time = scale("time", float(train.intervals.max()))
+    bars.stairs(train.counts, time.shown(train.edges), fill=True, color=BLUE, gid="histogram")
+    bars.set(xlabel=f"Interval  [{time.sign}]", ylabel="Number")
+    _returns(returns, train, time)
+    _lags(lags, train)
+    for ax in (bars, returns, lags):
+        ax.tick_params(axis="both", top=True, right=True)
+        ax.locator_params(axis="both", nbins=5)
+    told = [
+        f"{len(train.times)} impacts",
+        f"mean interval {time.shown(train.mean):.4g} {time.sign}",
+        f"coefficient of variation {train.variation:.3g}",
+    ]
+    if not np.isnan(train.fano):
+        told.append(f"Fano factor {train.fano:.3g} in {time.shown(train.window):.4g} {time.sign}")
+    figure.suptitle(", ".join(told), x=0.01, ha="left", fontsize=SMALL)
+    if train.hammer is not None:
+        sign(figure, train.hammer)
+    return figure
+
+
+def _returns(ax: Axes, train: ImpactTrain, time: Scale) -> None:
+    shown = time.shown(train.intervals)
+    ax.plot(
+        shown[:-1], shown[1:], ls="none", marker="o", ms=1.8, mew=0.0, color=BLUE, gid="returns", zorder=3.0
+    )
+    low, high = (float(end) for end in time.shown(train.edges[[0, -1]]))
+    room = 0.06 * (high - low)
+    ends = (low - room, high + room)
+    ax.plot(ends, ends, color=FAINT, lw=HAIR, zorder=1.0)
+    ax.set(xlabel=f"Interval  [{time.sign}]", ylabel=f"Next one  [{time.sign}]", xlim=ends, ylim=ends)
+
+
+def _lags(ax: Axes, train: ImpactTrain) -> None:
+    if np.isfinite(train.autocorrelation).all():
+        at = np.arange(len(train.autocorrelation))
+        ax.vlines(at, 0.0, train.autocorrelation, color=BLUE, lw=THIN, gid="autocorrelation")
+        ax.plot(at, train.autocorrelation, ls="none", marker="o", ms=2.2, mew=0.0, color=BLUE)
+        for level in (-train.significant, train.significant):
+            ax.axhline(level, color=MUTED, lw=HAIR, ls=(0, (4, 3)))
+    else:
+        note(ax, "all intervals are the same", (0.5, 0.6), ha="center", va="center")
+    ax.set_xlim(-0.5, len(train.autocorrelation) - 0.5)
+    ax.axhline(0.0, color=MUTED, lw=HAIR)
+    ax.set(xlabel="Lag", ylabel="Autocorrelation", ylim=(-1.1, 1.1))

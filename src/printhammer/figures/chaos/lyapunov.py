@@ -1,0 +1,229 @@
+"""Lyapunov exponents: running estimates of one train, many trains side by side, and the 0-1 test."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.zero_one import CHAOTIC, REGULAR
+from printhammer.figures.chaos.strobe import shown_period
+from printhammer.figures.elements.marks import HALO, note
+from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.style import (
+    BLUE,
+    FAINT,
+    HAIR,
+    INK,
+    LINE,
+    MUTED,
+    ORANGE,
+    SMALL,
+    THIN,
+    new_figure,
+    sign,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos import Lyapunov, LyapunovChart, ZeroOne
+    from printhammer.support.arrays import FloatArray
+
+_COLOURS: Final = (BLUE, ORANGE)
+_SIGMAS: Final = 3.0
+"""Standard errors that a band or bar reaches to either side: as many as decide on a sign."""
+
+
+@styled
+def plot(found: Lyapunov) -> Figure:
+    """Draw the running estimates of both exponents against the number of firings.
+
+    Parameters
+    ----------
+    found : Lyapunov
+        From `printhammer.lyapunov`.
+
+    Returns
+    -------
+    Figure
+        The figure; bands reach three standard errors to either side.
+    """
+    figure = new_figure(4.6)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    counts, means, errors = found.running()
+    for k, (ax, colour) in enumerate(zip((upper, lower), _COLOURS, strict=True)):
+        _running(ax, counts, means[:, k], errors[:, k], colour)
+        ax.set_ylabel(f"$\\lambda_{k + 1}$  [1/firing]")
+        value, error = float(found.exponents[k]), float(found.standard_errors[k])
+        at, side = ((0.98, 0.96), "top") if value < _middle(ax) else ((0.98, 0.05), "bottom")
+        note(ax, f"{value:+.4g} ± {error:.2g}", at, ha="right", va=side, color=colour, bbox=HALO)
+    upper.axhline(0.0, color=MUTED, lw=HAIR, zorder=1.0, gid="zero")
+    lower.set_xlabel("Number of firings averaged over")
+    lower.set_xscale("log")
+    # Also where no estimate is finite.
+    lower.set_xlim(max(0.9 * float(counts[0]), 0.5), 1.1 * float(counts[-1]))
+    upper.set_title(_title(found), loc="left", fontsize=SMALL)
+    remarks = [] if found.ok else [f"The run ended early: {found.status}."]
+    if not found.smooth:
+        remarks.append("The motion passes a touch without velocity, where it has no derivative.")
+    sign(figure, found.hammer, *remarks)
+    return figure
+
+
+def _title(found: Lyapunov) -> str:
+    told = [shown_period(found.period), found.verdict.name.replace("-", " ")]
+    if not math.isnan(found.dimension):
+        error = f" ± {found.dimension_error:.1g}" if found.dimension_error else ""
+        told.append(f"dimension {found.dimension:.4g}{error}")
+    if found.zero_one is not None:
+        told.append(f"0-1 test: {found.zero_one.verdict}")
+    return ", ".join(told)
+
+
+def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colour: str) -> None:
+    known = np.isfinite(means)
+    ax.plot(counts[known], means[known], color=colour, lw=LINE, gid="running", zorder=3.0)
+    sure = known & np.isfinite(errors)
+    reach = _SIGMAS * errors[sure]
+    band = (means[sure] - reach, means[sure] + reach)
+    ax.fill_between(counts[sure], *band, color=colour, alpha=0.18, lw=0.0, zorder=2.0, gid="band")
+    # The first few firings say nothing; they do not set the limits.
+    settled = sure & (counts >= counts[-1] // 20)
+    if settled.any():
+        low = float((means - _SIGMAS * np.where(sure, errors, 0.0))[settled].min())
+        high = float((means + _SIGMAS * np.where(sure, errors, 0.0))[settled].max())
+        room = max(0.25 * (high - low), 0.02 * max(abs(low), abs(high)), 1e-6)
+        ax.set_ylim(low - room, high + room)
+    ax.tick_params(axis="both", which="both", top=True, right=True)
+
+
+def _middle(ax: Axes) -> float:
+    low, high = ax.get_ylim()
+    return 0.5 * (low + high)
+
+
+@styled
+def plot_chart(chart: LyapunovChart) -> Figure:
+    """Draw both exponents and the K of the 0-1 test against the time between firings.
+
+    Parameters
+    ----------
+    chart : LyapunovChart
+        From `printhammer.chaos.lyapunovs`.
+
+    Returns
+    -------
+    Figure
+        The figure; bars reach three standard errors to either side, open marks are trains on which exponent
+        and 0-1 test do not both decide, or do not agree.
+    """
+    figure = new_figure(6.0)
+    grid = figure.add_gridspec(3, 1, height_ratios=(3.0, 2.0, 2.0), hspace=0.04)
+    axes = [figure.add_subplot(grid[0])]
+    axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in (1, 2)]
+    time = scale("time", float(chart.period.max()))
+    at = time.shown(chart.period)
+    order = np.argsort(at, kind="stable")
+    agree = np.array([a == b != "undecided" for a, b in zip(chart.growth, chart.zero_one, strict=True)])
+    for k, (ax, colour) in enumerate(zip(axes, _COLOURS, strict=False)):
+        _bars(ax, at, chart.exponents[:, k], chart.standard_errors[:, k], colour, agree, order)
+        ax.set_ylabel(f"$\\lambda_{k + 1}$  [1/firing]")
+    axes[0].axhline(0.0, color=MUTED, lw=HAIR, zorder=1.0, gid="zero")
+    _bars(axes[2], at, chart.k, np.zeros(len(at)), INK, agree, order)
+    for level in (REGULAR, CHAOTIC):
+        axes[2].axhline(level, color=MUTED, lw=HAIR, ls=(0, (4, 3)), zorder=1.0)
+    axes[2].set_ylim(-0.25, 1.15)
+    axes[2].set_ylabel("K of the 0-1 test")
+    label(axes[2], "x", time, "Time between firings")
+    for ax in axes[:2]:
+        ax.tick_params(labelbottom=False)
+    for ax in axes:
+        ax.tick_params(axis="both", top=True, right=True)
+    width = float(at.max() - at.min()) or 0.1 * float(at.max())
+    axes[0].set_xlim(float(at.min()) - 0.04 * width, float(at.max()) + 0.04 * width)
+    sign(figure, chart.hammer, *_remarks(chart, agree))
+    return figure
+
+
+def _bars(
+    ax: Axes, at: FloatArray, values: FloatArray, errors: FloatArray, colour: str, agree: Any, order: Any
+) -> None:
+    finite = np.isfinite(values)
+    joined = order[finite[order]]
+    ax.plot(at[joined], values[joined], color=FAINT, lw=THIN, zorder=1.5)
+    reach = _SIGMAS * np.where(np.isfinite(errors), errors, 0.0)
+    for filled in (True, False):
+        some = finite & (agree == filled)
+        ax.errorbar(
+            at[some],
+            values[some],
+            yerr=reach[some],
+            fmt="o",
+            ms=3.5,
+            mew=0.9,
+            mec=colour,
+            mfc=colour if filled else "white",
+            ecolor=colour,
+            elinewidth=THIN,
+            zorder=3.0,
+        )
+
+
+def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
+    told = []
+    other = int(np.count_nonzero(~agree))
+    if other:
+        told.append(
+            f"{other} of {len(agree)} trains (open marks): exponent and 0-1 test differ, or one is undecided."
+        )
+    infinite = int(np.count_nonzero(np.isneginf(chart.exponents[:, 0])))
+    if infinite:
+        told.append(f"{infinite} trains forget their past altogether: exponents minus infinity, not drawn.")
+    stopped = sum(status != "ok" for status in chart.status)
+    if stopped:
+        told.append(f"{stopped} runs ended early.")
+    return told
+
+
+@styled
+def plot_zero_one(found: ZeroOne) -> Figure:
+    """Draw what the 0-1 test looks at: the path, its mean square displacement, and the correlations.
+
+    Parameters
+    ----------
+    found : ZeroOne
+        From `printhammer.zero_one`.
+
+    Returns
+    -------
+    Figure
+        The figure; path and displacement are those of the angle with the median correlation, ringed at the
+        right.
+    """
+    figure = new_figure(2.9)
+    path, growth, angles = figure.subplots(1, 3)
+    path.plot(found.p, found.q, color=BLUE, lw=HAIR, gid="path")
+    path.set(xlabel="$p_c$", ylabel="$q_c$")
+    path.margins(0.06)
+    path.set_aspect("equal", adjustable="datalim")
+    steps = np.arange(1, len(found.displacement) + 1)
+    growth.plot(steps, found.displacement, color=BLUE, lw=THIN, gid="displacement")
+    growth.set(xlabel="Steps n", ylabel="Mean square displacement")
+    angles.plot(found.angles, found.correlations, ls="none", marker="o", ms=2.4, mew=0.0, color=BLUE, gid="k")
+    shown = found.shown
+    angles.plot(found.angles[shown], found.correlations[shown], marker="o", ms=7.0, mfc="none", mec=ORANGE)
+    for level in (REGULAR, CHAOTIC):
+        angles.axhline(level, color=MUTED, lw=HAIR, ls=(0, (4, 3)))
+    angles.set(xlabel="Angle c  [rad]", ylabel="Correlation $K_c$", ylim=(-1.1, 1.1))
+    for ax in (path, growth, angles):
+        ax.tick_params(axis="both", top=True, right=True)
+        ax.ticklabel_format(axis="both", style="sci", scilimits=(-3, 4))
+        ax.locator_params(axis="both", nbins=5)
+    figure.suptitle(f"0-1 test: {found.phrase}: {found.verdict}", x=0.01, ha="left", fontsize=SMALL)
+    if found.reason:
+        figure.supxlabel(found.reason, x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
+    return figure

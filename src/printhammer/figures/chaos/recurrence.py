@@ -1,0 +1,79 @@
+"""Recurrence plots with what is counted in them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from printhammer.figures.elements.style import INK, MUTED, SMALL, new_figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos import Recurrence
+
+_NAMES: Final = {
+    "rate": "recurrence rate",
+    "determinism": "determinism",
+    "mean_diagonal": "mean diagonal",
+    "longest_diagonal": "longest diagonal",
+    "entropy": "entropy",
+    "laminarity": "laminarity",
+    "trapping": "trapping time",
+    "longest_vertical": "longest vertical",
+}
+
+
+@styled
+def plot(found: Recurrence) -> Figure:
+    """Draw a recurrence plot: a point where two states lie within the threshold of each other.
+
+    Parameters
+    ----------
+    found : Recurrence
+        From `printhammer.recurrence`.
+
+    Returns
+    -------
+    Figure
+        The figure, the quantities beside the plot.
+    """
+    from matplotlib.colors import ListedColormap
+
+    figure = new_figure(4.6)
+    ax = figure.add_subplot()
+    count = len(found.matrix)
+    ax.imshow(
+        found.matrix,
+        origin="lower",
+        cmap=ListedColormap(["white", INK]),
+        vmin=0,
+        vmax=1,
+        extent=(0.5, count + 0.5, 0.5, count + 0.5),
+        # Averaged where there are more points than pixels, so that no line vanishes.
+        interpolation="antialiased",
+        interpolation_stage="rgba",
+    )
+    ax.set(xlabel="Number of the state", ylabel="Number of the state")
+    ax.tick_params(axis="both", top=True, right=True)
+    told = [f"threshold  {found.threshold:.3g}"]
+    told += [f"{_NAMES[name]}  {_shown(value)}" for name, value in found.quantities.items()]
+    ax.annotate(
+        "\n".join(told),
+        (1.0, 1.0),
+        xycoords="axes fraction",
+        xytext=(8, 0),
+        textcoords="offset points",
+        va="top",
+        ha="left",
+        fontsize=SMALL,
+        color=MUTED,
+        linespacing=1.7,
+    )
+    return figure
+
+
+def _shown(value: float) -> str:
+    if isinstance(value, int):
+        return str(value)
+    return "–" if math.isnan(value) else f"{value:.3g}"

@@ -1,0 +1,70 @@
+"""Impact maps: velocity at touch against the time since the last firing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from printhammer.figures.chaos.strobe import shown_period
+from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.style import (
+    BLUE,
+    FAINT,
+    HAIR,
+    ORANGE,
+    SMALL,
+    YELLOW,
+    new_figure,
+    sign,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos import Section
+
+
+@styled
+def plot(section: Section) -> Figure:
+    """Draw the touches of a surface: velocity against the time since the last firing.
+
+    Parameters
+    ----------
+    section : Section
+        From `printhammer.section`.
+
+    Returns
+    -------
+    Figure
+        The figure; the whole period is shown.
+    """
+    figure = new_figure(4.2)
+    ax = figure.add_subplot()
+    time, speed = scale("time", section.period), scale("velocity")
+    colour = BLUE if section.surface == "backstop" else ORANGE
+    ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=1.0)
+    ax.plot(
+        time.shown(section.since),
+        speed.shown(section.v),
+        ls="none",
+        marker="o",
+        ms=2.2,
+        mew=0.0,
+        color=colour,
+        gid="touches",
+        zorder=3.0,
+    )
+    ax.set_xlim(0.0, float(time.shown(section.period)))
+    ax.margins(y=0.08)
+    ax.set_title(
+        f"{len(section.t)} touches of the {section.surface}, fired every {shown_period(section.period)}",
+        loc="left",
+        fontsize=SMALL,
+    )
+    if not len(section.t):
+        note(ax, "no touches", (0.5, 0.5), ha="center", va="center", color=YELLOW)
+    label(ax, "x", time, "Time since the last firing")
+    label(ax, "y", speed, "Velocity at touch")
+    sign(figure, section.hammer, f"{section.remark}." if section.remark else "")
+    return figure

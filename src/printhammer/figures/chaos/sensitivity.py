@@ -1,0 +1,145 @@
+"""Sensitivities as bars, the longest on top: one panel for each quantity."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.figures.elements.style import (
+    BLUE,
+    HAIR,
+    INK,
+    MUTED,
+    ORANGE,
+    SMALL,
+    TINY,
+    new_figure,
+    sign,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos.sensitivity import Sensitivities
+    from printhammer.support.arrays import FloatArray
+
+SHOWN: Final = ("flight_time", "impact_speed", "peak_force", "net_loss")
+"""Quantities drawn unless told otherwise."""
+
+_COLUMNS: Final = 2
+_BAR: Final = 0.62
+
+
+@styled
+def plot(
+    found: Sensitivities, *, dot: int | None = None, quantities: Sequence[str] = SHOWN, bars: int = 8
+) -> Figure:
+    """Draw the largest sensitivities of one dot, or of the whole run.
+
+    Parameters
+    ----------
+    found : Sensitivities
+        From `printhammer.sensitivities`.
+    dot : int, optional
+        Number of the firing, from 0; by default the first that struck.
+    quantities : sequence of str, optional
+        Quantities of a dot or of the run, one panel each.
+    bars : int, optional
+        Largest number of constants in a panel.
+
+    Returns
+    -------
+    Figure
+        A bar is the relative change of the quantity for a relative change of the constant: with a bar of 2,
+        one per cent of the constant makes two per cent of the quantity. Constants that are zero have none.
+
+    Raises
+    ------
+    InputError
+        There is no such dot, it is lost, or a quantity is not known.
+    """
+    if bars < 1:
+        raise InputError(f"bars = {bars}, expected at least 1")
+    if not quantities:
+        raise InputError("quantities: expected at least one to draw")
+    number = _dot(found, dot, quantities)
+    rows = math.ceil(len(quantities) / _COLUMNS)
+    figure = new_figure(0.5 + rows * (0.9 + 0.19 * bars), 7.2)
+    columns = min(_COLUMNS, len(quantities))
+    for place, name in enumerate(quantities):
+        ax = figure.add_subplot(rows, columns, place + 1)
+        _panel(ax, found, _sensitivities(found, name, number), bars)
+        of_dot = f", dot {number + 1}" if name in found.quantities and len(found.dots) > 1 else ""
+        ax.set_title(name.replace("_", " ") + of_dot, loc="left", fontsize=SMALL)
+        if place >= len(quantities) - columns:
+            ax.set_xlabel("change in % for 1 % of the constant", fontsize=SMALL)
+    remarks = [] if found.ok else [f"The run ended early: {found.status}."]
+    if not found.smooth:
+        remarks.append("The motion passes a touch without velocity: what follows has no derivative.")
+    sign(figure, found.hammer, *remarks)
+    return figure
+
+
+def _dot(found: Sensitivities, dot: int | None, quantities: Sequence[str]) -> int:
+    """Return the number of the dot to draw."""
+    struck = [k for k in range(len(found.dots)) if k not in found.lost]
+    if all(name in found.run_quantities for name in quantities):
+        return 0
+    if dot is None:
+        if not struck:
+            raise InputError("all dots are lost, expected one that struck")
+        return struck[0]
+    if not 0 <= dot < len(found.dots):
+        raise InputError(f"dot = {dot}, expected a number from 0 to {len(found.dots) - 1}")
+    if dot not in struck:
+        raise InputError(f"dot = {dot} is lost and has no sensitivities")
+    return dot
+
+
+def _sensitivities(found: Sensitivities, name: str, dot: int) -> FloatArray:
+    if name in found.quantities:
+        return np.asarray(found.logarithmic[dot, found.quantities.index(name)])
+    if name in found.run_quantities:
+        return np.asarray(found.run_logarithmic[found.run_quantities.index(name)])
+    known = ", ".join((*found.quantities, *found.run_quantities))
+    raise InputError(f"quantity = {name!r} is not known, expected one of {known}")
+
+
+def _panel(ax: Axes, found: Sensitivities, values: FloatArray, bars: int) -> None:
+    """Draw one quantity; what is zero to the digits shown is left out."""
+    sizes = np.where(np.isfinite(values), np.abs(values), 0.0)
+    order = [int(k) for k in np.argsort(-sizes, kind="stable")[:bars] if sizes[k] >= 5e-4]
+    if not order:
+        ax.text(0.5, 0.5, "no sensitivity", transform=ax.transAxes, ha="center", color=MUTED, fontsize=SMALL)
+        ax.set_yticks([])
+        return
+    longest = float(sizes[order[0]])
+    for height, k in enumerate(order):
+        value = float(values[k])
+        colour = BLUE if value > 0.0 else ORANGE
+        ax.barh(height, value, height=_BAR, color=colour, gid=f"bar-{found.constants[k]}")
+        ax.annotate(
+            f"{value:+.3g}".replace("-", "−"),
+            (value, height),
+            xytext=(3.0 if value > 0.0 else -3.0, 0.0),
+            textcoords="offset points",
+            ha="left" if value > 0.0 else "right",
+            va="center",
+            fontsize=TINY,
+            color=INK,
+        )
+    ax.axvline(0.0, color=INK, lw=HAIR)
+    # Room for the numbers at the ends of the bars.
+    least = min(float(values[k]) for k in order)
+    most = max(float(values[k]) for k in order)
+    ax.set_xlim(min(least, 0.0) - 0.32 * longest, max(most, 0.0) + 0.32 * longest)
+    ax.set_ylim(max(len(order), 3) - 0.4, -0.6)
+    ax.set_yticks(range(len(order)), [found.constants[k] for k in order], fontsize=TINY)
+    ax.tick_params(axis="y", length=0.0)

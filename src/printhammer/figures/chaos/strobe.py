@@ -1,0 +1,155 @@
+"""Strobe points in the plane of displacement and velocity: one train, or a panel of several."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.window import Window
+from printhammer.figures.elements.marks import HALO, note
+from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.style import (
+    BLUE,
+    HAIR,
+    INK,
+    MUTED,
+    ORANGE,
+    SMALL,
+    TINY,
+    new_figure,
+    sign,
+    styled,
+)
+from printhammer.units import from_si
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos import Strobe
+    from printhammer.figures.elements.scales import Scale
+
+_CYCLE: Final = 8
+"""Largest period whose points are ringed."""
+
+RING: Final[dict[str, Any]] = {
+    "ls": "none",
+    "marker": "o",
+    "ms": 6.0,
+    "mew": 0.9,
+    "mfc": "none",
+    "mec": ORANGE,
+}
+"""How the last points of a periodic train are marked."""
+
+
+@styled
+def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
+    """Draw strobe points: velocity against displacement, the backstop, and the verdict.
+
+    Parameters
+    ----------
+    strobe : Strobe
+        From `printhammer.strobe`.
+    fit : bool, optional
+        Whether the axes end close about the points, instead of at the window of Fig. 11.
+
+    Returns
+    -------
+    Figure
+        The figure; rings are the last points of a periodic train.
+    """
+    figure = new_figure(4.6)
+    ax = figure.add_subplot()
+    window = _close(strobe) if fit else strobe.window
+    way, speed = scales_of(window)
+    panel(ax, strobe, window, way, speed, size=2.2, named=False)
+    judged = "" if strobe.verdict is None else f": {strobe.verdict.name.replace('-', ' ')}"
+    ax.set_title(f"{shown_period(strobe.period)}{judged}", loc="left", fontsize=SMALL)
+    label(ax, "x", way)
+    label(ax, "y", speed)
+    remarks = [] if strobe.ok else [f"The run ended early: {strobe.status}."]
+    if strobe.verdict is not None and strobe.verdict.reason:
+        remarks.append(f"Undecided: {strobe.verdict.reason}.")
+    sign(figure, strobe.hammer, *remarks)
+    return figure
+
+
+def _close(strobe: Strobe) -> Window:
+    """Return a window close about the points; that of the hammer where there are none."""
+    known = np.isfinite(strobe.x)
+    if not known.any():
+        return strobe.window
+    ends = []
+    for values, half in zip((strobe.x[known], strobe.v[known]), strobe.window.half_widths, strict=True):
+        low, high = float(values.min()), float(values.max())
+        room = 0.08 * (high - low) or 1e-3 * float(half)
+        ends.append((low - room, high + room))
+    return Window(*ends)
+
+
+def scales_of(window: Window) -> tuple[Scale, Scale]:
+    """Return how displacements and velocities of a window are shown."""
+    return scale("displacement", max(abs(end) for end in window.x)), scale("velocity")
+
+
+def panel(
+    ax: Axes,
+    strobe: Strobe,
+    window: Window,
+    way: Scale,
+    speed: Scale,
+    size: float,
+    *,
+    named: bool = True,
+    printed: str = "",
+) -> None:
+    """Draw the points of one train into axes.
+
+    Parameters
+    ----------
+    ax : Axes
+        The axes.
+    strobe : Strobe
+        The points.
+    window : Window
+        Limits of the axes; points outside are counted in a corner.
+    way, speed : Scale
+        How displacement and velocity are shown.
+    size : float
+        Size of a point, points.
+    named : bool, optional
+        Whether strobe time and verdict are written inside.
+    printed : str, optional
+        The verdict of the paper, written above that on the points where it is another.
+    """
+    ax.set_xlim(*(float(way.shown(end)) for end in window.x))
+    ax.set_ylim(*(float(speed.shown(end)) for end in window.v))
+    if strobe.hammer.position is not None:
+        line = ax.axvline(float(way.shown(strobe.hammer.position)), color=MUTED, lw=HAIR, zorder=1.0)
+        line.set_gid("backstop")
+    x, v = way.shown(strobe.x), speed.shown(strobe.v)
+    ax.plot(x, v, ls="none", marker="o", ms=size, mew=0.0, color=BLUE, gid="points", zorder=3.0)
+    judged = strobe.verdict
+    if judged is not None and judged.period is not None and judged.period <= min(_CYCLE, len(x)):
+        cycle = slice(len(x) - judged.period, None)
+        ax.plot(x[cycle], v[cycle], **{**RING, "ms": size + 4.0}, gid="cycle", zorder=4.0)
+    if named:
+        note(ax, shown_period(strobe.period), (0.97, 0.96), ha="right", color=INK)
+    if named and judged is not None:
+        note(ax, judged.name.replace("-", " "), (0.97, 0.04), ha="right", va="bottom", bbox=HALO)
+        if printed and printed != judged.name:
+            told = f"paper: {printed.replace('-', ' ')}"
+            note(ax, told, (0.97, 0.15), ha="right", va="bottom", fontsize=TINY, bbox=HALO)
+    outside = int(np.count_nonzero(np.isfinite(strobe.x) & ~window.inside(strobe.x, strobe.v)))
+    if outside:
+        note(ax, f"{outside} outside", (0.97, 0.86), ha="right", fontsize=TINY)
+
+
+def shown_period(period: float) -> str:
+    """Return a strobe time, s, as it is written in a figure: with two decimals if that is all there is."""
+    number = from_si(period, "s", "ms")
+    short = f"{number:.2f}"
+    return f"{short if math.isclose(float(short), number, rel_tol=1e-9) else f'{number:.6g}'} ms"

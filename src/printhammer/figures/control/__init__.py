@@ -1,0 +1,1 @@
+"""Pictures of compensation tables, feedback and bursts of least work."""

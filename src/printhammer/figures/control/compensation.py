@@ -1,0 +1,196 @@
+"""Compensation tables, and what they gain and lose beside open loop."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.control.histories import REST, gap_text, histories, number_of
+from printhammer.control.table_report import STRATEGIES
+from printhammer.figures.elements.scales import Scale
+from printhammer.figures.elements.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    HAIR,
+    MUTED,
+    ORANGE,
+    SMALL,
+    THIN,
+    TINY,
+    YELLOW,
+    new_figure,
+    sign,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.control.table import CompensationTable
+    from printhammer.control.table_report import TableReport
+    from printhammer.support.arrays import FloatArray
+
+_FEW: Final = 4
+_LINES: Final = (BLUE, ORANGE, GREEN, YELLOW)
+_MICROSECONDS: Final = Scale("", "s", "us")
+_BINS: Final = 41
+
+
+@styled
+def plot(table: CompensationTable) -> Figure:
+    """Draw a table: as maps of history by history at one or few rates, else against the rate.
+
+    Parameters
+    ----------
+    table : CompensationTable
+        From `printhammer.tune`.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
+    figure = _few_rates(table) if table.rates.size < _FEW else _many_rates(table)
+    told = f"{table.hammer} · {table.fingerprint[:8]} · at most {table.largest_current:g} A"
+    text = figure.supxlabel(told, x=0.99, ha="right", fontsize=TINY, color=MUTED)
+    text.set_in_layout(True)
+    return figure
+
+
+def _few_rates(table: CompensationTable) -> Figure:
+    """Draw advance and width with a cell for each history, the last gap down."""
+    figure = new_figure(1.2 + 2.1 * table.rates.size)
+    axes = figure.subplots(table.rates.size, 2, squeeze=False)
+    side, across = table.reach + 1, (table.reach + 1) ** (table.gaps - 1)
+    told = {number_of(row, table.reach): row for row in histories(table.gaps, table.reach)}
+    for row, rate in enumerate(table.rates.tolist()):
+        for ax, name, word in zip(
+            axes[row], ("advance", "width"), ("Fired before its slot", "Width of the pulse"), strict=True
+        ):
+            values = np.full((side, across), np.nan)
+            for number in told:
+                values[divmod(number, across)] = getattr(table, name)[row, number]
+            shown = _MICROSECONDS.shown(values)
+            mesh = ax.pcolormesh(np.ma.masked_invalid(shown), cmap="viridis")
+            for (down, right), value in np.ndenumerate(shown):
+                if np.isfinite(value):
+                    dark = mesh.norm(value) < 0.6
+                    ax.text(
+                        right + 0.5,
+                        down + 0.5,
+                        f"{value:.1f}",
+                        ha="center",
+                        va="center",
+                        fontsize=TINY,
+                        color="white" if dark else "black",
+                    )
+            ax.set_title(f"{word}, µs, at {rate:g} Hz", loc="left", fontsize=SMALL)
+            ax.set_yticks(np.arange(side) + 0.5, [gap_text(gap) for gap in range(side)])
+            ticks = {
+                number % across: "-".join(map(gap_text, history[1:])) for number, history in told.items()
+            }
+            ax.set_xticks([place + 0.5 for place in ticks], list(ticks.values()), fontsize=TINY)
+            ax.set_ylabel("Last gap, slots")
+            if table.gaps > 1:
+                ax.set_xlabel("Gaps before, latest first")
+            ax.invert_yaxis()
+    return figure
+
+
+def _many_rates(table: CompensationTable) -> Figure:
+    """Draw advance and width against the rate, a line for each gap after a rest."""
+    figure = new_figure(5.0)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    lowest = int(np.argmax((table.advance != 0.0).any(axis=1)))
+    shown = slice(max(0, lowest - 1), None)
+    rates = table.rates[shown] / 1e3
+    for gap in range(1, table.reach + 1):
+        column = number_of((gap, *[REST] * (table.gaps - 1)), table.reach)
+        colour = _LINES[(gap - 1) % len(_LINES)]
+        word = "one slot after another" if gap == 1 else f"{gap} slots after another"
+        for ax, name in ((upper, "advance"), (lower, "width")):
+            values = _MICROSECONDS.shown(getattr(table, name)[shown, column])
+            ax.plot(rates, values, color=colour, lw=THIN, label=word, gid=f"{name} {gap}")
+            braked = table.brake_width[shown, column] > 0.0
+            ax.plot(
+                rates[braked],
+                values[braked],
+                ls="none",
+                marker="o",
+                ms=2.5,
+                color=colour,
+                gid=f"braked {name} {gap}",
+                label="with a brake pulse before" if ax is lower and gap == 1 and braked.any() else None,
+            )
+    upper.axhline(0.0, color=MUTED, lw=HAIR)
+    upper.set_ylabel("Fired before its slot  [µs]")
+    lower.set_ylabel("Width of the pulse  [µs]")
+    lower.set_xlabel("Slots per second  [kHz]")
+    lower.legend(frameon=False, fontsize=SMALL)
+    upper.set_title("Dots after a dot from rest", loc="left", fontsize=SMALL)
+    return figure
+
+
+@styled
+def plot_report(report: TableReport) -> Figure:
+    """Draw what a table gains and loses: shares of good dots for each hammer, and force and arrival.
+
+    Parameters
+    ----------
+    report : TableReport
+        From `printhammer.control.judge_table`.
+
+    Returns
+    -------
+    Figure
+        The figure. Bars: dots within the limits, over all rates and patterns. Histograms: dots of the de
+        Bruijn cycle at the first rate; grey bands are the limits.
+    """
+    figure = new_figure(5.6)
+    grid = figure.add_gridspec(2, 2, height_ratios=(1.2, 1.0))
+    bars = figure.add_subplot(grid[0, :])
+    share = 100.0 * report.good.mean(axis=(2, 3))
+    places = np.arange(len(report.hammers))
+    for number, (name, colour) in enumerate(zip(STRATEGIES, (ORANGE, BLUE), strict=True)):
+        bars.bar(places + 0.4 * number - 0.2, share[number], 0.38, color=colour, label=name)
+    bars.set_xticks(places, [name.replace(" %", "%") for name in report.hammers], fontsize=TINY, rotation=30)
+    for text in bars.get_xticklabels():
+        text.set_horizontalalignment("right")
+    bars.set_ylabel("Dots within limits  [%]")
+    bars.set_xlim(-0.6, places.size - 0.4)
+    bars.set_ylim(0.0, 119.0)
+    bars.set_yticks([0, 25, 50, 75, 100])
+    bars.legend(frameon=False, fontsize=SMALL, ncols=2, loc="upper right")
+    rates = report.rates
+    span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
+    bars.set_title(f"Hammers driven, {span}", loc="left", fontsize=SMALL)
+    _histogram(
+        figure.add_subplot(grid[1, 0]),
+        100.0 * report.force_deviation,
+        100.0 * report.limits.force,
+        "Force off by  [%]",
+    )
+    _histogram(
+        figure.add_subplot(grid[1, 1]),
+        _MICROSECONDS.shown(report.arrival_deviation),
+        float(_MICROSECONDS.shown(report.limits.arrival)),
+        "Arrival off by  [µs]",
+    )
+    sign(figure, report.hammer)
+    return figure
+
+
+def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
+    """Draw how far dots are off, what is beyond three limits in the outermost bins."""
+    edges = np.linspace(-3.0 * limit, 3.0 * limit, _BINS + 1)
+    ax.axvspan(-limit, limit, color=FAINT, lw=0.0, zorder=0)
+    for row, colour, style in zip(values, (ORANGE, BLUE), ("--", "-"), strict=True):
+        known = np.clip(row[~np.isnan(row)], edges[0], edges[-1])
+        ax.hist(known, bins=edges.tolist(), histtype="step", color=colour, ls=style, lw=THIN)
+    ax.set_title("what is farther off: at the ends", loc="right", fontsize=TINY)
+    ax.set_yscale("log")
+    ax.set_xlabel(name)
+    ax.set_ylabel("Dots of the cycle")

@@ -1,0 +1,161 @@
+"""What the figures draw: drives, ranges and the points of a curve."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
+
+SETTLED: Final = 0.01
+"""Part of the stroke within which the armature counts as settled in a figure."""
+
+_POINTS: Final = 2400
+_PER_PIECE: Final = 60
+
+
+def waveform_of(hammer: Hammer) -> Waveform:
+    """Return the standard waveform of a hammer.
+
+    Raises
+    ------
+    InputError
+        It has none.
+    """
+    if hammer.waveform is None:
+        raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+    return hammer.waveform
+
+
+def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str | None = None) -> Motion:
+    """Return the motion of a hammer whose waveform is fired at given times, s.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    times : iterable of float, optional
+        Firing times, s; a single pulse at 0 by default.
+    duration : float or str, optional
+        End of the run, s, or text with a unit; by default that of `printhammer.simulate`.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform or no rest state.
+    """
+    from printhammer.drive.trains import PulseTrain
+    from printhammer.run.simulate import simulate
+
+    return simulate(hammer, PulseTrain(waveform_of(hammer), at=list(times)), duration=duration, points=2)
+
+
+def places(hammer: Hammer) -> dict[str, float]:
+    """Return the positions that a hammer has of "backstop", "pack" and "platen", m, in this order."""
+    found = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
+    return {name: place for name, place in found.items() if place is not None}
+
+
+def times_of(motion: Motion, start: float | None = None, end: float | None = None) -> FloatArray:
+    """Return times, s, at which a curve of a motion is drawn: even ones, all steps and all extrema.
+
+    Parameters
+    ----------
+    motion : Motion
+        The motion.
+    start, end : float, optional
+        Limits, s; those of the motion by default.
+    """
+    start = motion.start if start is None else max(start, motion.start)
+    end = motion.end if end is None else min(end, motion.end)
+    steps = motion.step_times
+    peaks = np.array([contact.t_peak for contact in motion.contacts])
+    pieces = [
+        np.linspace(contact.t_in, end if contact.t_out is None else contact.t_out, _PER_PIECE)
+        for contact in motion.contacts
+        if not contact.initial
+    ]
+    every = np.concatenate([np.linspace(start, end, _POINTS), steps, peaks, motion.maxima[0], *pieces])
+    return np.unique(every[(every >= start) & (every <= end)])
+
+
+def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return displacement, m, and velocity, m/s, along a motion, with both ends of every jump."""
+    x, v = motion.at(times)
+    jumps = [
+        (contact.t_in, contact.v_in)
+        for contact in motion.contacts
+        if contact.surface == "backstop" and contact.peak_force is None and not contact.initial
+    ]
+    for t, v_in in reversed(jumps):
+        row = int(np.searchsorted(times, t))
+        if 0 < row < len(times):
+            x = np.insert(x, row, x[row])
+            v = np.insert(v, row, v_in)
+    return x, v
+
+
+def settled_at(motion: Motion) -> float:
+    """Return the time, s, from which on the armature stays where it ends, up to `SETTLED` of the stroke."""
+    times = times_of(motion)
+    x, _v = motion.at(times)
+    room = SETTLED * float(np.ptp(x))
+    away = np.flatnonzero(np.abs(x - x[-1]) > room)
+    return float(times[away[-1]]) if away.size else motion.end
+
+
+def shown_until(motion: Motion) -> float:
+    """Return a round time, s, at which a picture of a motion that settles can end."""
+    step = 10.0 ** math.floor(math.log10(motion.end)) / 4.0
+    return float(min(motion.end, step * math.ceil(1.1 * settled_at(motion) / step)))
+
+
+def reach(hammer: Hammer) -> tuple[float, float]:
+    """Return the displacements, m, between which the static forces of a hammer are drawn.
+
+    Raises
+    ------
+    InputError
+        The hammer has nothing that gives a scale: neither platen nor pack, nor a range of its magnet's law.
+    """
+    from printhammer.hammer.static_force import StaticForce
+
+    low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
+    end = min(StaticForce(hammer).end, high)
+    near = hammer.origin if hammer.position is not None else max(low, min(0.0, end))
+    if hammer.platen is None and hammer.pack is None and not math.isfinite(high):
+        raise InputError(
+            f"the hammer {hammer.name!r} has neither platen nor pack, expected one to scale the figure"
+        )
+    if hammer.pack is not None and hammer.front is not None:
+        end = max(end, hammer.front + 0.2 * abs(hammer.front - near))
+    if not near < end:
+        raise InputError(f"the hammer {hammer.name!r} has no stroke: from {near:.6g} m to {end:.6g} m")
+    room = 0.08 * (end - near)
+    return max(low + 1e-3 * room, near - 2.0 * room) if math.isfinite(low) else near - room, min(
+        high, end + room
+    )
+
+
+def total_force(motion: Motion, times: FloatArray) -> FloatArray:
+    """Return the sum of all forces on the armature, N, at times, s.
+
+    Where a rigid backstop holds the armature, its reaction balances all others, and the sum is 0.
+    """
+    total = motion.forces_at(times)["total"].copy()
+    for contact in motion.contacts:
+        if contact.surface == "backstop" and contact.peak_force is None:
+            end = math.inf if contact.t_out is None else contact.t_out
+            total[(times > contact.t_in) & (times < end)] = 0.0
+            total[(times == contact.t_in) & contact.initial] = 0.0
+    return total

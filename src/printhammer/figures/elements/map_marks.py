@@ -1,0 +1,287 @@
+"""What the pictures of frequency-time maps share: scales, firings, lost dots, the colour bar."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.figures.elements.scales import Scale, scale
+from printhammer.figures.elements.style import HAIR, INK, MUTED, ORANGE, SMALL, TINY
+from printhammer.maps.layout import failed_rates, places_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+COLOURS: Final = "viridis"
+"""Perceptually uniform, and told apart by the colour-blind (N. Smith and S. van der Walt, 2015)."""
+
+LINES: Final = "white"
+"""Of the firings."""
+
+LOST: Final = "lost dots"
+"""The gid of the marks of lost dots."""
+
+FEW: Final = 50
+"""Number of rates below which firings and lost dots are marked row by row."""
+
+UNKNOWN: Final = "#e4e4e4"
+"""Where the displacement is not known."""
+
+LOWEST, HIGHEST, RATES, TIMES = 500.0, 2500.0, 640, 1024
+"""Range of the rates in the paper's figures as drawn here, Hz, and the numbers of rates and times."""
+
+_KILO: Final = 1e3
+_LOST: Final = 2.0
+
+
+def chart_of(
+    hammer: Hammer, rates: npt.ArrayLike | None = None, times: npt.ArrayLike | None = TIMES
+) -> xr.Dataset:
+    """Return the map of a hammer that a figure shows.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform or no rest state, or the rates are not usable.
+    """
+    from printhammer.maps.frequency import frequency_map
+
+    return frequency_map(hammer, np.linspace(LOWEST, HIGHEST, RATES) if rates is None else rates, times=times)
+
+
+def drawable(chart: xr.Dataset) -> xr.Dataset:
+    """Return a map that has an axis of time.
+
+    Raises
+    ------
+    InputError
+        It has fewer than two times.
+    """
+    if chart["time"].size < 2:
+        raise InputError(f"the map has {chart['time'].size} times, expected at least 2 to draw it")
+    return chart
+
+
+def edges(centres: FloatArray) -> FloatArray:
+    """Return the borders of cells about ascending centres, one more than there are."""
+    if len(centres) == 1:
+        return np.asarray([0.98 * centres[0], 1.02 * centres[0]], dtype=np.float64)
+    middle = 0.5 * (centres[1:] + centres[:-1])
+    ends = 2.0 * centres[[0, -1]] - middle[[0, -1]]
+    return np.concatenate([ends[:1], middle, ends[1:]], dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Scales:
+    """How the displacements, times and rates of maps are shown."""
+
+    way: Scale
+    time: Scale
+    rate: Scale
+
+
+def scales_of(*charts: xr.Dataset) -> Scales:
+    """Return the scales that suit all of some maps."""
+    ends = [*limits_of(*charts), *(place for chart in charts for place in places_of(chart).values())]
+    fast = max(float(chart["rate"][-1]) for chart in charts)
+    return Scales(
+        scale("displacement", max(map(abs, ends))),
+        scale("time", max(float(chart["time"][-1]) for chart in charts)),
+        Scale("Rate", "Hz", "kHz" if fast >= _KILO else "Hz"),
+    )
+
+
+def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
+    """Return the smallest and the largest displacement of maps, m."""
+    every = np.concatenate([chart["displacement"].values.ravel() for chart in charts])
+    known = every[np.isfinite(every)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    return low, high if high > low else low + 1e-6
+
+
+def picture(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> QuadMesh:
+    """Draw the displacement of a map in colours, time to the right and rate upward; cells as pixels."""
+    from matplotlib import colormaps
+
+    time, rate = scales.time, scales.rate
+    mesh = ax.pcolormesh(
+        time.shown(edges(chart["time"].values)),
+        rate.shown(edges(chart["rate"].values)),
+        np.ma.masked_invalid(scales.way.shown(chart["displacement"].values)),
+        cmap=colormaps[COLOURS].with_extremes(bad=UNKNOWN),
+        norm=norm,
+        rasterized=True,
+        zorder=0.5,
+    )
+    mesh.set_gid("displacement")
+    ax.set_facecolor(UNKNOWN)
+    ax.set_xlim(float(time.shown(chart["time"][0])), float(time.shown(chart["time"][-1])))
+    ax.set_xlabel(f"Time from the first firing  [{time.sign}]")
+    ax.set_ylabel(f"{rate.label}  [{rate.sign}]")
+    return mesh
+
+
+def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
+    """Draw a thin line along each firing, and a strong one where its dot is lost.
+
+    Where the map has fewer than 50 rates, the lines are upright marks in the row of each rate instead.
+    """
+    if "fired_at" not in chart:
+        return
+    time, shown = scales.time, scales.rate
+    rates = chart["rate"].values
+    rows = edges(rates)
+    few = len(rates) < FEW
+    fired, struck = chart["fired_at"].values, chart["struck"].values
+    lost: list[tuple[FloatArray, FloatArray]] = []
+    for firing in range(fired.shape[1]):
+        at = time.shown(fired[:, firing])
+        # A line leans as the firing times do, from one border of the cell to the other; a mark does not.
+        slopes = np.zeros_like(at) if few or firing == 0 else -at / rates
+        along = _strokes(at, slopes, rates, rows) if few else (at, rates)
+        ax.plot(
+            along[0],
+            shown.shown(along[1]),
+            color=LINES,
+            lw=HAIR,
+            alpha=0.6,
+            zorder=2.0,
+            gid=f"firing {firing + 1}",
+        )
+        missed = np.flatnonzero(~struck[:, firing] & np.isfinite(at))
+        lost.append(_strokes(at, slopes, rates, rows, missed))
+    lost_at, lost_rates = (np.concatenate(parts) for parts in zip(*lost, strict=True))
+    if lost_at.size:
+        cap: Literal["butt", "projecting"] = "butt" if few else "projecting"
+        ax.plot(
+            lost_at,
+            shown.shown(lost_rates),
+            color=ORANGE,
+            lw=_LOST,
+            solid_capstyle=cap,
+            zorder=2.5,
+            gid=LOST,
+        )
+
+
+def _strokes(
+    at: FloatArray,
+    slopes: FloatArray,
+    rates: FloatArray,
+    borders: FloatArray,
+    rows: npt.NDArray[np.intp] | slice = slice(None),
+) -> tuple[FloatArray, FloatArray]:
+    """Return strokes through the cells of some rows, from the lower border to the upper one, NaN between."""
+    centre, place, slope = rates[rows], at[rows], slopes[rows]
+    ends = np.column_stack([borders[:-1][rows], borders[1:][rows], np.full_like(centre, np.nan)])
+    return (
+        place[:, np.newaxis] + slope[:, np.newaxis] * (ends - centre[:, np.newaxis])
+    ).ravel(), ends.ravel()
+
+
+def key(ax: Axes, chart: xr.Dataset) -> None:
+    """Write above a picture what its lines are."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patheffects import Stroke
+
+    if "fired_at" not in chart:
+        return
+    lost = int((~chart["struck"].values & np.isfinite(chart["fired_at"].values)).sum())
+    fired = int(np.isfinite(chart["fired_at"].values).sum())
+    around = [Stroke(linewidth=3.0, foreground=MUTED), Stroke(linewidth=1.4, foreground=LINES)]
+    handles = [
+        Line2D([], [], color=LINES, lw=HAIR, path_effects=around, label="firings"),
+        Line2D([], [], color=ORANGE, lw=_LOST + 0.8, label=f"lost dots, {lost} of {fired}"),
+    ]
+    ax.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.2,
+        fontsize=SMALL,
+        frameon=False,
+        ncols=2,
+    )
+
+
+def colour_bar(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> None:
+    """Draw the scale of the colours from the lowest place to the highest, with marks; white: not reached."""
+    from matplotlib import colormaps
+
+    way = scales.way
+    low, high = float(norm.vmin or 0.0), float(norm.vmax or 1.0)
+    places = {name: float(way.shown(place)) for name, place in places_of(chart).items()}
+    ends = [low, high, *places.values()]
+    room = 0.02 * (max(ends) - min(ends))
+    ax.imshow(
+        np.linspace(0.0, 1.0, 256)[:, np.newaxis],
+        extent=(0.0, 1.0, low, high),
+        origin="lower",
+        aspect="auto",
+        cmap=colormaps[COLOURS],
+        interpolation="nearest",
+    )
+    ax.set_xlim(0.0, 1.0)
+    ax.set_ylim(min(ends) - room, max(ends) + room)
+    ax.set_xticks([])
+    ax.yaxis.set_label_position("right")
+    ax.yaxis.tick_right()
+    ax.tick_params(axis="y", left=False, right=True)
+    ax.set_ylabel(f"Displacement  [{way.sign}]")
+    for name, at in places.items():
+        for colour, width in (("white", 2.0), (INK, 0.9)):
+            ax.axhline(at, color=colour, lw=width, gid=name)
+        ax.annotate(
+            name,
+            (0.0, at),
+            xycoords=("axes fraction", "data"),
+            xytext=(-3.0, 0.0),
+            textcoords="offset points",
+            ha="right",
+            va="center",
+            fontsize=SMALL,
+            color=INK,
+        )
+
+
+def failures(chart: xr.Dataset) -> str:
+    """Say how many runs of a map did not reach their end, and why; empty if all did."""
+    failed = {name: len(rates) for name, rates in failed_rates(chart).items()}
+    if not failed:
+        return ""
+    names = ", ".join(f"{name} ({count})" for name, count in failed.items())
+    return f"{sum(failed.values())} of {chart['rate'].size} runs did not reach their end: {names}."
+
+
+def sign_map(figure: Figure, chart: xr.Dataset, *remarks: str) -> None:
+    """Write below a figure where its map comes from, and remarks above it."""
+    told = [str(chart.attrs.get("hammer", chart.attrs.get("source", "")))]
+    if "hammer_fingerprint" in chart.attrs:
+        told.append(str(chart.attrs["hammer_fingerprint"])[:8])
+    constants = str(chart.attrs.get("hammer_constants", ""))
+    if constants.startswith("in part"):
+        told.append(f"constants {constants}")
+    text = figure.supxlabel(" · ".join(filter(None, told)), x=0.99, ha="right", fontsize=TINY, color=MUTED)
+    text.set_in_layout(True)
+    shown = [remark for remark in remarks if remark]
+    if shown:
+        figure.suptitle("\n".join(shown), x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
+
+
+def norm_of(scales: Scales, *charts: xr.Dataset) -> Normalize:
+    """Return the scale of the colours that holds the displacements of maps."""
+    from matplotlib.colors import Normalize
+
+    low, high = limits_of(*charts)
+    return Normalize(float(scales.way.shown(low)), float(scales.way.shown(high)))

@@ -1,0 +1,244 @@
+"""Marks on figures: where backstop, pack and platen are, which way time runs, when the coil is fired."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+
+from printhammer.figures.elements.curves import places
+from printhammer.figures.elements.room import CURVE, freest, occupied
+from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.style import BLUE, FAINT, HAIR, INK, LINE, MUTED, SMALL, SURFACES, THIN
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.text import Text
+
+    from printhammer.figures.elements.scales import Scale
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
+
+HALO: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
+"""Background of text that may lie on a line."""
+
+_LINE_NAME: Final = (0.095, 0.06)
+"""Width and height of a name on a horizontal line, of the axes."""
+
+_APART: Final = 1.3
+"""Half the distance of the two lines of a double line, points."""
+
+
+def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] = "y") -> None:
+    """Draw lines at backstop, pack and platen: horizontal single ones, or vertical double ones as in Fig. 2.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes with displacement along `side`, whose limits are set.
+    hammer : Hammer
+        The hammer.
+    shown : Scale
+        The displacement.
+    side : str, optional
+        "y" for horizontal lines, "x" for vertical ones.
+    """
+    low, high = ax.get_ylim() if side == "y" else ax.get_xlim()
+    for name, place in places(hammer).items():
+        at = float(shown.shown(place))
+        if not low <= at <= high:
+            continue
+        if side == "y":
+            line = ax.axhline(at, color=MUTED, lw=HAIR, zorder=1.0)
+            line.set_gid(name)
+        else:
+            _double_line(ax, at, name)
+
+
+def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
+    """Write the names of the places on their horizontal lines, at the right or where no curve is."""
+    low, high = ax.get_ylim()
+    points = occupied(ax)
+    for name, place in places(hammer).items():
+        at = (float(shown.shown(place)) - low) / (high - low)
+        if not 0.0 <= at <= 1.0:
+            continue
+        corners = [
+            (left, bottom)
+            for bottom in (at, at - _LINE_NAME[1])
+            for left in np.linspace(1.0 - _LINE_NAME[0], 0.0, 60).tolist()
+        ]
+        (left, bottom), _covered = freest(points, _LINE_NAME, corners)
+        ax.annotate(
+            name,
+            (left + _LINE_NAME[0], at),
+            xycoords="axes fraction",
+            xytext=(-4, 1.5 if bottom == at else -2.5),
+            textcoords="offset points",
+            ha="right",
+            va="bottom" if bottom == at else "top",
+            fontsize=SMALL,
+            color=MUTED,
+            zorder=4.0,
+        )
+
+
+def _double_line(ax: Axes, at: float, name: str) -> None:
+    from matplotlib.transforms import ScaledTranslation
+
+    for number, shift in enumerate((-_APART, _APART)):
+        offset = ScaledTranslation(shift / 72.0, 0.0, ax.figure.dpi_scale_trans)
+        line = ax.axvline(at, color=MUTED, lw=HAIR, zorder=1.0)
+        line.set_transform(ax.get_xaxis_transform() + offset)
+        line.set_gid(f"{name}-{number}")
+    ax.annotate(
+        name,
+        (at, 1.0),
+        xycoords=("data", "axes fraction"),
+        xytext=(-_APART - 2.0, -4),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        rotation=90,
+        fontsize=SMALL,
+        color=MUTED,
+        zorder=4.0,
+        bbox=HALO,
+    )
+
+
+def note(ax: Axes, text: str, at: tuple[float, float], **options: Any) -> Text:
+    """Write a small remark at a place in fractions of the axes."""
+    style = {"fontsize": SMALL, "color": MUTED, "va": "top", "ha": "left", "zorder": 5.0, **options}
+    return ax.text(*at, text, transform=ax.transAxes, **style)
+
+
+def contact_spans(ax: Axes, motion: Motion, until: float, shown: Scale) -> None:
+    """Tint the times, s, at which the armature touches pack or backstop."""
+    for contact in motion.contacts:
+        end = until if contact.t_out is None else min(contact.t_out, until)
+        if contact.t_in >= end:
+            continue
+        span = (float(shown.shown(contact.t_in)), float(shown.shown(end)))
+        strong = 0.28 if contact.surface == "pack" else 0.18
+        ax.axvspan(*span, color=SURFACES[contact.surface], alpha=strong, lw=0.0, zorder=0.5)
+
+
+def arrows(
+    ax: Axes,
+    x: FloatArray,
+    y: FloatArray,
+    count: int,
+    color: str = INK,
+    size: float = 9.0,
+    first: float = 0.5,
+) -> None:
+    """Put arrow heads on a curve, evenly by its length on paper, in the direction of its points.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes whose limits are set.
+    x, y : array
+        The curve in data units.
+    count : int
+        Number of heads.
+    color : str, optional
+        Colour of the heads.
+    size : float, optional
+        Their size, points.
+    first : float, optional
+        Place of the first one, in units of the distance between them.
+    """
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    root = ax.get_figure(root=True)
+    width, height = (1.0, 1.0) if root is None else root.get_size_inches()
+    across, up = (x - left) / (right - left) * width, (y - bottom) / (top - bottom) * height
+    inside = (across >= 0.0) & (across <= width) & (up >= 0.0) & (up <= height)
+    steps = np.hypot(np.diff(across), np.diff(up)) * (inside[1:] & inside[:-1])
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    if length[-1] <= 0.0:
+        return
+    for k in range(count):
+        at = (k + first) / count * length[-1]
+        row = int(np.clip(np.searchsorted(length, at), 1, len(x) - 1))
+        back = row - 1
+        # A head needs a direction: reach back until the chord is long enough to have one.
+        while back > 0 and length[row] - length[back] < 0.02:
+            back -= 1
+        ax.annotate(
+            "",
+            (x[row], y[row]),
+            (x[back], y[back]),
+            arrowprops={
+                "arrowstyle": "-|>,head_width=0.28,head_length=0.6",
+                "color": color,
+                "lw": 0.0,
+                "mutation_scale": size,
+                "shrinkA": 0.0,
+                "shrinkB": 0.0,
+            },
+            zorder=4.0,
+        )
+
+
+def firings(ax: Axes, times: Iterable[float], shown: Scale, color: str = BLUE, foot: float = 0.022) -> None:
+    """Mark firing times, s, by small triangles inside the lower edge of the axes."""
+    at = [float(shown.shown(t)) for t in times]
+    ax.plot(
+        at,
+        [foot] * len(at),
+        ls="none",
+        marker="^",
+        ms=4.5,
+        mew=0.0,
+        color=color,
+        transform=ax.get_xaxis_transform(),
+        clip_on=False,
+        zorder=5.0,
+        gid="firings",
+    )
+
+
+def drive_strip(
+    ax: Axes, motions: Sequence[Motion], times: Sequence[FloatArray], until: float, colours: Sequence[str]
+) -> None:
+    """Draw the currents, or the forces, of the drives of motions in the slim strip below a panel.
+
+    Parameters
+    ----------
+    ax : Axes
+        The strip.
+    motions : sequence of Motion
+        Motions of one hammer; if they differ in what is driven, the first decides.
+    times : sequence of array
+        Times at which to draw each, s.
+    until : float
+        End of the time axis, s.
+    colours : sequence of str
+        A colour for each.
+    """
+    quantity = motions[0].drive.quantity
+    time, value = scale("time", until), scale(quantity)
+    low, high = 0.0, 0.0
+    for number, (motion, grid, colour) in enumerate(zip(motions, times, colours, strict=True)):
+        if motion.drive.quantity != quantity:
+            continue
+        values = value.shown(motion.drive.value(grid))
+        low, high = min(low, float(values.min())), max(high, float(values.max()))
+        gid = f"{quantity} {number + 1}" if len(motions) > 1 else str(quantity)
+        curve(ax, time.shown(grid), values, gid, colour, lw=THIN)
+    room = 0.15 * (high - low) or 1.0
+    ax.set_ylim(low - room, high + 1.6 * room)
+    ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
+    label(ax, "x", time)
+    label(ax, "y", value, "Current\n" if quantity == "current" else "Drive\n")
+
+
+def curve(ax: Axes, x: FloatArray, y: FloatArray, gid: str, color: str = BLUE, **options: Any) -> None:
+    """Draw a curve with a name by which it is found again."""
+    (line,) = ax.plot(x, y, color=color, label=CURVE + gid, **{"lw": LINE, **options})
+    line.set_gid(gid)

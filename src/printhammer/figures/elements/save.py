@@ -1,0 +1,102 @@
+"""Figures as files: SVG and PDF for print, PNG for the screen; the same figure gives the same bytes."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.errors import InputError
+from printhammer.figures.elements.style import in_style
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure
+
+FORMATS: Final = ("svg", "pdf", "png")
+
+DOTS_PER_INCH: Final = 200.0
+"""Of a PNG, unless told otherwise."""
+
+_METADATA: Final[dict[str, dict[str, Any]]] = {
+    # Neither dates nor versions, which would make equal figures differ.
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+    "png": {"Software": None},
+}
+
+
+def picture(figure: Figure, kind: str, *, dpi: float = DOTS_PER_INCH) -> bytes:
+    """Return the contents of a file with a figure.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    kind : str
+        One of `FORMATS`.
+    dpi : float, optional
+        Dots per inch of a PNG.
+    """
+    buffer = BytesIO()
+    with in_style():
+        figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
+    return buffer.getvalue()
+
+
+def save(
+    figure: Figure,
+    folder: str | Path,
+    name: str,
+    *,
+    formats: Sequence[str] = FORMATS,
+    dpi: float = DOTS_PER_INCH,
+) -> list[Path]:
+    """Write a figure into a folder, which is made if it is missing.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    folder : path
+        Where to.
+    name : str
+        Name of the files, without suffix.
+    formats : sequence of str, optional
+        Of "svg", "pdf" and "png".
+    dpi : float, optional
+        Dots per inch of the PNG.
+
+    Returns
+    -------
+    list of Path
+        The files, in the order of `formats`.
+
+    Raises
+    ------
+    InputError
+        A format is not known, or the folder cannot be written to; files there before stay as they are.
+    """
+    unknown = [kind for kind in formats if kind not in FORMATS]
+    if unknown:
+        raise InputError(f"format = {unknown[0]!r}, expected one of {', '.join(FORMATS)}")
+    target = Path(folder)
+    paths = {kind: target / f"{name}.{kind}" for kind in formats}
+    drafts = {kind: target / f".{name}.{kind}.part" for kind in formats}
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        try:
+            for kind, draft in drafts.items():
+                draft.write_bytes(picture(figure, kind, dpi=dpi))
+            # All or none, so that an interrupted call leaves no files of two figures under one name.
+            for kind, draft in drafts.items():
+                draft.replace(paths[kind])
+        finally:
+            for draft in drafts.values():
+                draft.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{target}: the figure {name} cannot be written ({error.strerror or error})"
+        ) from None
+    return list(paths.values())

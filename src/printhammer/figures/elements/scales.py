@@ -1,0 +1,141 @@
+"""Axes in both unit systems, as in the paper: SI left and below, inches and pounds right and above."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, Literal
+
+from printhammer.units import from_si
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    from matplotlib.axes import Axes
+    from matplotlib.axes._secondary_axes import SecondaryAxis
+
+    from printhammer.support.arrays import FloatArray
+
+Name = Literal["displacement", "velocity", "force", "time", "current"]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How a quantity is shown.
+
+    Attributes
+    ----------
+    label : str
+        Name on the axis.
+    si : str
+        SI unit of the numbers inside.
+    unit : str
+        Unit of the numbers drawn.
+    other : str
+        Unit of the opposite axis; empty for none.
+    """
+
+    label: str
+    si: str
+    unit: str
+    other: str = ""
+
+    @property
+    def factor(self) -> float:
+        """Number drawn per SI unit."""
+        return _factor(self.si, self.unit)
+
+    @property
+    def ratio(self) -> float:
+        """Number on the opposite axis per number drawn."""
+        return _factor(self.si, self.other) / self.factor
+
+    @property
+    def sign(self) -> str:
+        """The unit drawn, as it is written on the axis."""
+        return _SIGNS.get(self.unit, self.unit)
+
+    def shown(self, values: npt.ArrayLike) -> FloatArray:
+        """Return values in SI as the numbers drawn."""
+        import numpy as np
+
+        return np.asarray(values, dtype=np.float64) * self.factor
+
+
+_SIGNS: Final = {"um": "µm", "mil": "10⁻³ in"}
+_SCALES: Final[dict[str, tuple[tuple[float, Scale], ...]]] = {
+    "displacement": (
+        (5e-3, Scale("Displacement", "m", "um", "mil")),
+        (5.0, Scale("Displacement", "m", "mm", "in")),
+        (float("inf"), Scale("Displacement", "m", "m", "in")),
+    ),
+    "velocity": ((float("inf"), Scale("Velocity", "m/s", "m/s", "in/s")),),
+    "force": ((float("inf"), Scale("Force", "N", "N", "lbf")),),
+    "time": (
+        (0.5, Scale("Time", "s", "ms")),
+        (float("inf"), Scale("Time", "s", "s")),
+    ),
+    "current": ((float("inf"), Scale("Current", "A", "A")),),
+}
+
+
+def scale(name: Name, largest: float = 0.0) -> Scale:
+    """Return how a quantity is shown.
+
+    Parameters
+    ----------
+    name : str
+        The quantity.
+    largest : float, optional
+        Largest absolute value, SI; hammers far from the size of the paper's get larger units.
+
+    Returns
+    -------
+    Scale
+        Units and factors.
+    """
+    return next(found for limit, found in _SCALES[name] if largest <= limit)
+
+
+def label(ax: Axes, side: Literal["x", "y"], shown: Scale, name: str = "") -> SecondaryAxis | None:
+    """Name an axis with its unit and put the other unit system on the opposite side.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes whose data are in `shown.unit`.
+    side : str
+        "x" or "y".
+    shown : Scale
+        The quantity.
+    name : str, optional
+        Other name than that of the scale.
+
+    Returns
+    -------
+    SecondaryAxis or None
+        The opposite axis, if there is one.
+    """
+    name = name or shown.label
+    text = f"{name}  [{shown.sign}]".replace("\n  ", "\n")
+    if side == "x":
+        ax.set_xlabel(text)
+    else:
+        ax.set_ylabel(text)
+    if not shown.other:
+        ax.tick_params(axis=side, top=side == "x", right=side == "y")
+        return None
+    ratio = shown.ratio
+    functions = (lambda values: values * ratio, lambda values: values / ratio)
+    other = f"[{_SIGNS.get(shown.other, shown.other)}]"
+    if side == "x":
+        opposite = ax.secondary_xaxis("top", functions=functions)
+        opposite.set_xlabel(other)
+    else:
+        opposite = ax.secondary_yaxis("right", functions=functions)
+        opposite.set_ylabel(other)
+    return opposite
+
+
+@lru_cache(maxsize=64)
+def _factor(si: str, unit: str) -> float:
+    return from_si(1.0, si, unit)

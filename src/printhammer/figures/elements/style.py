@@ -1,0 +1,135 @@
+"""The one style of all figures: colours, widths, sizes.
+
+Figures are made with matplotlib's objects, never with pyplot, so that nothing global is left behind. Colours
+are those of M. Okabe and K. Ito (2008), which the colour-blind can tell apart; what matters also differs in
+dash or label.
+"""
+
+from __future__ import annotations
+
+from functools import wraps
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any, Final, ParamSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.hammer.hammer import Hammer
+
+_P = ParamSpec("_P")
+
+INK: Final = "#1a1a1a"
+MUTED: Final = "#6b6b6b"
+FAINT: Final = "#d9d9d9"
+BLUE: Final = "#0072b2"
+ORANGE: Final = "#d55e00"
+GREEN: Final = "#009e73"
+YELLOW: Final = "#e69f00"
+FAMILY: Final = ("#7db7dc", "#4f9bcb", "#2f7fb9", "#1a619f", "#08417a")
+"""Light to dark, for a family of curves with one parameter."""
+
+SURFACES: Final = {"backstop": "#8a8a8a", "pack": YELLOW}
+"""Tints of the surfaces that the armature touches."""
+
+WIDTH: Final = 6.4
+"""Width of a figure, in."""
+
+TEXT, SMALL, TINY = 9.0, 8.0, 6.5
+LINE, THIN, HAIR = 1.4, 0.9, 0.6
+_LINE_OF_REMARK: Final = 112
+
+RC: Final[dict[str, Any]] = {
+    "axes.edgecolor": INK,
+    "axes.formatter.useoffset": False,
+    "axes.grid": False,
+    "axes.labelcolor": INK,
+    "axes.labelsize": TEXT,
+    "axes.linewidth": HAIR,
+    "axes.unicode_minus": True,
+    "axes.xmargin": 0.0,
+    "figure.constrained_layout.h_pad": 0.05,
+    "figure.constrained_layout.w_pad": 0.06,
+    "figure.dpi": 100.0,
+    "figure.facecolor": "white",
+    "font.family": ["DejaVu Sans"],
+    "font.size": TEXT,
+    "lines.dash_capstyle": "butt",
+    "lines.linewidth": LINE,
+    "lines.solid_joinstyle": "round",
+    "mathtext.fontset": "dejavusans",
+    "patch.linewidth": HAIR,
+    "path.simplify": True,
+    "path.simplify_threshold": 0.05,
+    "pdf.fonttype": 42,
+    "savefig.bbox": None,
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "printhammer",
+    "text.color": INK,
+    "text.usetex": False,
+    "xtick.color": INK,
+    "xtick.direction": "in",
+    "xtick.labelsize": SMALL,
+    "xtick.major.size": 3.5,
+    "xtick.major.width": HAIR,
+    "ytick.color": INK,
+    "ytick.direction": "in",
+    "ytick.labelsize": SMALL,
+    "ytick.major.size": 3.5,
+    "ytick.major.width": HAIR,
+}
+"""Settings in force while a figure is made and while it is saved, whatever the user's own are."""
+
+
+def in_style() -> AbstractContextManager[None]:
+    """Return a context in which matplotlib's settings are those of the style."""
+    from matplotlib import rc_context
+
+    settings: Any = RC  # matplotlib's own type lists every setting by name
+    return rc_context(settings)
+
+
+def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
+    """Have a function make its figure in the style, as a decorator."""
+
+    @wraps(function)
+    def wrapped(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
+        with in_style():
+            return function(*args, **kwargs)
+
+    return wrapped
+
+
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """Return an empty figure, sizes in inches, whose axes will be laid out without overlap."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
+    """Divide a figure into a panel and a slim strip below it on the same time axis."""
+    grid = figure.add_gridspec(2, 1, height_ratios=(ratio, 1.0), hspace=0.03)
+    panel = figure.add_subplot(grid[0])
+    strip = figure.add_subplot(grid[1], sharex=panel)
+    panel.tick_params(axis="x", labelbottom=False)
+    strip.locator_params(axis="y", nbins=2)
+    return panel, strip
+
+
+def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
+    """Write below a figure which hammer it shows, how its constants came about, and remarks on the run."""
+    statuses = {constant.status for constant in hammer.constants.values()}
+    known = [status for status in ("reconstructed", "assumed") if status in statuses]
+    told = [hammer.name, hammer.fingerprint[:8]]
+    if known:
+        told.append(f"constants in part {' and '.join(known)}")
+    text = figure.supxlabel(" · ".join(told), x=0.99, ha="right", fontsize=TINY, color=MUTED)
+    text.set_in_layout(True)
+    shown = [line for remark in remarks if remark for line in wrap(remark, _LINE_OF_REMARK)]
+    if shown:
+        figure.suptitle("\n".join(shown), x=0.01, ha="left", fontsize=SMALL, color=ORANGE)

@@ -1,0 +1,148 @@
+"""Figure 11: Poincaré plots at gradually increasing rates, with the verdict on each."""
+
+from __future__ import annotations
+
+import math
+from string import ascii_lowercase
+from typing import TYPE_CHECKING, Final, Literal
+
+from printhammer.errors import InputError
+from printhammer.figures.chaos.strobe import RING, panel, scales_of, shown_period
+from printhammer.figures.elements.curves import waveform_of
+from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.scales import label
+from printhammer.figures.elements.style import INK, SMALL, new_figure, sign, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.chaos import Strobe
+    from printhammer.figures.elements.scales import Scale
+    from printhammer.hammer.hammer import Hammer
+
+PERIODS: Final = (
+    1.35e-3,
+    1.3e-3,
+    1.25e-3,
+    1.2e-3,
+    1.15e-3,
+    1.1e-3,
+    1.05e-3,
+    1e-3,
+    0.95e-3,
+    0.9e-3,
+    0.85e-3,
+    0.8e-3,
+)
+"""Strobe times of the panels, s: from 1.35 ms down to 0.80 ms."""
+
+POINTS: Final = 200
+"""Points in each panel."""
+
+_COLUMNS: Final = 3
+
+
+@styled
+def figure11(
+    hammer: Hammer,
+    *,
+    strobes: Sequence[Strobe] | None = None,
+    periods: Sequence[float | str] = PERIODS,
+    points: int = POINTS,
+    printed: Mapping[float, str] | None = None,
+) -> Figure:
+    """Draw Fig. 11: the states at the first firings of trains, a panel for each strobe time.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        Any hammer with a waveform.
+    strobes : sequence of Strobe, optional
+        Strobe points from `printhammer.chaos.strobes`; by default those of the hammer.
+    periods : sequence, optional
+        Strobe times, s, or text with a unit.
+    points : int, optional
+        Points in each panel, from the first firing on.
+    printed : mapping, optional
+        Verdicts that the paper prints, such as "period-2", by strobe time, s; each is written in its panel
+        where the verdict on the points is another.
+
+    Returns
+    -------
+    Figure
+        The figure. The vertical line is the backstop; circles are the last points of a train with a period
+        of up to 8 firings.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform or no rest state.
+    """
+    from printhammer.chaos import strobes as strobed
+
+    waveform_of(hammer)
+    found = strobed(hammer, periods, points=points) if strobes is None else list(strobes)
+    if not found:
+        raise InputError("strobes: expected at least one train to draw")
+    window = found[0].window
+    way, speed = scales_of(window)
+    rows = -(-len(found) // _COLUMNS)
+    columns = min(_COLUMNS, len(found))
+    figure = new_figure(0.7 + 1.75 * rows)
+    grid = figure.add_gridspec(rows, columns, wspace=0.02, hspace=0.02)
+    for i, strobe in enumerate(found):
+        row, column = divmod(i, columns)
+        ax = figure.add_subplot(grid[row, column])
+        panel(ax, strobe, window, way, speed, size=1.6, printed=_printed(strobe, printed or {}))
+        if len(found) <= len(ascii_lowercase):
+            note(ax, f"({ascii_lowercase[i]})", (0.03, 0.96), color=INK)
+        ax.locator_params(axis="both", nbins=5)
+        lowest = i + columns >= len(found)
+        ax.tick_params(labelbottom=lowest, labelleft=column == 0)
+        _edge(ax, "x", way, lowest, row == 0)
+        _edge(ax, "y", speed, column == 0, i + 1 == len(found) or column == columns - 1)
+    if any(line.get_gid() == "cycle" for ax in figure.axes for line in ax.lines):
+        _key(figure)
+    sign(figure, hammer, *_remarks(found))
+    return figure
+
+
+def _printed(strobe: Strobe, verdicts: Mapping[float, str]) -> str:
+    """Return what the paper says of a strobe time; empty if nothing."""
+    said = (name for period, name in verdicts.items() if math.isclose(period, strobe.period, rel_tol=1e-9))
+    return next(said, "")
+
+
+def _key(figure: Figure) -> None:
+    """Write below the panels what the circles are."""
+    from matplotlib.lines import Line2D
+
+    figure.legend(
+        handles=[Line2D([], [], label="last points of a periodic train", **RING)],
+        loc="outside lower left",
+        fontsize=SMALL,
+        frameon=False,
+        handletextpad=0.2,
+    )
+
+
+def _edge(ax: Axes, side: Literal["x", "y"], shown: Scale, here: bool, opposite: bool) -> None:
+    """Name the axis of a panel where it lies on an edge of the figure, and the other unit system opposite."""
+    other = label(ax, side, shown)
+    if not here:
+        ax.set(**{f"{side}label": ""})
+    if other is not None and not opposite:
+        other.remove()
+        ax.tick_params(axis=side, top=side == "x", right=side == "y")
+
+
+def _remarks(strobes: Sequence[Strobe]) -> list[str]:
+    """Return what went wrong in the runs."""
+    return [
+        f"The run at {shown_period(strobe.period)} ended early: {strobe.status}."
+        for strobe in strobes
+        if not strobe.ok
+    ]

@@ -1,0 +1,252 @@
+"""Figure 8: displacement curves at gradually rising rates, laminated into a surface, hidden lines removed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from printhammer.figures.elements.map_marks import (
+    HIGHEST,
+    LOWEST,
+    chart_of,
+    drawable,
+    failures,
+    limits_of,
+    scales_of,
+    sign_map,
+)
+from printhammer.figures.elements.style import BLUE, HAIR, INK, MUTED, SMALL, new_figure, styled
+from printhammer.maps.layout import places_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.figures.elements.scales import Scale
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+CURVES: Final = 81
+"""Number of curves."""
+
+_TIMES: Final = 1361
+_LEAN: Final = (0.19, 0.66)
+"""Way from the first curve to the last, to the right and upward, in units of the width of the picture."""
+
+_ACROSS: Final = 0.80
+"""Width of a curve."""
+
+_TALL: Final = 0.22
+"""Height of the displacements, from the lowest to the highest place."""
+
+_TICK: Final = 0.008
+
+_SHEETS: Final = 2.0
+"""One for curves and sheets alike, so that they are drawn in the order in which they are made."""
+
+_FLAT: Final = 4e-4
+"""How far a drawn curve may be from the computed one, in the units of the picture: 0.15 points."""
+
+_POST: Final = 0.13
+"""Way from the displacement axis to the curves."""
+
+
+@dataclass(frozen=True)
+class _View:
+    """Oblique projection of time, s, displacement, m, and rate, Hz, onto the picture."""
+
+    times: tuple[float, float]
+    heights: tuple[float, float]
+    rates: tuple[float, float]
+
+    def depth(self, rate: float) -> float:
+        first, last = self.rates
+        return (rate - first) / (last - first) if last > first else 0.0
+
+    def across(self, t: npt.ArrayLike, rate: float) -> FloatArray:
+        first, last = self.times
+        way = (np.asarray(t, dtype=np.float64) - first) / (last - first)
+        return np.asarray(_ACROSS * way + _LEAN[0] * self.depth(rate))
+
+    def up(self, x: npt.ArrayLike, rate: float) -> FloatArray:
+        low, high = self.heights
+        way = (np.asarray(x, dtype=np.float64) - low) / (high - low)
+        return np.asarray(_TALL * way + _LEAN[1] * self.depth(rate))
+
+
+@styled
+def figure8(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None) -> Figure:
+    """Draw Fig. 8: displacement against time, one curve for each rate, each hiding those behind it.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        Any hammer with a waveform; not looked at where a map is given.
+    chart : xarray.Dataset, optional
+        A map from `printhammer.frequency_map`, of which evenly chosen rates are drawn; by default the one of
+        the hammer.
+    rates : array, optional
+        Rates of the map that is computed, Hz.
+
+    Returns
+    -------
+    Figure
+        The figure. The parts of a curve inside the pack are blue; the gids of the curves are "rate" and their
+        numbers.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform or no rest state, or the map fewer than two times.
+    """
+    if chart is None:
+        chart = chart_of(hammer, np.linspace(LOWEST, HIGHEST, CURVES) if rates is None else rates, _TIMES)
+    drawable(chart)
+    scales = scales_of(chart)
+    places = places_of(chart)
+    low, high = limits_of(chart)
+    every = chart["rate"].values
+    time = chart["time"].values
+    view = _View(
+        (float(time[0]), float(time[-1])),
+        (min(low, *places.values(), high), max(high, *places.values())),
+        (float(every[0]), float(every[-1])),
+    )
+    figure = new_figure(4.7)
+    ax = figure.add_subplot()
+    ax.set_axis_off()
+    rows = np.unique(np.linspace(0, len(every) - 1, min(CURVES, len(every))).round().astype(int))
+    for row in rows[::-1]:
+        _sheet(ax, view, time, chart["displacement"].values[row], float(every[row]), places.get("pack"))
+    _time_axis(ax, view, scales.time)
+    _height_axis(ax, view, scales.way, places)
+    _rate_axis(ax, view, scales.rate)
+    ax.set_xlim(-0.26, 1.10)
+    ax.set_ylim(-0.09, _LEAN[1] + _TALL)
+    sign_map(figure, chart, failures(chart))
+    return figure
+
+
+def _sheet(ax: Axes, view: _View, time: FloatArray, x: FloatArray, rate: float, front: float | None) -> None:
+    """Draw one curve over a white sheet that hides what is behind."""
+    known = np.isfinite(x)
+    if not known.any():
+        return
+    t, x = time[known], x[known].astype(np.float64)
+    across, up = thinned(view.across(t, rate), view.up(x, rate), _FLAT)
+    foot = float(view.up(view.heights[0], rate))
+    ax.fill([across[0], *across, across[-1]], [foot, *up, foot], color="white", lw=0.0, zorder=_SHEETS)
+    (line,) = ax.plot(across, up, color=INK, lw=0.4, zorder=_SHEETS)
+    line.set_gid(f"rate {rate:.6g}")
+    if front is not None and (x > front).any():
+        level = float(view.up(front, rate))
+        (line,) = ax.plot(*_above(across, up, level), color=BLUE, lw=0.6, zorder=_SHEETS)
+        line.set_gid(f"in the pack at {rate:.6g}")
+
+
+def thinned(x: FloatArray, y: FloatArray, room: float) -> tuple[FloatArray, FloatArray]:
+    """Leave out the points of a curve without which it stays within `room` of itself, measured along y.
+
+    After D. Douglas and T. Peucker, Cartographica 10 (1973) 112.
+    """
+    keep = np.zeros(len(x), dtype=np.bool_)
+    keep[[0, -1]] = True
+    pieces = [(0, len(x) - 1)]
+    while pieces:
+        first, last = pieces.pop()
+        if last - first < 2:
+            continue
+        share = (x[first : last + 1] - x[first]) / (x[last] - x[first])
+        off = np.abs(y[first : last + 1] - y[first] - share * (y[last] - y[first]))
+        far = first + int(off.argmax())
+        if off[far - first] > room:
+            keep[far] = True
+            pieces += [(first, far), (far, last)]
+    return x[keep], y[keep]
+
+
+def _above(x: FloatArray, y: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
+    """Return the parts of a curve above a level, with NaN between them."""
+    crossing = np.flatnonzero((y[1:] - level) * (y[:-1] - level) < 0.0)
+    share = (level - y[crossing]) / (y[crossing + 1] - y[crossing])
+    x = np.insert(x, crossing + 1, x[crossing] + share * (x[crossing + 1] - x[crossing]))
+    y = np.insert(y, crossing + 1, level)
+    return x, np.where(y >= level, y, np.nan)
+
+
+def _time_axis(ax: Axes, view: _View, time: Scale) -> None:
+    first, last = view.times
+    foot = float(view.up(view.heights[0], view.rates[0]))
+    ax.plot(view.across([first, last], view.rates[0]), [foot, foot], color=INK, lw=HAIR)
+    for tick in _ticks(float(time.shown(first)), float(time.shown(last)), 9):
+        at = float(view.across(tick / time.factor, view.rates[0]))
+        ax.plot([at, at], [foot, foot - _TICK], color=INK, lw=HAIR)
+        _text(ax, f"{tick:g}", (at, foot - _TICK), (0.0, -2.0), ha="center", va="top")
+    middle = float(view.across(0.5 * (first + last), view.rates[0]))
+    _text(
+        ax,
+        f"Time from the first firing  [{time.sign}]",
+        (middle, foot - _TICK),
+        (0.0, -14.0),
+        ha="center",
+        va="top",
+        fontsize="medium",
+    )
+
+
+def _height_axis(ax: Axes, view: _View, way: Scale, places: dict[str, float]) -> None:
+    low, high = view.heights
+    at = float(view.across(view.times[0], view.rates[0])) - _POST
+    ends = [float(view.up(end, view.rates[0])) for end in (low, high)]
+    ax.plot([at, at], ends, color=INK, lw=HAIR)
+    for tick in _ticks(float(way.shown(low)), float(way.shown(high)), 4):
+        up = float(view.up(tick / way.factor, view.rates[0]))
+        ax.plot([at, at - _TICK], [up, up], color=INK, lw=HAIR)
+        _text(ax, f"{tick:g}", (at - _TICK, up), (-2.0, 0.0), ha="right", va="center")
+    for name, place in places.items():
+        up = float(view.up(place, view.rates[0]))
+        colour = BLUE if name == "pack" else MUTED
+        ax.plot([at, at + _TICK], [up, up], color=colour, lw=HAIR, gid=name)
+        _text(ax, name, (at + _TICK, up), (2.0, 0.0), ha="left", va="center", color=colour)
+    middle = 0.5 * (ends[0] + ends[1])
+    text = f"Displacement  [{way.sign}]"
+    _text(ax, text, (at, middle), (-26.0, 0.0), ha="right", va="center", fontsize="medium", rotation=90.0)
+
+
+def _rate_axis(ax: Axes, view: _View, shown: Scale) -> None:
+    end, floor = view.times[1], view.heights[0]
+    first, last = view.rates
+    across = [float(view.across(end, rate)) for rate in (first, last)]
+    up = [float(view.up(floor, rate)) for rate in (first, last)]
+    ax.plot(across, up, color=INK, lw=HAIR)
+    for tick in _ticks(float(shown.shown(first)), float(shown.shown(last)), 5):
+        rate = tick / shown.factor
+        at = float(view.across(end, rate)), float(view.up(floor, rate))
+        ax.plot([at[0], at[0] + _TICK], [at[1], at[1]], color=INK, lw=HAIR)
+        _text(ax, f"{tick:g}", (at[0] + _TICK, at[1]), (2.0, 0.0), ha="left", va="center")
+    middle = 0.5 * (across[0] + across[1]), 0.5 * (up[0] + up[1])
+    _text(
+        ax,
+        f"{shown.label}  [{shown.sign}]",
+        middle,
+        (32.0, -4.0),
+        ha="center",
+        va="center",
+        fontsize="medium",
+        rotation=float(np.degrees(np.arctan2(_LEAN[1], _LEAN[0]))),
+    )
+
+
+def _ticks(low: float, high: float, most: int) -> list[float]:
+    ticks = MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+    return [float(tick) for tick in ticks if low <= tick <= high * (1.0 + 1e-12)]
+
+
+def _text(ax: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **options: Any) -> None:
+    style = {"fontsize": SMALL, "color": INK, **options}
+    ax.annotate(text, at, xytext=shift, textcoords="offset points", annotation_clip=False, **style)

@@ -1,0 +1,1 @@
+"""Pictures of printed pages, quality and tolerance."""

@@ -1,0 +1,354 @@
+"""The printed page: what came on paper, what was wanted, how far the dots are off, and the worst place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.figures.elements.ink import Sheet, coloured, inked
+from printhammer.figures.elements.scales import Scale
+from printhammer.figures.elements.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    MUTED,
+    ORANGE,
+    SMALL,
+    THIN,
+    TINY,
+    sign,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import EllipseCollection
+    from matplotlib.figure import Figure
+
+    from printhammer.printing.page import Page
+    from printhammer.support.arrays import FloatArray
+
+View = Literal["page", "zoom", "sheet"]
+VIEWS: Final = get_args(View)
+"""The page with all that there is to see; its worst place alone; the paper alone, at its true size."""
+
+ZOOM_SHAPE: Final = 3.5
+"""How many times wider than the height of the wires the worst place is."""
+
+_WIDTH: Final = 7.6
+_SIDE: Final = 0.2
+_LABEL: Final = 0.24
+_GAP: Final = 0.1
+_BESIDE: Final = 0.15
+_UPRIGHT: Final = 0.5
+_BAR: Final = 1.5
+_LEAST_MARK: Final = 1.8
+_NEUTRAL: Final = "#c6ccd1"
+_TALLEST: Final = 4.5
+_LARGEST: Final = 0.1
+_FOOT: Final = 0.62
+_INCH: Final = 25.4e-3
+_FINENESS: Final = 10
+_ACROSS: Final = 2000
+_ZOOM_FINENESS: Final = 50
+_SHEET_FINENESS: Final = 16
+_MICRONS: Final = Scale("Placement error", "m", "um")
+
+
+@styled
+def plot(page: Page, view: View = "page") -> Figure:
+    """Draw a page.
+
+    Parameters
+    ----------
+    page : Page
+        From `printhammer.print_page`.
+    view : str, optional
+        "page": from the top, what was printed, what was wanted, the difference, and the worst place; "zoom":
+        the worst place alone; "sheet": the paper alone, at its true size.
+
+    Returns
+    -------
+    Figure
+        The figure. In the difference a dot has the colour of its placement error, and crosses are lost dots.
+        In the worst place rings are where dots are wanted, and crosses lost dots.
+
+    Raises
+    ------
+    InputError
+        There is no such view.
+    """
+    if view == "sheet":
+        return _sheet_alone(page)
+    if view == "zoom":
+        return _zoom_alone(page)
+    if view != "page":
+        raise InputError(f"view = {view!r}, expected one of {', '.join(VIEWS)}")
+    sheet, place = whole_sheet(page), zoomed_sheet(page)
+    # Side by side where the paper is upright, else one below the other.
+    beside = sheet.height > _UPRIGHT * sheet.width
+    wide = _WIDTH - 2.0 * _SIDE
+    each = (wide - 2.0 * _BESIDE) / 3.0 if beside else wide
+    scale = min(each / sheet.width, _TALLEST / sheet.height, _LARGEST / page.head.pitch)
+    strip = scale * sheet.height
+    sheet = replace(sheet, right=sheet.left + each / scale)
+    zoom = wide * place.height / place.width
+    rows = 1 if beside else 3
+    height = rows * (_LABEL + strip + _GAP) + (1.5 + beside) * _LABEL + zoom + _FOOT + 0.1
+    figure, top = _figure(height), height - 0.1
+    if beside:
+        top -= _LABEL
+        style: dict[str, Any] = {"fontsize": SMALL, "color": MUTED, "va": "center"}
+        figure.text(_SIDE / _WIDTH, (top + 0.1) / height, _printed_title(page), **style)
+    axes = []
+    for number, name in enumerate(("Printed" if beside else _printed_title(page), "Wanted", "Difference")):
+        if number == 0 or not beside:
+            top -= _LABEL
+        left = _SIDE + (number * (each + _BESIDE) if beside else 0.0)
+        axes.append(_panel(figure, sheet, top, strip, name, left))
+        if number == 2 or not beside:
+            top -= strip + _GAP
+    across, down = page.places
+    fine = max(page.head.pitch / _FINENESS, sheet.width / _ACROSS)
+    _paper(axes[0], sheet, *_dots(page), page.head.wire_diameter, fine)
+    full = np.full(page.line.shape, page.head.density)
+    _paper(axes[1], sheet, *page.intended, full, page.head.wire_diameter, fine)
+    _differences(figure, axes[2], page, across, down, beside * _LABEL)
+    top -= 1.5 * _LABEL
+    _zoom(_panel(figure, place, top, zoom, _zoom_title(page)), place, page)
+    _tell(figure, page)
+    return figure
+
+
+def whole_sheet(page: Page) -> Sheet:
+    """Return the paper of a page: all its print lines, with a margin about them."""
+    head, pattern = page.head, page.pattern
+    margin = 2.0 * head.wire_diameter
+    across = (pattern.slots - 1) * head.pitch
+    down = (pattern.lines - 1) * head.line_pitch + (head.wires - 1) * head.wire_pitch
+    return Sheet(-margin, across + margin, -margin, down + margin)
+
+
+def zoom_slots(page: Page) -> int:
+    """Return the slots of the worst place that are shown."""
+    return max(1, round(ZOOM_SHAPE * page.head.wires * page.head.wire_pitch / page.head.pitch))
+
+
+def zoomed_sheet(page: Page) -> Sheet:
+    """Return the paper about the worst place of a page."""
+    head, slots = page.head, zoom_slots(page)
+    line, first = page.worst_place(slots)
+    top = line * head.line_pitch
+    last = first + slots - 1
+    margin = 1.2 * head.pitch
+    return Sheet(
+        first * head.pitch - margin,
+        last * head.pitch + margin,
+        top - margin,
+        top + (head.wires - 1) * head.wire_pitch + margin,
+    )
+
+
+def _figure(height: float, width: float = _WIDTH) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height))
+    figure.set_layout_engine("none")
+    return figure
+
+
+def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, left: float = _SIDE) -> Axes:
+    """Return axes for a sheet: their height, their top above the bottom of the figure, their left, in."""
+    width, whole = figure.get_size_inches()
+    wide = height * sheet.width / sheet.height
+    ax = figure.add_axes((left / width, (top - height) / whole, wide / width, height / whole))
+    ax.set_xlim(sheet.left, sheet.right)
+    ax.set_ylim(sheet.bottom, sheet.top)
+    ax.set_xticks([])
+    ax.set_yticks([])
+    for spine in ax.spines.values():
+        spine.set_color(FAINT)
+    ax.set_title(title, loc="left", fontsize=SMALL, color=MUTED, pad=3.0)
+    return ax
+
+
+def _printed_title(page: Page) -> str:
+    return f"Printed at {page.rate:.6g} Hz, {page.strategy}, carriage at {page.speed:.3g} m/s"
+
+
+def _zoom_title(page: Page) -> str:
+    line, first = page.worst_place(zoom_slots(page))
+    last = min(first + zoom_slots(page), page.pattern.slots)
+    return (
+        f"The worst place: print line {line + 1}, slots {first + 1} to {last} (rings: where dots are wanted)"
+    )
+
+
+def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return places and densities of all that is on the paper, extra contacts among it."""
+    on = page.printed
+    (across, down), (more_across, more_down) = page.places, page.extra_places
+    return (
+        np.concatenate([across[on], more_across]),
+        np.concatenate([down[on], more_down]),
+        np.concatenate([page.density[on], page.extra_density]),
+    )
+
+
+def _paper(
+    ax: Axes,
+    sheet: Sheet,
+    across: FloatArray,
+    down: FloatArray,
+    density: FloatArray,
+    diameter: float,
+    finest: float,
+) -> None:
+    picture = coloured(inked(sheet, across, down, density, diameter, finest))
+    ax.imshow(
+        picture,
+        extent=(sheet.left, sheet.right, sheet.bottom, sheet.top),
+        aspect="auto",
+        interpolation="antialiased",
+    )
+
+
+def _discs(
+    ax: Axes, across: FloatArray, down: FloatArray, diameter: float, **options: Any
+) -> EllipseCollection:
+    from matplotlib.collections import EllipseCollection
+
+    size = np.full(across.shape, diameter)
+    discs = EllipseCollection(
+        size,
+        size,
+        np.zeros(across.shape),
+        units="xy",
+        offsets=np.column_stack([across, down]),
+        offset_transform=ax.transData,
+        **options,
+    )
+    ax.add_collection(discs, autolim=False)
+    return discs
+
+
+def _in_points(ax: Axes, length: float) -> float:
+    """Return how long a length on the paper, m, is drawn, points."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    width, _height = figure.get_size_inches()
+    left, right = ax.get_xlim()
+    return float(72.0 * width * ax.get_position().width * length / (right - left))
+
+
+def _differences(
+    figure: Figure, ax: Axes, page: Page, across: FloatArray, down: FloatArray, above: float
+) -> None:
+    """Draw where dots are off, and a scale above the panel, by some inches more than need be."""
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+    on, head = page.printed, page.head
+    error = _MICRONS.shown(page.placement_error[on])
+    # At least as wide as the limits, so that nothing shines that is nothing.
+    bound = float(_MICRONS.shown(page.limits.arrival * page.speed))
+    widest = max(float(np.abs(error).max(initial=0.0)), bound)
+    colours = LinearSegmentedColormap.from_list("off", [BLUE, _NEUTRAL, ORANGE])
+    discs = _discs(
+        ax,
+        across[on],
+        down[on],
+        head.wire_diameter,
+        array=error,
+        cmap=colours,
+        norm=Normalize(-widest, widest),
+        linewidths=0.0,
+        gid="placement error",
+    )
+    lost_across, lost_down = (part[page.lost] for part in page.intended)
+    mark = max(_in_points(ax, head.wire_diameter), _LEAST_MARK)
+    ax.plot(
+        lost_across, lost_down, ls="none", marker="x", ms=0.9 * mark, mew=0.25 * mark, color=INK, gid="lost"
+    )
+    width, whole = figure.get_size_inches()
+    box = ax.get_position()
+    bar_axes = figure.add_axes(
+        ((_WIDTH - _SIDE - _BAR - 0.75) / width, box.y1 + (0.06 + above) / whole, _BAR / width, 0.09 / whole)
+    )
+    bar = figure.colorbar(discs, cax=bar_axes, orientation="horizontal", ticks=[])
+    bar.outline.set_visible(False)
+    for place, side, text in (
+        (-0.02, "right", f"−{widest:.3g} µm, early"),
+        (1.02, "left", f"late, {widest:.3g} µm"),
+    ):
+        bar_axes.text(
+            place, 0.5, text, ha=side, va="center", fontsize=TINY, color=MUTED, transform=bar_axes.transAxes
+        )
+
+
+def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
+    head = page.head
+    fine = max(head.pitch / _ZOOM_FINENESS, sheet.width / _ACROSS)
+    _paper(ax, sheet, *_dots(page), head.wire_diameter, fine)
+    across, down = page.intended
+    reach = head.pitch
+    near = (across > sheet.left - reach) & (across < sheet.right + reach)
+    near &= (down > sheet.top - reach) & (down < sheet.bottom + reach)
+    on, lost = near & page.printed, near & page.lost
+    mark = _in_points(ax, head.wire_diameter)
+    rings = {"facecolors": "none", "linewidths": min(THIN, 0.07 * mark)}
+    _discs(ax, across[on], down[on], head.wire_diameter, edgecolors=BLUE, gid="wanted", **rings)
+    _discs(ax, across[lost], down[lost], head.wire_diameter, edgecolors=ORANGE, gid="lost", **rings)
+    ax.plot(across[lost], down[lost], ls="none", marker="x", ms=0.4 * mark, mew=0.1 * mark, color=ORANGE)
+    more = near[page.extra_of]
+    extra_across, extra_down = (part[more] for part in page.extra_places)
+    _discs(ax, extra_across, extra_down, head.wire_diameter, edgecolors=GREEN, gid="extra", **rings)
+
+
+def _tell(figure: Figure, page: Page) -> None:
+    """Write below the figure how good the page is."""
+    sign(figure, page.hammer)
+    _width, whole = figure.get_size_inches()
+    left = _SIDE / _WIDTH
+    figure.text(left, 0.4 / whole, summary(page), fontsize=SMALL, color=INK, va="center")
+
+
+def summary(page: Page) -> str:
+    """Return in a line how good a page is."""
+    lost, extra = int(page.lost.sum()), int(page.extra_contacts.sum())
+    told = [f"{page.line.size} dots wanted", f"{int(page.printed.sum())} printed", f"{lost} lost"]
+    if not page.run.all():
+        told.append(f"{int((~page.run).sum())} not run")
+    told.append(f"{extra} extra contacts")
+    if page.printed.any():
+        error = _MICRONS.shown(page.placement_error[page.printed])
+        told.append(f"placement ±{np.std(error):.3g} µm, worst {np.abs(error).max():.3g} µm")
+        told.append(
+            f"darkness {page.darkness[page.printed].min():.2f} to {page.darkness[page.printed].max():.2f}"
+        )
+    return " · ".join(told)
+
+
+def _zoom_alone(page: Page) -> Figure:
+    place = zoomed_sheet(page)
+    wide = _WIDTH - 2.0 * _SIDE
+    height = wide * place.height / place.width
+    figure = _figure(height + 2.5 * _LABEL + _FOOT)
+    title = f"{_printed_title(page)}\n{_zoom_title(page)}"
+    _zoom(_panel(figure, place, _FOOT + height, height, title), place, page)
+    _tell(figure, page)
+    return figure
+
+
+def _sheet_alone(page: Page) -> Figure:
+    sheet = whole_sheet(page)
+    figure = _figure(sheet.height / _INCH, sheet.width / _INCH)
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    ax.set_axis_off()
+    ax.set_xlim(sheet.left, sheet.right)
+    ax.set_ylim(sheet.bottom, sheet.top)
+    _paper(ax, sheet, *_dots(page), page.head.wire_diameter, page.head.pitch / _SHEET_FINENESS)
+    return figure

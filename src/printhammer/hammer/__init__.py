@@ -1,0 +1,1 @@
+"""A hammer: its constants, its file and its statics."""

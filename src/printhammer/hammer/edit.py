@@ -1,0 +1,192 @@
+"""Edits of a hammer file: the same change in plain dictionaries and in the text.
+
+In the text everything else stays as it is, comments and layout too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from printhammer.errors import InputError
+from printhammer.hammer.file import SELECTORS, TEXTS, Body, file_options, kinds_of, model_of, si_unit_of
+from printhammer.support.constants import Constant, Quantity, quantities, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, MutableMapping
+
+    from pydantic import BaseModel
+
+Edit = tuple[str, Any]
+"""A dotted key and the TOML value to put there; None takes the key away."""
+
+
+def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, source: str) -> Edit:
+    """Turn a key and a value as a user gives them into an edit.
+
+    Parameters
+    ----------
+    document : mapping
+        The TOML document to which the edit is meant.
+    key : str
+        Such as "mass", "pack.stiffness", "pack.reloading", or a table such as "backstop".
+    value : object
+        Text with a unit, a number in SI or a `Constant`; the value of an option; a part, a waveform or a
+        mapping for a whole table; None to take something away.
+    status, source : str
+        Of the constants.
+
+    Returns
+    -------
+    Edit
+        For `apply`.
+
+    Raises
+    ------
+    InputError
+        The key is not known, or the value is not a quantity.
+    """
+    section, _, name = key.rpartition(".")
+    if key in SELECTORS:
+        return key, None if value is None else _table(key, value, status, source)
+    if not section:
+        model: type[BaseModel] | None = Body
+    elif section in SELECTORS:
+        selector = SELECTORS[section]
+        kind = document.get(section, {}).get(selector, "") if selector else ""
+        if selector and kind not in kinds_of(section):
+            raise InputError(f"the key {shown(key)} is not known, the hammer has no [{section}]")
+        if name == selector:
+            raise InputError(f"{key} = {shown(value)}: expected a whole table for {section!r} instead")
+        model = model_of(section, kind)
+    else:
+        model = None
+    note = quantities(model).get(name) if model is not None else None
+    texts = tuple(TEXTS) if not section else ()
+    if model is None or (note is None and name not in file_options(model) and name not in texts):
+        raise InputError(f"the key {shown(key)} is not known, expected one such as 'pack.stiffness'")
+    if note is None or value is None:
+        return key, value
+    return key, _constant(key, _si_unit(note, document, section, name), value, status, source)
+
+
+def _si_unit(note: Quantity, document: Mapping[str, Any], section: str, name: str) -> str:
+    """Return the SI unit of a bare number: that of what it replaces, where the constant may have several."""
+    known = document.get(section, {}).get(name) if note.also else None
+    unit = known.get("unit") if isinstance(known, Mapping) else None
+    return note.si if unit is None else si_unit_of(note, unit)
+
+
+def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> dict[str, Any]:
+    from printhammer.units import split
+
+    if isinstance(value, Mapping):
+        whole = {"status": status, "source": source, **value}
+        # Value and unit first, as files are written.
+        return dict(sorted(whole.items(), key=lambda item: item[0] in ("status", "source")))
+    if isinstance(value, Constant):
+        return {"value": value.value, "unit": value.unit, "status": value.status, "source": value.source}
+    if isinstance(value, str):
+        try:
+            number, unit = split(value, si_unit)
+        except InputError as error:
+            raise InputError(f"{key}: {error}") from None
+    else:
+        try:
+            number, unit = float(value), si_unit
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(f"{key} = {shown(value)}: expected a number in {si_unit} or text") from None
+    return {"value": number, "unit": unit, "status": status, "source": source}
+
+
+def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]:
+    """Return the TOML table of a part, a waveform or a mapping of what `edit_of` takes."""
+    selector = SELECTORS[section]
+    given = dict(value) if isinstance(value, Mapping) else _fields(section, value)
+    if selector and given.get(selector) not in kinds_of(section):
+        known = ", ".join(kinds_of(section))
+        raise InputError(f"{section}.{selector} = {shown(given.get(selector))}: expected one of {known}")
+    result: dict[str, Any] = {}
+    if selector:
+        result[selector] = given.pop(selector)
+    for name, entry in given.items():
+        key, item = edit_of({section: result}, f"{section}.{name}", entry, status, source)
+        if item is not None:
+            result[key.rpartition(".")[2]] = item
+    return result
+
+
+def _fields(section: str, value: Any) -> dict[str, Any]:
+    """Return selector, constants and options of a part or waveform object."""
+    selector = SELECTORS[section]
+    kind = getattr(type(value), selector, None) if selector else None
+    if kind not in kinds_of(section) or type(value) is not model_of(section, kind):
+        raise InputError(f"{section} = {shown(value)}: expected a part, a table, or None")
+    if getattr(value, "content", dict)():
+        raise InputError(f"{section}: expected a table that names its file, not one read already")
+    driven = getattr(value, "quantity", "current")
+    fields: dict[str, Any] = {selector: kind}
+    for name, note in quantities(type(value)).items():
+        number = getattr(value, name)
+        unit = note.also[0] if note.also and driven == "force" else note.si
+        fields[name] = None if number is None else {"value": number, "unit": unit}
+    for name in file_options(type(value)):
+        if getattr(value, name) != type(value).model_fields[name].default:
+            fields[name] = getattr(value, name)
+    return fields
+
+
+def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
+    """Return a copy of a plain document with edits made."""
+    result: dict[str, Any] = _copied(document)
+    for key, value in edits:
+        _put(result, key, _copied(value), dict)
+    return result
+
+
+def _copied(value: Any) -> Any:
+    """Return a copy of a plain value: tables and lists are new, what they hold cannot change."""
+    if isinstance(value, Mapping):
+        return {name: _copied(entry) for name, entry in value.items()}
+    return [_copied(entry) for entry in value] if isinstance(value, list) else value
+
+
+def changed_text(text: str, edits: Iterable[Edit]) -> str:
+    """Return the text of a document with edits made; everything else stays as it is, comments too."""
+    import tomlkit
+
+    def inline(value: Mapping[str, Any]) -> Any:
+        table = tomlkit.inline_table()
+        table.update(value)
+        return table
+
+    def table(value: Mapping[str, Any]) -> Any:
+        result = tomlkit.table()
+        for name, entry in value.items():
+            result[name] = inline(entry) if isinstance(entry, Mapping) else entry
+        return result
+
+    document = tomlkit.parse(text)
+    for key, value in edits:
+        section, _, name = key.rpartition(".")
+        if key in SELECTORS and isinstance(value, Mapping):
+            document[key] = table(value)
+        elif section in SELECTORS and section not in document:
+            document[section] = table({name: value})
+        else:
+            multiline = isinstance(value, str) and "\n" in value
+            _put(document, key, tomlkit.string(value, multiline=True) if multiline else value, inline)
+    return tomlkit.dumps(document)
+
+
+def _put(document: MutableMapping[str, Any], key: str, value: Any, table: Callable[..., Any]) -> None:
+    section, _, name = key.rpartition(".")
+    holder: Any = document.setdefault(section, {}) if section else document
+    if value is None:
+        holder.pop(name, None)
+    elif isinstance(value, Mapping) and isinstance(holder.get(name), Mapping) and name not in SELECTORS:
+        # In place, so that a comment behind the constant stays.
+        for part, entry in value.items():
+            holder[name][part] = entry
+    else:
+        holder[name] = table(value) if isinstance(value, Mapping) else value

@@ -1,0 +1,355 @@
+"""Where the armature can rest: the equilibria of a hammer, their stability, and how firmly it is held.
+
+An equilibrium is a displacement at which the static forces cancel: magnet at a constant current, spring,
+elastic force of the backstop, and the loading branch of the pack (as when fresh paper is pressed slowly;
+its equilibria are held up to the hysteresis of the paper). The paper finds the rest state "by an iteration
+on x such that Ft = 0" at zero current, with the armature compressing the backstop.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.hammer.static_force import FAR, HammerLike, StaticForce
+from printhammer.support.roots import Root, bisect, roots
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.support.arrays import FloatArray
+
+__all__ = [
+    "FAR",
+    "Equilibrium",
+    "EquilibriumPicture",
+    "equilibria",
+    "equilibrium_picture",
+    "holding_margin",
+    "positive_intervals",
+    "release_current",
+    "rest_state",
+]
+
+_NEAREST: Final = 1e-18
+_LARGEST_CURRENT: Final = 1e6
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """One equilibrium.
+
+    Attributes
+    ----------
+    x : float
+        Displacement, m.
+    stable : bool
+        Whether the force drives the armature back after a small displacement to either side.
+    frequency : float or None
+        Natural frequency of small undamped oscillations, Hz; None where unstable, on a rigid backstop, or
+        in a pack with memory, which has no single stiffness.
+    surface : str or None
+        "backstop" or "pack" where the armature touches it.
+    """
+
+    x: float
+    stable: bool
+    frequency: float | None
+    surface: str | None
+
+
+@dataclass(frozen=True)
+class EquilibriumPicture:
+    """The statics of a hammer.
+
+    Attributes
+    ----------
+    rest : float or None
+        Rest state at zero current, m.
+    no_rest : str
+        Why there is none; empty where there is one.
+    equilibria : tuple of Equilibrium
+        At zero current, ascending.
+    release_current : float or None
+        Current at which the armature lifts off the backstop, A.
+    x, margin : arrays
+        Displacements from the backstop to the end of the stroke, m, and the holding margin there, N.
+    weakest : tuple (x, margin)
+        Where on that grid the armature is held least, m and N.
+    positive_intervals : tuple of (low, high)
+        Displacements, m, where the net force at zero current drives the armature toward the paper.
+    """
+
+    rest: float | None
+    no_rest: str
+    equilibria: tuple[Equilibrium, ...]
+    release_current: float | None
+    x: FloatArray
+    margin: FloatArray
+    weakest: tuple[float, float]
+    positive_intervals: tuple[tuple[float, float], ...]
+
+
+def rest_state(hammer: HammerLike) -> float:
+    """Return the displacement at which the armature rests at zero current, m.
+
+    With a backstop against which the net force presses: the equilibrium there, compressing it (on a rigid
+    one, its position). Without a magnet, and without a backstop: the nearest stable equilibrium otherwise.
+
+    Raises
+    ------
+    InputError
+        There is none, or a hammer with a magnet does not rest at its backstop.
+    """
+    force = StaticForce(hammer)
+    if hammer.backstop is not None:
+        position = hammer.backstop.position
+        pressing = force.free(position)
+        if pressing < 0.0:
+            rest = position if force.rigid else _compressed(force, position)
+            if rest is None:
+                told = f"at zero current the backstop is crushed down to {force.low:.6g} m"
+                raise InputError(
+                    f"{_named(hammer)} has no rest state: {told}, expected it to hold the armature"
+                )
+            return rest
+        if hammer.magnet is not None:
+            told = f"at the backstop the net force at zero current is {pressing:.6g} N"
+            raise InputError(f"{_named(hammer)} has no rest state: {told}, expected a negative force")
+    stable = [
+        root.x
+        for root in _roots(force, 0.0)
+        if _is_stable(root, force) and (root.x <= force.front or not force.memory)
+    ]
+    if not stable:
+        raise InputError(f"{_named(hammer)} has no rest state: it has no stable equilibrium at zero current")
+    return min(stable, key=lambda x: abs(x - hammer.origin))
+
+
+def equilibria(
+    hammer: HammerLike, current: float = 0.0, within: tuple[float, float] | None = None
+) -> list[Equilibrium]:
+    """Find all equilibria at a constant current, ascending.
+
+    Sought from the lower limit of the magnet's law (or the rigid backstop) to the platen, or else to where
+    pack or magnet law end; where nothing limits the search, 1 m to either side. Stretches without any force
+    are left out.
+
+    Parameters
+    ----------
+    hammer
+        The hammer.
+    current
+        Coil current, A.
+    within
+        Other limits, m.
+
+    Raises
+    ------
+    InputError
+        The current is not finite or outside the range of the magnet's law, or the limits are empty.
+    """
+    smallest, largest = _currents(hammer)
+    if not smallest <= current <= largest:
+        told = f"is expected to be from {smallest:g} to {largest:g} A"
+        raise InputError(f"current = {current!r} {told}, where the law of the magnet holds")
+    force = StaticForce(hammer)
+    found = [_described(force, root, current) for root in _same_rest(force, current, within)]
+    if force.rigid and hammer.backstop is not None:
+        position = hammer.backstop.position
+        inside = within is None or within[0] <= position <= within[1]
+        if inside and force.free(position, current) < 0.0:
+            found.insert(0, Equilibrium(position, True, None, "backstop"))
+    return found
+
+
+def release_current(hammer: HammerLike) -> float:
+    """Return the smallest current that lifts the armature off the backstop, A.
+
+    At that current the force of magnet and spring at the position of the backstop vanishes. For equation
+    (3) it is (Am - sqrt((F0 + Fs(b)) sqrt(b))) / Bm. Of two currents of different sign the smaller counts;
+    0 if the net force is not negative at zero current.
+
+    Raises
+    ------
+    InputError
+        The hammer has no backstop or magnet, or no current within the range of the magnet's law does it.
+    """
+    if hammer.backstop is None or hammer.magnet is None:
+        raise InputError(f"{_named(hammer)} has no release current: it has no {_missing(hammer)}")
+    force = StaticForce(hammer)
+    position = hammer.backstop.position
+
+    def net(current: float) -> float:
+        return force.free(position, current)
+
+    if net(0.0) >= 0.0:
+        return 0.0
+    low, high = _currents(hammer)
+    found: list[float] = []
+    for sign, limit in ((1.0, high), (-1.0, -low)):
+        if limit > 0.0:
+            grid = [sign * size for size in _away_from_zero(1e-9, limit)]
+            crossed = [root.x for root in roots(net, sorted(grid))]
+            found += sorted(crossed, key=abs)[:1]
+    if not found:
+        told = f"none from {low:g} to {high:g} A lifts the armature"
+        raise InputError(f"{_named(hammer)} has no release current: {told}")
+    return min(found, key=abs)
+
+
+def holding_margin(hammer: HammerLike, x: npt.ArrayLike) -> FloatArray:
+    """Return the force that holds the armature back at zero current, N, at displacements x, m.
+
+    Minus the net force of magnet and spring, without contacts: positive where the armature is driven to the
+    backstop, at rest the force with which it presses against it. NaN outside the range of the magnet's law.
+    """
+    force = StaticForce(hammer)
+    places = np.asarray(x, dtype=np.float64)
+    return np.array([-force.free(float(place)) for place in places.ravel()]).reshape(places.shape)
+
+
+def positive_intervals(hammer: HammerLike) -> list[tuple[float, float]]:
+    """Return the intervals of the stroke where the net force at zero current is positive; ends in m.
+
+    There magnet and spring drive the armature toward the paper, so that it may never return. Sought from the
+    backstop to the platen, or to the back of the pack; empty without a backstop.
+    """
+    if hammer.backstop is None:
+        return []
+    force = StaticForce(hammer)
+    start, end = max(force.low, hammer.backstop.position), force.end
+    if not start < end:
+        return []
+    crossings = [root.x for root in roots(force.free, _grid(force, start, end))]
+    marks = [start, *(x for x in crossings if start < x < end), end]
+    positive: list[tuple[float, float]] = []
+    for left, right in itertools.pairwise(marks):
+        if force.free(0.5 * (left + right)) > 0.0:
+            joined = bool(positive) and positive[-1][1] == left
+            positive.append((positive.pop()[0] if joined else left, right))
+    return positive
+
+
+def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPicture:
+    """Return the whole statics of a hammer, with the holding margin at a number of points."""
+    force = StaticForce(hammer)
+    try:
+        rest, reason = rest_state(hammer), ""
+    except InputError as error:
+        rest, reason = None, str(error)
+    try:
+        release = release_current(hammer)
+    except InputError:
+        release = None
+    start = hammer.backstop.position if hammer.backstop is not None else force.low
+    x = np.linspace(start, force.end, points)
+    margin = holding_margin(hammer, x)
+    least = int(np.nanargmin(margin)) if np.isfinite(margin).any() else 0
+    return EquilibriumPicture(
+        rest=rest,
+        no_rest=reason,
+        equilibria=tuple(equilibria(hammer)),
+        release_current=release,
+        x=x,
+        margin=margin,
+        weakest=(float(x[least]), float(margin[least])),
+        positive_intervals=tuple(positive_intervals(hammer)),
+    )
+
+
+def _compressed(force: StaticForce, position: float, current: float = 0.0) -> float | None:
+    """Find the equilibrium next to the surface of an elastic backstop on which the armature is pressed."""
+
+    def total(x: float) -> float:
+        return force.total(x, current)
+
+    depth = max(_NEAREST, math.ulp(position))
+    above = position
+    while position - depth > force.low:
+        below = position - depth
+        if total(below) >= 0.0:
+            return bisect(total, below, above)
+        above = below
+        depth *= 1.25
+    return None
+
+
+def _described(force: StaticForce, root: Root, current: float) -> Equilibrium:
+    """Tell stability, frequency and surface of an equilibrium."""
+    stable = _is_stable(root, force)
+    surface = None
+    if force.hammer.backstop is not None and root.x < force.hammer.backstop.position:
+        surface = "backstop"
+    elif root.x > force.front:
+        surface = "pack"
+    frequency = None
+    if stable and not (surface == "pack" and force.memory):
+        slope = force.slope(root.x, current)
+        frequency = math.sqrt(max(-slope, 0.0) / force.hammer.mass) / (2.0 * math.pi)
+    return Equilibrium(root.x, stable, frequency, surface)
+
+
+def _is_stable(root: Root, force: StaticForce) -> bool:
+    """Whether the force points to the root from both sides; a rigid backstop holds from below."""
+    held = root.before > 0 or (force.rigid and root.x == force.limits[0])
+    return held and root.after < 0
+
+
+def _roots(force: StaticForce, current: float, within: tuple[float, float] | None = None) -> list[Root]:
+    low, high = within if within is not None else (force.low, force.high)
+    low, high = max(low, force.limits[0]), min(high, force.limits[1])
+    if not low < high:
+        raise InputError(f"the range {low:g} to {high:g} m is empty, expected the lower end first")
+    return roots(lambda x: force.total(x, current), _grid(force, low, high))
+
+
+def _same_rest(force: StaticForce, current: float, within: tuple[float, float] | None) -> list[Root]:
+    """Find all roots, the one next to the surface of the backstop to the same bits as `rest_state`."""
+    found = _roots(force, current, within)
+    backstop = force.hammer.backstop
+    if backstop is None or force.rigid or not force.free(backstop.position, current) < 0.0:
+        return found
+    rest = _compressed(force, backstop.position, current)
+    if rest is None:
+        return found
+    same = 1e-9 * (backstop.position - rest) + 4.0 * math.ulp(rest)
+    return [replace(root, x=rest) if abs(root.x - rest) <= same else root for root in found]
+
+
+def _grid(force: StaticForce, low: float, high: float) -> list[float]:
+    """Return places between two limits, even ones and ever closer ones about the anchors."""
+    places = set(np.linspace(low, high, 1025).tolist())
+    for anchor in (*force.anchors(), low, high):
+        for sign in (1.0, -1.0):
+            limit = high - anchor if sign > 0.0 else anchor - low
+            if limit > 0.0:
+                places.update(anchor + sign * step for step in _away_from_zero(_NEAREST, limit))
+    return sorted(place for place in places if low <= place <= high)
+
+
+def _away_from_zero(first: float, limit: float) -> list[float]:
+    """Return 0 and steps that grow geometrically up to a limit, 12 a decade."""
+    if limit <= first:
+        return [0.0, limit]
+    count = max(2, math.ceil(12.0 * math.log10(limit / first)) + 1)
+    return [0.0, *np.geomspace(first, limit, count).tolist()]
+
+
+def _currents(hammer: HammerLike) -> tuple[float, float]:
+    """Return the currents for which the law of the magnet holds, A."""
+    low, high = getattr(hammer.magnet, "current_range", (-_LARGEST_CURRENT, _LARGEST_CURRENT))
+    return float(low), float(high)
+
+
+def _named(hammer: HammerLike) -> str:
+    return f"the hammer {hammer.name!r}"
+
+
+def _missing(hammer: HammerLike) -> str:
+    return "magnet" if hammer.magnet is None else "backstop"

@@ -1,0 +1,325 @@
+"""Hammer files: TOML to parts, constants and waveform, every fault told in one sentence.
+
+A file has ``format = 1``, ``name``, optionally ``title`` and ``note``, the constants ``mass`` and ``platen``,
+and a table for each part: ``[magnet]``, ``[spring]``, ``[pack]`` and ``[backstop]`` with their ``law``,
+``[waveform]`` with its ``shape``, and ``[coil]``. All but name and mass are optional. A constant is
+``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a pure number.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib import import_module
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from printhammer.errors import InputError
+from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
+from printhammer.support.constants import (
+    STATUSES,
+    Constant,
+    Quantity,
+    options,
+    quantities,
+    quantity,
+    sentence,
+    shown,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from printhammer.drive.waveforms.shapes import Waveform
+
+FORMAT: Final = 1
+"""Version of the hammer file format."""
+
+CONSTANT_KEYS: Final = ("value", "unit", "status", "source")
+TEXTS: Final = {
+    "name": "short name of the hammer",
+    "title": "one line that says what it is",
+    "note": "what a reader must know about the constants",
+}
+"""The texts of a file and what they say."""
+
+SELECTORS: Final = {**dict.fromkeys(ROLES, "law"), "waveform": "shape", "coil": ""}
+"""The tables of a file, and the key that selects what kind of part each one is."""
+
+_M = TypeVar("_M", bound=BaseModel)
+
+
+class Body(BaseModel):
+    """The constants at the top of a hammer file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    mass: float = quantity("kg", "m", "mass of the armature", gt=0)
+    platen: float | None = quantity("m", "x_platen", "position of the platen", default=None)
+
+
+class Coil(BaseModel):
+    """The constants of the coil."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    resistance: float | None = quantity("ohm", "R", "resistance of the coil", ge=0, default=None)
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a hammer file says, SI; `parts` by role."""
+
+    name: str
+    title: str
+    note: str
+    body: Body
+    coil: Coil
+    parts: dict[str, Part]
+    waveform: Waveform | None
+    constants: dict[str, Constant]
+
+
+def read_document(text: str, where: str) -> dict[str, Any]:
+    """Read TOML text into plain dictionaries.
+
+    Raises
+    ------
+    InputError
+        It is not TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        # tomllib raises a bare ValueError for a number of thousands of digits.
+        raise InputError(f"{where}: expected a TOML file ({' '.join(str(error).split())})") from None
+
+
+def build(document: Mapping[str, Any], where: str, folder: Path) -> Contents:
+    """Build and check the contents of a hammer file.
+
+    Parameters
+    ----------
+    document : mapping
+        The TOML document.
+    where : str
+        What to name in a message, usually the file.
+    folder : Path
+        Where a force table or a sampled waveform lies.
+
+    Returns
+    -------
+    Contents
+        Parts and constants in SI.
+
+    Raises
+    ------
+    InputError
+        A key is unknown or missing, a value is of the wrong kind, dimension or range, or positions are out of
+        order.
+    """
+    try:
+        return _build(document, folder)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def model_of(section: str, kind: str) -> type[BaseModel]:
+    """Return the model class of a table, such as ("pack", "power"); the kind of "coil" is empty."""
+    if section == "coil":
+        return Coil
+    if section == "waveform":
+        from printhammer.drive.waveforms.shapes import SHAPES
+
+        return SHAPES[kind]
+    return PARTS[section, kind]
+
+
+def kinds_of(section: str) -> tuple[str, ...]:
+    """List what may stand for the law or shape of a table."""
+    if section == "waveform":
+        from printhammer.drive.waveforms.shapes import SHAPES
+
+        return tuple(SHAPES)
+    return laws(section)
+
+
+def file_options(model: type[BaseModel]) -> dict[str, Any]:
+    """List the options of a model that a file may give; what a waveform drives follows from its unit."""
+    return {name: kind for name, kind in options(model).items() if name != "quantity"}
+
+
+def _build(document: Mapping[str, Any], folder: Path) -> Contents:
+    _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS), "")
+    _check_format(document)
+    texts: dict[str, str] = {}
+    for name in TEXTS:
+        texts[name] = document.get(name, "")
+        if not isinstance(texts[name], str):
+            raise InputError(f"{name} = {shown(texts[name])}: expected text in quotes")
+    if not texts["name"].strip():
+        raise InputError("name is missing, expected a short name of the hammer")
+    constants: dict[str, Constant] = {}
+    top = {key: document[key] for key in quantities(Body) if key in document}
+    body = _read(Body, top, "", constants, folder)
+    made: dict[str, Any] = {}
+    for section, selector in SELECTORS.items():
+        if section in document:
+            table = document[section]
+            if not isinstance(table, Mapping):
+                raise InputError(f"{section} = {shown(table)}: expected a table [{section}]")
+            kind = _kind(table, section, selector) if selector else ""
+            rest = {key: value for key, value in table.items() if key != selector}
+            made[section] = _read(model_of(section, kind), rest, f"{section}.", constants, folder)
+    contents = Contents(
+        **texts,
+        body=body,
+        coil=made.pop("coil", Coil()),
+        waveform=made.pop("waveform", None),
+        parts=made,
+        constants=constants,
+    )
+    _check_order(contents)
+    return contents
+
+
+def _check_format(document: Mapping[str, Any]) -> None:
+    if "format" not in document:
+        raise InputError(f"format is missing, expected format = {FORMAT}")
+    given = document["format"]
+    if not isinstance(given, int) or isinstance(given, bool) or given != FORMAT:
+        raise InputError(f"format = {shown(given)}: expected {FORMAT}")
+
+
+def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
+    known = kinds_of(section)
+    kind = table.get(selector)
+    if kind is None:
+        raise InputError(f"{section}.{selector} is missing, expected one of {', '.join(known)}")
+    if not isinstance(kind, str) or kind not in known:
+        raise InputError(f"{section}.{selector} = {shown(kind)}: expected one of {', '.join(known)}")
+    return kind
+
+
+def _only(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
+    """Refuse a key that is not known; where one comes close, name that one alone."""
+    known = list(known)
+    for key in table:
+        if key not in known:
+            close = get_close_matches(key, known, 1)
+            hint = f"expected {close[0]!r}" if close else f"expected one of {', '.join(known)}"
+            raise InputError(f"the key {shown(prefix + key, quotes=False)} is not known, {hint}")
+
+
+def _read(
+    model: type[_M], table: Mapping[str, Any], prefix: str, constants: dict[str, Constant], folder: Path
+) -> _M:
+    """Read the constants and options of one table into its model, and the constants also into `constants`."""
+    known, choices = quantities(model), file_options(model)
+    _only(table, (*known, *choices), prefix)
+    fields: dict[str, Any] = {}
+    written: dict[str, str] = {}
+    for name, value in table.items():
+        if name in known:
+            constant = _constant(prefix + name, value, known[name])
+            constants[constant.key] = constant
+            fields[name] = constant.si
+            written[name] = f"{constant.value!r} {constant.unit}"
+            if known[name].also:
+                from printhammer.drive.waveforms.shapes import QUANTITY_UNITS
+
+                fields["quantity"] = QUANTITY_UNITS[constant.si_unit]
+        else:
+            fields[name] = value
+    try:
+        return model.model_validate(fields, strict=True, context={"folder": folder})
+    except ValidationError as error:
+        raise InputError(sentence(error, model, prefix, written)) from None
+
+
+def _constant(key: str, given: Any, note: Quantity) -> Constant:
+    from printhammer.units import describe, to_si
+
+    if not isinstance(given, Mapping):
+        raise InputError(
+            f"{key} = {shown(given)}: expected {describe(note.si)} as "
+            '{ value = ..., unit = "...", status = "...", source = "..." }'
+        )
+    _only(given, CONSTANT_KEYS, f"{key}.")
+    value = given.get("value")
+    for name in CONSTANT_KEYS:
+        if name not in given:
+            what = f"the constant {key} = {shown(value)}" if name != "value" else f"the constant {key}"
+            raise InputError(f"{what} has no {name}, expected {describe(note.si)} with {_WANTED[name]}")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:
+        raise InputError(f"{key} = {shown(value)}: expected a finite number")
+    texts = {name: given[name] for name in CONSTANT_KEYS[1:]}
+    for name, text in texts.items():
+        if not isinstance(text, str) or not text.strip():
+            raise InputError(f"{key}.{name} = {shown(text)}: expected {_WANTED[name]}")
+    if texts["status"] not in STATUSES:
+        raise InputError(f"{key}.status = {shown(texts['status'])}: expected one of {', '.join(STATUSES)}")
+    si_unit = si_unit_of(note, texts["unit"])
+    try:
+        si = to_si(value, texts["unit"], si_unit)
+    except InputError as error:
+        raise InputError(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}: {error}") from None
+    return Constant(
+        key=key, value=value, **texts, si=si, meaning=note.meaning, symbol=note.symbol, si_unit=si_unit
+    )
+
+
+_WANTED: Final = {
+    "value": "a number",
+    "unit": "a unit",
+    "status": f"a status ({', '.join(STATUSES)})",
+    "source": "a source",
+}
+
+
+def si_unit_of(note: Quantity, unit: str) -> str:
+    """Return the SI unit that goes with a unit, of a constant that may have several dimensions."""
+    return next((other for other in note.also if _fits(unit, other)), note.si)
+
+
+def _fits(unit: str, si_unit: str) -> bool:
+    from printhammer.units import to_si
+
+    try:
+        to_si(1.0, unit, si_unit)
+    except InputError:
+        return False
+    return True
+
+
+def _check_order(contents: Contents) -> None:
+    """Refuse positions out of order: backstop, front of the pack, platen, where the magnet's law holds."""
+    places: dict[str, float] = {}
+    backstop, pack = contents.parts.get("backstop"), contents.parts.get("pack")
+    if isinstance(backstop, BackstopPart):
+        places["backstop.position"] = backstop.position
+    if isinstance(pack, PackPart):
+        places["pack.front"] = pack.front
+    ends = {} if contents.body.platen is None else {"platen": contents.body.platen}
+
+    def written(key: str) -> str:
+        constant = contents.constants[key]
+        return f"{key} = {constant.value!r} {constant.unit}"
+
+    for (key, place), (after, end) in pairwise([*places.items(), *ends.items()]):
+        if not place < end:
+            raise InputError(f"{written(key)}: expected a position before {written(after)}")
+    magnet = contents.parts.get("magnet")
+    if isinstance(magnet, MagnetPart):
+        low, high = magnet.domain
+        for key, place in places.items():
+            force = import_module(magnet.module).magnet_force(magnet.packed(0.0), place, 0.0)
+            if not (low <= place <= high and math.isfinite(force)):
+                span = f"{low:g} to {high:g} m"
+                raise InputError(f"{written(key)}: expected a position where the magnet's law holds, {span}")

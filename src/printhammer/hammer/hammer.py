@@ -1,0 +1,436 @@
+"""The hammer: one actuator, its constants with unit, status and source, and where they come from.
+
+A hammer is read from a TOML file (`load`, `Hammer.from_toml`), changed by `Hammer.replace`, and written back
+without loss. Numbers are SI inside; the file keeps its own units, comments and layout.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.errors import InputError
+from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
+from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
+from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart
+from printhammer.support.constants import Constant, quantities
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from pydantic import BaseModel
+
+    from printhammer.drive.waveforms.shapes import Waveform
+
+REPLACED: Final = "replaced"
+"""Source of a constant that `Hammer.replace` has set, unless another is given."""
+
+
+def shipped() -> tuple[str, ...]:
+    """List the names of the hammers that come with the program."""
+    folder = files("printhammer").joinpath("hammers")
+    return tuple(sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml")))
+
+
+def load(name_or_path: str | Path) -> Hammer:
+    """Load a hammer.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a shipped hammer, such as "hendriks-1983", or a path to a hammer file.
+
+    Returns
+    -------
+    Hammer
+        The hammer.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is not TOML, or does not describe a hammer; one sentence names the file, the
+        key, the value and what was expected.
+    """
+    if isinstance(name_or_path, str) and name_or_path in shipped():
+        source = files("printhammer").joinpath("hammers", f"{name_or_path}.toml")
+        return Hammer.from_toml(source.read_text(encoding="utf-8"), name=f"{name_or_path}.toml")
+    path = Path(name_or_path)
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: expected a TOML file in UTF-8") from None
+    except FileNotFoundError:
+        names = ", ".join(shipped())
+        raise InputError(f"{path}: there is no such file, expected a path or one of {names}") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: the hammer file cannot be read ({reason})") from None
+    return Hammer.from_toml(text, name=str(path), folder=path.parent)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Hammer:
+    """One actuator: armature, magnet, spring, backstop, the pack before it, its waveform and coil.
+
+    Made by `load` or `Hammer.from_toml`. Two hammers are equal if their files say the same.
+    """
+
+    _contents: Contents
+    _document: Mapping[str, Any]
+    _text: str
+    _edits: tuple[Edit, ...] = ()
+    _where: str = "hammer"
+    _folder: Path = field(default_factory=Path)
+
+    @classmethod
+    def from_toml(cls, text: str, name: str = "hammer", folder: str | Path | None = None) -> Hammer:
+        """Read a hammer from the text of a hammer file.
+
+        Parameters
+        ----------
+        text : str
+            TOML.
+        name : str, optional
+            What to name in a message, usually the file.
+        folder : path, optional
+            Where a force table or a sampled waveform lies; the working directory by default.
+
+        Returns
+        -------
+        Hammer
+            The hammer.
+
+        Raises
+        ------
+        InputError
+            As for `load`.
+        """
+        place = Path(folder) if folder is not None else Path()
+        document = read_document(text, name)
+        return cls(build(document, name, place), document, text, (), name, place)
+
+    @classmethod
+    def build(
+        cls,
+        mass: str | float,
+        *,
+        name: str = "hammer",
+        status: str = "assumed",
+        source: str = "given in Python",
+        **parts: Any,
+    ) -> Hammer:
+        """Make a hammer of parts, such as a textbook impact oscillator.
+
+        Parameters
+        ----------
+        mass : str or float
+            Mass of the armature, text with its unit or kg.
+        name : str, optional
+            Short name.
+        status, source : str, optional
+            Of all constants.
+        **parts
+            `magnet`, `spring`, `pack`, `backstop`, `waveform`, `platen`, `coil`, each as `replace` takes it.
+
+        Returns
+        -------
+        Hammer
+            The hammer.
+
+        Raises
+        ------
+        InputError
+            As for `replace`.
+        """
+        constant = 'mass = { value = 1.0, unit = "kg", status = "assumed", source = "to be replaced" }'
+        bare = cls.from_toml(f'format = {FORMAT}\nname = "hammer"\n\n{constant}\n', name=name)
+        return bare.replace({"name": name, "mass": mass, **parts}, status=status, source=source)
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+        return self._contents.name
+
+    @property
+    def title(self) -> str:
+        """One line that says what it is; may be empty."""
+        return self._contents.title
+
+    @property
+    def note(self) -> str:
+        """What a reader must know about the constants; may be empty."""
+        return self._contents.note
+
+    @property
+    def path(self) -> str:
+        """File that it was read from, as messages name it."""
+        return self._where
+
+    @property
+    def mass(self) -> float:
+        """Mass of the armature, kg."""
+        return self._contents.body.mass
+
+    @property
+    def platen(self) -> float | None:
+        """Position of the platen, m."""
+        return self._contents.body.platen
+
+    @property
+    def coil_resistance(self) -> float | None:
+        """Resistance of the coil, ohm."""
+        return self._contents.coil.resistance
+
+    @property
+    def magnet(self) -> MagnetPart | None:
+        """Permanent magnet and coil."""
+        part = self._contents.parts.get("magnet")
+        return part if isinstance(part, MagnetPart) else None
+
+    @property
+    def spring(self) -> SpringPart | None:
+        """Spring of the armature."""
+        part = self._contents.parts.get("spring")
+        return part if isinstance(part, SpringPart) else None
+
+    @property
+    def pack(self) -> PackPart | None:
+        """Ribbon and paper pack."""
+        part = self._contents.parts.get("pack")
+        return part if isinstance(part, PackPart) else None
+
+    @property
+    def backstop(self) -> BackstopPart | None:
+        """Backstop."""
+        part = self._contents.parts.get("backstop")
+        return part if isinstance(part, BackstopPart) else None
+
+    @property
+    def parts(self) -> Mapping[str, Part]:
+        """The parts that the hammer has, by role."""
+        return MappingProxyType(self._contents.parts)
+
+    @property
+    def waveform(self) -> Waveform | None:
+        """Standard waveform of one pulse."""
+        return self._contents.waveform
+
+    @property
+    def position(self) -> float | None:
+        """Position of the backstop, m."""
+        return self.backstop.position if self.backstop is not None else None
+
+    @property
+    def front(self) -> float | None:
+        """Front of the pack, m."""
+        return self.pack.front if self.pack is not None else None
+
+    @property
+    def origin(self) -> float:
+        """Position b of equation (4): that of the backstop, or 0 without one, m."""
+        return self.position if self.position is not None else 0.0
+
+    @property
+    def constants(self) -> Mapping[str, Constant]:
+        """Every constant that the file gives, by dotted key such as "magnet.F0"."""
+        return MappingProxyType(self._contents.constants)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Digest of the physics: laws, SI values, options and tables, in hexadecimal.
+
+        Names, notes, units, sources, statuses, comments and file names do not enter; an option or constant at
+        its default counts as left out.
+        """
+        found: dict[str, Any] = {"mass": self.mass.hex()}
+        if self.platen is not None:
+            found["platen"] = self.platen.hex()
+        if self.coil_resistance is not None:
+            found["coil.resistance"] = self.coil_resistance.hex()
+        models: dict[str, tuple[str, Any]] = {role: (part.law, part) for role, part in self.parts.items()}
+        if self.waveform is not None:
+            models["waveform"] = (self.waveform.shape, self.waveform)
+        for section, (kind, model) in models.items():
+            found[section] = {"": kind, **_physics(model)}
+        text = json.dumps(found, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def replace(
+        self,
+        key: str | Mapping[str, Any],
+        value: Any = None,
+        *,
+        status: str = "assumed",
+        source: str = REPLACED,
+    ) -> Hammer:
+        """Return a hammer with constants, options or whole parts replaced.
+
+        Parameters
+        ----------
+        key : str or mapping
+            Dotted key, such as "pack.stiffness", "pack.reloading" or "backstop"; or a mapping of keys to
+            values, which are set together.
+        value : object, optional
+            For a constant: text with its unit ("60 lbf"), a float in SI, or a `Constant`; for an option: its
+            value; for a part: a part, or a mapping of its keys with "law"; None takes away what is optional.
+        status, source : str, optional
+            Of the constants set.
+
+        Returns
+        -------
+        Hammer
+            A new hammer; this one stays as it is.
+
+        Raises
+        ------
+        InputError
+            The key is not known, or the hammer would not be one.
+        """
+        wanted = {key: value} if isinstance(key, str) else dict(key)
+        document = dict(self._document)
+        edits: list[Edit] = []
+        try:
+            for name, given in wanted.items():
+                edit = edit_of(document, name, given, status, source)
+                document = changed(document, [edit])
+                edits.append(edit)
+        except InputError as error:
+            raise InputError(f"{self._where}: {error}") from None
+        contents = build(document, self._where, self._folder)
+        return Hammer(contents, document, self._text, (*self._edits, *edits), self._where, self._folder)
+
+    def to_toml(self) -> str:
+        """Return the text of the hammer file: as it was read, with what was replaced."""
+        return changed_text(self._text, self._edits) if self._edits else self._text
+
+    def save(self, path: str | Path) -> None:
+        """Write the hammer file, and beside it the tables that it names.
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written, or a table beside it would overwrite another; what was there stays.
+        """
+        target = Path(path)
+        draft = target.with_name(target.name + ".part")
+        try:
+            tables = self._tables(target)
+            draft.write_bytes(self.to_toml().encode())
+            for name, data in tables.items():
+                (target.parent / name).write_bytes(data)
+            draft.replace(target)
+        except OSError as error:
+            with suppress(OSError):
+                draft.unlink()
+            raise InputError(f"{target}: the hammer file cannot be written ({error.strerror})") from None
+
+    def _tables(self, target: Path) -> dict[str, bytes]:
+        """Return the files named in the hammer file that are missing beside `target`."""
+        found: dict[str, bytes] = {}
+        for model in (self.magnet, self.waveform):
+            name = getattr(model, "file", None)
+            if not name or Path(name).is_absolute():
+                continue
+            data, there = (self._folder / name).read_bytes(), target.parent / name
+            if not there.exists():
+                found[name] = data
+            elif there.read_bytes() != data:
+                raise InputError(f"{there}: the file is another table than that of {self.name}")
+        return found
+
+    def check(self) -> None:
+        """Refuse a hammer that does not rest at its backstop.
+
+        Raises
+        ------
+        InputError
+            With a magnet and a backstop, the net force at zero current at the backstop is not negative, or
+            the backstop does not hold the armature.
+        """
+        from printhammer.hammer.equilibrium import rest_state
+
+        if self.magnet is not None and self.backstop is not None:
+            try:
+                rest_state(self)
+            except InputError as error:
+                raise InputError(f"{self._where}: {error}") from None
+
+    def warnings(self) -> list[str]:
+        """Say what is odd about a hammer that can still be simulated.
+
+        Returns
+        -------
+        list of str
+            A sentence for each interval between backstop and platen in which the net force of magnet and
+            spring at zero current is positive.
+
+        Raises
+        ------
+        InputError
+            As `check`.
+        """
+        from printhammer.hammer.equilibrium import positive_intervals
+        from printhammer.units import from_si
+
+        self.check()
+        told = []
+        for ends in positive_intervals(self):
+            low, high = (from_si(end, "m", "um") for end in ends)
+            where = f"from {low:.4g} to {high:.4g} um"
+            told.append(
+                f"the net force at zero current is positive {where}: the armature may never return from there"
+            )
+        return told
+
+    @staticmethod
+    def schema() -> dict[str, Any]:
+        """Return the JSON schema of hammer files."""
+        from printhammer.hammer.schema import schema
+
+        return schema()
+
+    def __eq__(self, other: object) -> bool:
+        """Compare what the files say, whatever their layout."""
+        if not isinstance(other, Hammer):
+            return NotImplemented
+        return self.fingerprint == other.fingerprint and self._document == other._document
+
+    def __hash__(self) -> int:
+        return hash(self.fingerprint)
+
+    def __repr__(self) -> str:
+        return f"<Hammer {self.name} {self.fingerprint[:8]}>"
+
+
+def _physics(model: Any) -> dict[str, Any]:
+    """Return what of a part or waveform enters the fingerprint."""
+    kind: type[BaseModel] = type(model)
+    found: dict[str, Any] = {}
+    for name in (*quantities(kind), *(set(file_options(kind)) - {"file"}), "quantity"):
+        value = getattr(model, name, None)
+        if value is not None and value != _default(kind, name):
+            found[name] = value.hex() if isinstance(value, float) else value
+    for name, numbers in model.content().items():
+        found[name] = _hex(numbers)
+    return found
+
+
+def _default(kind: type[BaseModel], name: str) -> Any:
+    return kind.model_fields[name].default if name in kind.model_fields else None
+
+
+def _hex(numbers: Any) -> Any:
+    nested = getattr(numbers, "tolist", lambda: numbers)()
+    return [_hex(entry) for entry in nested] if isinstance(nested, (list, tuple)) else float(nested).hex()

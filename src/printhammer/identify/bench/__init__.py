@@ -1,0 +1,1 @@
+"""The synthetic laboratory: benches, sensors, recovery."""

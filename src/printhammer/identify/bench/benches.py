@@ -1,0 +1,343 @@
+"""The benches of the laboratory: what is there to be measured of a hammer, without any error of a sensor.
+
+magnet
+    Armature held at a grid of displacements and currents, pack absent: the force of magnet and spring.
+spring
+    The same without the magnet.
+pack
+    Slow load cycles to several indentations: the loading branch up, the unloading branch down.
+backstop
+    The armature alone thrown at the backstop at several speeds: the speed with which it comes back.
+motion
+    One shot from rest: displacement and current, a while before the firing included.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.hammer.static_force import StaticForce
+from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform, time_constant
+from printhammer.parts import absent
+from printhammer.parts.backstop._hertz import damping_from_restitution
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.run.simulate import CYCLE, simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy.typing as npt
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.identify.bench.sensor import Sensor
+    from printhammer.support.arrays import FloatArray
+
+DISPLACEMENTS: Final = 31
+"""Places at which the armature is held, from the backstop to the platen."""
+
+CURRENTS: Final = 6
+HIGHEST_CURRENT: Final = 1.25
+"""Number of currents, and the highest one in units of the peak of the waveform."""
+
+PEAKS: Final = (0.3, 0.45, 0.6)
+"""Largest indentations of the load cycles, in units of the thickness of the pack."""
+
+BRANCH_POINTS: Final = 30
+"""Readings on one branch of a load cycle."""
+
+SPEEDS: Final = (0.1, 2.0, 40)
+"""Slowest and fastest impact on the backstop, m/s, and the number of impacts."""
+
+BEFORE: Final = 100e-6
+"""Time before the firing from which on a shot is recorded, s."""
+
+_FINEST: Final = 0.5e-6
+"""Largest step of the displacement that goes through the sensor, s: a hundredth of a contact."""
+
+_MOST: Final = 2_000_000
+"""Steps of a record, which bound its room in the memory."""
+
+_RUN_UP: Final = 10e-6
+"""Way before the backstop, m; without any force it changes nothing."""
+
+_LONGEST: Final = 30
+"""Doublings of the time that a rebound is given."""
+
+_LEAST: Final = 1e-6
+"""Restitution below which no backstop is taken for one that sends the armature back."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """What is there to be measured.
+
+    Attributes
+    ----------
+    what : str
+        One line that says what is measured, and how.
+    true : dict of str to array, shape (rows,)
+        Columns by name, SI, before noise and resolution.
+    words : dict of str to tuple of str
+        Columns of words.
+    exact : tuple of str
+        Columns that have no error, such as the time.
+    suspect : str
+        Column in which wrong readings occur.
+    """
+
+    what: str
+    true: dict[str, FloatArray]
+    suspect: str
+    words: dict[str, tuple[str, ...]]
+    exact: tuple[str, ...] = ()
+
+
+def magnet(
+    hammer: Hammer,
+    sensor: Sensor,  # noqa: ARG001
+    *,
+    displacements: npt.ArrayLike | None = None,
+    currents: npt.ArrayLike | None = None,
+) -> Bench:
+    """Hold the armature at displacements, m, with currents, A, in the coil."""
+    if hammer.magnet is None:
+        raise InputError(f"{hammer.path}: the hammer has no [magnet], expected one to measure its force")
+    places = _places(hammer, displacements)
+    levels = _currents(hammer) if currents is None else _array(currents, "currents")
+    force = StaticForce(hammer)
+    x = np.tile(places, len(levels))
+    current = np.repeat(levels, len(places))
+    total = np.array([force.free(*row) for row in zip(x.tolist(), current.tolist(), strict=True)])
+    if not np.isfinite(total).all():
+        bad = float(x[~np.isfinite(total)][0])
+        raise InputError(
+            f"{hammer.path}: the magnet has no force at {bad:.6g} m, expected its range to be kept"
+        )
+    return Bench(
+        "static force of magnet and spring, armature held, pack absent; positive toward the paper",
+        {"displacement": x, "current": current, "force": total},
+        "force",
+        {},
+    )
+
+
+def spring(
+    hammer: Hammer,
+    sensor: Sensor,  # noqa: ARG001
+    *,
+    displacements: npt.ArrayLike | None = None,
+) -> Bench:
+    """Hold the armature at displacements, m, with the magnet taken out."""
+    if hammer.spring is None:
+        raise InputError(f"{hammer.path}: the hammer has no [spring], expected one to measure its force")
+    x = _places(hammer, displacements)
+    force = StaticForce(hammer)
+    return Bench(
+        "static force of the spring alone, magnet taken out; positive toward the paper",
+        {"displacement": x, "force": np.array([force.spring(place) for place in x.tolist()])},
+        "force",
+        {},
+    )
+
+
+def pack(
+    hammer: Hammer,
+    sensor: Sensor,  # noqa: ARG001
+    *,
+    peaks: npt.ArrayLike | None = None,
+    points: int = BRANCH_POINTS,
+) -> Bench:
+    """Press the pack to largest indentations, m, each on fresh paper, and let it go."""
+    if hammer.pack is None:
+        raise InputError(f"{hammer.path}: the hammer has no [pack], expected one to press")
+    deepest = _peaks(hammer) if peaks is None else _array(peaks, "peaks")
+    if points < 2 or not (deepest > 0.0).all():
+        raise InputError("peaks and points are expected to be positive indentations and 2 points or more")
+    room = getattr(hammer.pack, "thickness", math.inf)
+    if deepest.max() >= room:
+        raise InputError(
+            f"a peak of {deepest.max():.6g} m is expected to be less than the thickness, {room:.6g} m"
+        )
+    loading, memory, unloading = (_law(hammer, name) for name in ("loading", "memory", "unloading"))
+    share = np.arange(1, points + 1) / points
+    indentation, force = [], []
+    branch: list[str] = []
+    for peak in deepest.tolist():
+        up, down = peak * share, peak * share[-2::-1]
+        q = memory(hammer.pack.front + peak)
+        indentation += [*up.tolist(), *down.tolist()]
+        force += [-loading(hammer.pack.front + r, 0.0) for r in up.tolist()]
+        force += [-unloading(hammer.pack.front + r, 0.0, q) for r in down.tolist()]
+        branch += ["loading"] * len(up) + ["unloading"] * len(down)
+    return Bench(
+        "force of slow load cycles against the indentation from the front of the pack, each on fresh paper",
+        {"indentation": np.array(indentation), "force": np.array(force)},
+        "force",
+        {"branch": tuple(branch)},
+    )
+
+
+def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = None) -> Bench:  # noqa: ARG001
+    """Throw the armature alone at the backstop with speeds, m/s."""
+    if hammer.backstop is None:
+        raise InputError(f"{hammer.path}: the hammer has no [backstop], expected one to rebound from")
+    impacts = np.linspace(SPEEDS[0], SPEEDS[1], SPEEDS[2]) if speeds is None else _array(speeds, "speeds")
+    if not (impacts > 0.0).all():
+        raise InputError("speeds are expected to be greater than 0 m/s")
+    bare = hammer.replace({"magnet": None, "spring": None, "pack": None, "waveform": None})
+    different, which = np.unique(impacts, return_inverse=True)
+    rebound = np.array([_rebound(bare, speed) for speed in different.tolist()])[which]
+    return Bench(
+        "speeds of the armature alone just before and just after it meets the backstop",
+        {"impact speed": impacts, "rebound speed": rebound},
+        "rebound speed",
+        {},
+    )
+
+
+def motion(
+    hammer: Hammer,
+    sensor: Sensor,
+    *,
+    duration: float | str | None = None,
+    before: float | str = BEFORE,
+) -> Bench:
+    """Record one shot from rest for a duration after the firing, s, and a while before, s."""
+    from printhammer.drive.input import read_number, read_positive
+    from printhammer.drive.trains import PulseTrain
+
+    if hammer.waveform is None:
+        raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")
+    rate = sensor.sampling_rate
+    if rate is None:
+        raise InputError("the sensor has no sampling rate, expected one for a record")
+    length = CYCLE if duration is None else read_positive(duration, "s", "duration")
+    early = read_number(before, "s", "before")
+    if early < 0.0:
+        raise InputError(f"before = {before!r} is expected to be 0 s or more")
+    first, last = -math.floor(early * rate + 1e-9), math.floor(length * rate + 1e-9)
+    if last < 1:
+        raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz has no sample after the firing")
+    each = max(1, math.ceil(1.0 / (rate * _FINEST)))
+    if last * each - first > _MOST:
+        raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz is too long, expected a shorter one")
+    t = np.arange(first, last + 1) / rate
+    fine = np.arange(last * each + 1) / (rate * each)
+    shot = simulate(hammer, PulseTrain(hammer.waveform), duration=max(float(fine[-1]), length), times=fine)
+    if not shot.ok:
+        raise InputError(f"{hammer.path}: the shot did not reach its end: {shot.message}")
+    tau = time_constant(sensor.bandwidth)
+    seen = lowpass_motion(shot.t, shot.x[:, np.newaxis], shot.v[:, np.newaxis], tau)[::each, 0]
+    after = t >= 0.0
+    x = np.full(len(t), seen[0])
+    x[after] = seen
+    true = {"time": t, "displacement": x}
+    if hammer.waveform.unit == "A":
+        current = hammer.waveform.value(t)
+        true["current"] = lowpass_waveform(hammer.waveform.segments(), t, tau) if tau else current
+    what = "displacement of the armature in one shot from rest, fired at time 0"
+    return Bench(what, true, "displacement", {}, ("time",))
+
+
+BENCHES: Final[dict[str, Callable[..., Bench]]] = {
+    "magnet": magnet,
+    "spring": spring,
+    "pack": pack,
+    "backstop": backstop,
+    "motion": motion,
+}
+
+
+def _array(values: npt.ArrayLike, name: str) -> FloatArray:
+    try:
+        found = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.ndim != 1 or not found.size or not np.isfinite(found).all():
+        raise InputError(f"{name} are expected to be a list of finite numbers in SI")
+    return found
+
+
+def _places(hammer: Hammer, displacements: npt.ArrayLike | None) -> FloatArray:
+    if displacements is not None:
+        return _array(displacements, "displacements")
+    low, high = hammer.origin, StaticForce(hammer).end
+    if not low < high or (hammer.platen is None and hammer.pack is None):
+        raise InputError(
+            f"{hammer.path}: the hammer has no platen or pack, expected displacements to be given"
+        )
+    return np.linspace(low, high, DISPLACEMENTS)
+
+
+def _currents(hammer: Hammer) -> FloatArray:
+    if hammer.waveform is None or hammer.waveform.unit != "A":
+        raise InputError(f"{hammer.path}: the hammer has no current to fire, expected currents to be given")
+    return np.linspace(0.0, HIGHEST_CURRENT * hammer.waveform.peak, CURRENTS)
+
+
+def _peaks(hammer: Hammer) -> FloatArray:
+    thickness = getattr(hammer.pack, "thickness", None)
+    if thickness is None:
+        raise InputError(
+            f"{hammer.path}: the pack has no thickness, expected the largest indentations to be given"
+        )
+    return float(thickness) * np.array(PEAKS)
+
+
+def _law(hammer: Hammer, name: str) -> Callable[..., float]:
+    """Return a law function of the pack with its constants filled in."""
+    part = hammer.pack
+    if part is None:
+        raise InputError(f"{hammer.path}: the hammer has no [pack]")
+    law: Callable[..., float] = getattr(
+        import_module(part.module), f"pack_{name}", getattr(absent, f"pack_{name}")
+    )
+    constants = part.packed(hammer.origin)
+    return lambda *arguments: law(constants, *arguments)
+
+
+def _rebound(bare: Hammer, speed: float) -> float:
+    """Return the speed, m/s, with which an armature without other forces leaves its backstop."""
+    part = bare.backstop
+    if isinstance(part, HertzBackstop):
+        k, damping, _pull = part.packed(bare.origin)
+        return speed * _restitution(k, damping, speed)
+    return _simulated_rebound(bare, speed)
+
+
+def _restitution(k: float, damping: float, speed: float) -> float:
+    """Return the restitution of a free rebound after equations (6) and (7).
+
+    Solves the exact law of `printhammer.parts.backstop._hertz.damping_from_restitution`, which falls with e, for e.
+    """
+    from scipy.optimize import brentq
+
+    if damping == 0.0:
+        return 1.0
+    found: float = brentq(
+        lambda e: damping_from_restitution(k, e, speed) / damping - 1.0, _LEAST, 1.0, xtol=1e-15
+    )
+    return found
+
+
+def _simulated_rebound(bare: Hammer, speed: float) -> float:
+    from printhammer.drive.trains import PulseTrain
+    from printhammer.drive.waveforms.shapes import Rectangle
+
+    idle = PulseTrain(Rectangle(amplitude=0.0, width=1e-6, rise=0.0, decay=0.0, quantity="force"))
+    duration = 4.0 * _RUN_UP / speed
+    for _ in range(_LONGEST):
+        run = simulate(bare, idle, duration=duration, state=(bare.origin + _RUN_UP, -speed), points=2)
+        if not run.ok:
+            raise InputError(f"{bare.path}: the rebound at {speed:.6g} m/s did not end: {run.message}")
+        left = run.contacts[0].v_out if run.contacts else None
+        if left is not None:
+            return float(left)
+        duration *= 2.0
+    raise InputError(f"{bare.path}: the armature does not come back from the backstop at {speed:.6g} m/s")

@@ -1,0 +1,215 @@
+"""The synthetic laboratory: measurements of a hammer, with the errors of real sensors and a seed.
+
+What is there to be seen of a hammer is computed (`printhammer.identify.bench.benches`), goes through the sensors
+(`printhammer.identify.bench.sensor`), and becomes a table like those that a laboratory hands in. Every kind of
+measurement and every column has its own random numbers, so that none disturbs another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.identify.bench.benches import BENCHES
+from printhammer.identify.bench.sensor import (
+    FULL_SCALE,
+    READING,
+    Amount,
+    Channel,
+    Sensor,
+    full_scale,
+    wrong_rows,
+)
+from printhammer.identify.bench.sensor_settings import adjusted
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    import numpy.typing as npt
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+KINDS: Final = tuple(BENCHES)
+"""What can be measured."""
+
+UNITS: Final = {
+    "displacement": ("m", "um"),
+    "indentation": ("m", "um"),
+    "force": ("N", "N"),
+    "current": ("A", "A"),
+    "impact speed": ("m/s", "m/s"),
+    "rebound speed": ("m/s", "m/s"),
+    "time": ("s", "us"),
+}
+"""SI unit of each column, and the unit in which it is written."""
+
+SI: Final = {name: si for name, (si, _unit) in UNITS.items()}
+"""SI unit of each column."""
+
+SAMPLING_RATE: Final = 1e6
+BANDWIDTH: Final = 200e3
+"""Of the record of a shot, Hz."""
+
+_LENGTH: Final = Channel(noise=Amount(0.2e-6), resolution=Amount(0.05e-6))
+_FORCE: Final = Channel(noise=Amount(0.005, FULL_SCALE), resolution=Amount(0.0005, FULL_SCALE))
+_CURRENT: Final = Channel(noise=Amount(0.001, FULL_SCALE), resolution=Amount(0.0005, FULL_SCALE))
+_SPEED: Final = Channel(noise=Amount(0.01, READING))
+
+SENSORS: Final = {
+    "magnet": Sensor({"displacement": _LENGTH, "current": _CURRENT, "force": _FORCE}),
+    "spring": Sensor({"displacement": _LENGTH, "force": _FORCE}),
+    "pack": Sensor({"indentation": _LENGTH, "force": _FORCE}),
+    "backstop": Sensor({"impact speed": _SPEED, "rebound speed": _SPEED}),
+    "motion": Sensor({"displacement": _LENGTH, "current": _CURRENT}, SAMPLING_RATE, BANDWIDTH),
+}
+"""The sensors of an ordinary bench, by what is measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """One table of measurements.
+
+    Attributes
+    ----------
+    kind : str
+        "magnet", "spring", "pack", "backstop" or "motion".
+    comments : dict of str to str
+        What was measured, of which hammer, with what sensors and which seed.
+    values : dict of str to array, shape (rows,)
+        Readings by column, SI.
+    words : dict of str to tuple of str
+        Columns of words.
+    true : dict of str to array, shape (rows,)
+        What noise, resolution, offset and wrong readings have been added to, SI.
+    outliers : array of int
+        Rows with a wrong reading.
+    """
+
+    kind: str
+    comments: dict[str, str]
+    values: dict[str, FloatArray]
+    words: dict[str, tuple[str, ...]]
+    true: dict[str, FloatArray]
+    outliers: npt.NDArray[np.int64]
+
+    def to_csv(self) -> str:
+        """Return the table as CSV: comments, a heading with units, the rows."""
+        from printhammer.units import from_si
+
+        lines = [f"# {key}: {value}" for key, value in self.comments.items()]
+        columns = []
+        for name, values in self.values.items():
+            si, unit = UNITS[name]
+            # Fifteen digits leave out what only the binary numbers add.
+            columns.append([f"{from_si(value, si, unit):.15g}" for value in values.tolist()])
+        columns += [list(words) for words in self.words.values()]
+        lines.append(",".join([*(f"{name} [{UNITS[name][1]}]" for name in self.values), *self.words]))
+        lines += [",".join(cells) for cells in zip(*columns, strict=True)]
+        return "\n".join(lines) + "\n"
+
+    def write(self, path: str | Path) -> None:
+        """Write the table as CSV.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        from printhammer.support.outputs import write_file
+
+        write_file(path, self.to_csv())
+
+
+def measure(
+    kind: str,
+    hammer: Hammer,
+    *,
+    sensor: Sensor | Mapping[str, Any] | None = None,
+    seed: int = 0,
+    **bench: Any,
+) -> Measurement:
+    """Measure a hammer on a bench.
+
+    Parameters
+    ----------
+    kind : str
+        "magnet": static force of magnet and spring over displacement and current; "spring": that of the
+        spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": the record of one shot.
+    hammer : Hammer
+        The hammer.
+    sensor : Sensor or mapping, optional
+        By default that of an ordinary bench, `SENSORS`; or what is different there, such as
+        {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `printhammer.identify.bench.sensor_settings.adjusted`.
+    seed : int, optional
+        Of the random numbers; the same seed gives the same table.
+    **bench
+        What is measured where, in SI: `displacements`, `currents` (magnet); `displacements` (spring);
+        `peaks`, the largest indentations, and `points` of a branch (pack); `speeds` (backstop); `duration`
+        and `before`, the time before the firing (motion).
+
+    Returns
+    -------
+    Measurement
+        The table.
+
+    Raises
+    ------
+    InputError
+        There is no such kind, or the hammer lacks what is to be measured.
+    """
+    if kind not in BENCHES:
+        raise InputError(f"kind = {kind!r}, expected one of {', '.join(KINDS)}")
+    if seed < 0:
+        raise InputError(f"seed = {seed!r} is expected to be a whole number, 0 or more")
+    used = sensor if isinstance(sensor, Sensor) else adjusted(SENSORS[kind], sensor or {}, SI)
+    there = BENCHES[kind](hammer, used, **bench)
+    streams = np.random.SeedSequence([seed, KINDS.index(kind)]).spawn(len(UNITS) + 1)
+    generators = dict(zip([*UNITS, ""], map(np.random.default_rng, streams), strict=True))
+    rows, errors = wrong_rows(used.outliers, there.true[there.suspect], generators[""])
+    values = {}
+    for name, true in there.true.items():
+        if name in there.exact:
+            values[name] = true
+            continue
+        channel = used.channels.get(name, Channel())
+        shown = channel.readings(true, generators[name].standard_normal(len(true)))
+        if name == there.suspect and len(rows):
+            shown = shown.copy()
+            shown[rows] = channel.rounded(shown[rows] + errors, true)
+        values[name] = shown
+    comments = _comments(kind, hammer, used, there.true, there.exact, there.what)
+    comments["outliers"] = f"{len(rows)} of {len(values[there.suspect])} rows"
+    comments["seed"] = str(seed)
+    return Measurement(kind, comments, values, there.words, there.true, rows)
+
+
+def _comments(
+    kind: str, hammer: Hammer, sensor: Sensor, true: dict[str, FloatArray], exact: tuple[str, ...], what: str
+) -> dict[str, str]:
+    from printhammer import __version__
+
+    found = {
+        "measurement": f"{kind}, synthetic (printhammer {__version__})",
+        "measured": what,
+        "hammer": f"{hammer.name}, fingerprint {hammer.fingerprint[:16]}",
+    }
+    for name, values in true.items():
+        if name in exact:
+            continue
+        channel = sensor.channels.get(name, Channel())
+        found[name] = channel.told(*UNITS[name], full_scale(values))
+    if kind == "motion":
+        found["sampling rate"] = _frequency(sensor.sampling_rate)
+        found["bandwidth"] = _frequency(sensor.bandwidth)
+    return found
+
+
+def _frequency(value: float | None) -> str:
+    from printhammer.units import from_si
+
+    return "none" if value is None else f"{from_si(value, 'Hz', 'kHz'):.9g} kHz"

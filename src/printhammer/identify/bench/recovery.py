@@ -1,0 +1,157 @@
+"""The whole path: hammer, measurements, constants, hammer.
+
+A hammer is measured on every bench of the synthetic laboratory, its constants are fitted to the tables, and a
+hammer is built of them. As the true constants are known, it shows what fits and intervals are worth, and what
+a bench would give before anybody builds it.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.identify.bench.laboratory import KINDS, SENSORS, measure
+from printhammer.identify.bench.sensor_settings import applicable
+from printhammer.identify.shots.motion import fit_motion
+from printhammer.identify.static.backstop import Stiffness, fit_backstop
+from printhammer.identify.static.magnet import fit_magnet
+from printhammer.identify.static.pack import fit_pack
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.identify.result import Fit, FittedConstant
+
+STEEL: Final = ((200e9, 0.01), (0.3, 0.01))
+"""Young's modulus, Pa, and Poisson ratio of both bodies of the backstop, with relative standard errors."""
+
+RADIUS_ERROR: Final = 0.01
+"""Relative standard error of the radius that is measured."""
+
+_START: Final = 0.2
+"""The fit of the motion begins with constants wrong by up to this share."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recovery:
+    """One laboratory, and what was found.
+
+    Attributes
+    ----------
+    truth : Hammer
+        What was measured.
+    fits : dict of str to Fit
+        By kind: "magnet" (with the spring), "pack", "backstop", "motion".
+    constants : dict of str to FittedConstant
+        The constants of the hammer file in the end, from all measurements.
+    hammer : Hammer
+        Built of them.
+    """
+
+    truth: Hammer
+    fits: Mapping[str, Fit]
+    constants: Mapping[str, FittedConstant]
+    hammer: Hammer
+
+    def true(self, key: str) -> float:
+        """Return the true value of a constant, SI."""
+        return true_value(self.truth, key)
+
+
+def recover(
+    hammer: Hammer,
+    seed: int,
+    *,
+    sensor: Mapping[str, Any] | None = None,
+    folder: str | Path | None = None,
+) -> Recovery:
+    """Measure a hammer, fit its constants and build a hammer of them.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        With a magnet after equation (3), a linear spring, a pack after equation (5), a Hertz backstop and a
+        waveform.
+    seed : int
+        Of the laboratory.
+    sensor : mapping, optional
+        Settings of the sensors, as `measure` takes them, wherever they apply.
+    folder : path, optional
+        Where the tables are left; by default they are not kept.
+
+    Returns
+    -------
+    Recovery
+        What was found.
+
+    Raises
+    ------
+    InputError
+        The hammer lacks a part, or a fit fails.
+    """
+    if folder is None:
+        with tempfile.TemporaryDirectory() as place:
+            return recover(hammer, seed, sensor=sensor, folder=place)
+    where = Path(folder)
+    paths = {kind: where / f"{kind}.csv" for kind in KINDS}
+    for kind, path in paths.items():
+        settings = applicable(SENSORS[kind], sensor or {})
+        measure(kind, hammer, sensor=settings, seed=seed).write(path)
+    rng = np.random.default_rng(np.random.SeedSequence([seed, len(KINDS)]))
+    fits = {
+        "magnet": fit_magnet(paths["magnet"], position=hammer.origin, spring=paths["spring"]),
+        "pack": fit_pack(paths["pack"], thickness=true_value(hammer, "pack.thickness")),
+        "backstop": fit_backstop(paths["backstop"], stiffness=measured_stiffness(hammer, rng)),
+    }
+    built = _unknown(hammer, rng)
+    for fit in fits.values():
+        built = fit.into(built)
+    fits["motion"] = fit_motion([paths["motion"]], built, earlier=tuple(fits.values()))
+    constants = {
+        key: constant for fit in fits.values() for key, constant in fit.constants.items() if constant.in_file
+    }
+    return Recovery(hammer, fits, constants, fits["motion"].into(built))
+
+
+def measured_stiffness(hammer: Hammer, rng: np.random.Generator) -> Stiffness:
+    """Return the stiffness of the backstop as it follows from bodies that are measured with errors.
+
+    A ball of steel meets a flat of steel; the radius is the one that gives the stiffness of the hammer.
+    """
+    (modulus, modulus_error), (ratio, ratio_error) = STEEL
+    k = true_value(hammer, "backstop.stiffness")
+    contact = modulus / (2.0 * (1.0 - ratio * ratio))
+    radius = (0.75 * k / contact) ** 2
+
+    def read(true: float, error: float) -> tuple[float, float]:
+        return true * (1.0 + error * float(rng.standard_normal())), error * true
+
+    return Stiffness.from_bodies(
+        [read(radius, RADIUS_ERROR)],
+        [read(modulus, modulus_error), read(modulus, modulus_error)],
+        [read(ratio, ratio_error), read(ratio, ratio_error)],
+    )
+
+
+def true_value(hammer: Hammer, key: str) -> float:
+    """Return a constant of a hammer, SI, also one that follows from others, such as l from a rebound."""
+    section, _, name = key.rpartition(".")
+    if not section:
+        return hammer.mass
+    part = hammer.parts.get(section)
+    if part is None:
+        raise InputError(f"{hammer.path}: the hammer has no [{section}], expected one to recover")
+    if section == "backstop" and name in ("stiffness", "damping"):
+        return float(part.packed(hammer.origin)[0 if name == "stiffness" else 1])
+    return float(getattr(part, name))
+
+
+def _unknown(hammer: Hammer, rng: np.random.Generator) -> Hammer:
+    """Return a hammer whose mass is a guess, so that the fit of the motion does not begin at the truth."""
+    return hammer.replace("mass", hammer.mass * (1.0 + _START * float(rng.uniform(-1.0, 1.0))))

@@ -1,0 +1,178 @@
+"""Sensors as a user describes them: text with units, by quantity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.errors import InputError
+from printhammer.identify.bench.sensor import Amount, Sensor
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+NONE: Final = "none"
+"""What a bandwidth is called that does not limit anything."""
+
+PARTS: Final = ("noise", "resolution", "offset")
+"""What every quantity has."""
+
+_OTHERS: Final = ("exact", "sampling_rate", "bandwidth", "outliers")
+
+
+def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, str]) -> Sensor:
+    """Return a sensor with settings changed.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        What is changed.
+    settings : mapping
+        "noise", "resolution", "offset": mapping of quantity to amount, such as {"force": "0.5 %"};
+        "sampling_rate", "bandwidth": "100 kHz" or a number in Hz, "none" for no limit; "outliers": share,
+        "2 %" or 0.02; "exact": True to begin without any error.
+    units : mapping of str to str
+        SI unit of each quantity.
+
+    Returns
+    -------
+    Sensor
+        The sensor.
+
+    Raises
+    ------
+    InputError
+        A setting or quantity is not known, or the value is not what it should be.
+    """
+    for name in settings:
+        if name not in (*PARTS, *_OTHERS):
+            raise InputError(
+                f"the sensor setting {name!r} is not known, expected one of {', '.join((*PARTS, *_OTHERS))}"
+            )
+    if settings.get("exact"):
+        sensor = sensor.exact()
+    channels = dict(sensor.channels)
+    for part in PARTS:
+        for name, given in _quantities(part, settings.get(part)).items():
+            if name not in channels:
+                known = ", ".join(channels)
+                raise InputError(f"{part}: the quantity {name!r} is not measured, expected one of {known}")
+            amount = Amount.read(given, units[name], f"{part} of {name}", signed=part == "offset")
+            channels[name] = replace(channels[name], **{part: amount})
+    changes: dict[str, Any] = {"channels": channels}
+    for name, read in _READ.items():
+        if settings.get(name) is not None:
+            changes[name] = read(settings[name], name)
+    if sensor.sampling_rate is None and any(changes.get(name) for name in ("sampling_rate", "bandwidth")):
+        raise InputError("a sampling rate or bandwidth is given, expected it with a record of a motion only")
+    return replace(sensor, **changes)
+
+
+def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings that are about what a sensor has: its quantities, and records if it makes them."""
+    found = dict(settings)
+    for part in PARTS:
+        if part in found:
+            given = _quantities(part, found[part])
+            found[part] = {name: value for name, value in given.items() if name in sensor.channels}
+    if sensor.sampling_rate is None:
+        found = {name: value for name, value in found.items() if name not in ("sampling_rate", "bandwidth")}
+    return found
+
+
+def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> dict[str, str]:
+    """Read settings such as "force=0.5 %" or "0.2 um", which goes to all quantities of its dimension.
+
+    Parameters
+    ----------
+    texts : list of str
+        As given on the command line.
+    part : str
+        "noise", "resolution" or "offset", for messages.
+    quantities : mapping of str to str
+        SI unit of each quantity that may be named.
+
+    Returns
+    -------
+    dict
+        Text of the amount, by quantity.
+
+    Raises
+    ------
+    InputError
+        A quantity is not known, given twice, or none has the dimension.
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        name, equals, amount = text.partition("=")
+        name = " ".join(name.lower().split())
+        names = [name] if equals else _of_dimension(text, part, quantities)
+        for one in names:
+            if one not in quantities:
+                known = ", ".join(quantities)
+                raise InputError(
+                    f"{part} {text!r}: the quantity {one!r} is not known, expected one of {known}"
+                )
+            if one in found:
+                raise InputError(f"{part} {text!r}: {one} is given twice, expected it once")
+            found[one] = amount.strip() if equals else text.strip()
+    return found
+
+
+def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[str]:
+    from printhammer.units import parse
+
+    names = []
+    for name, si in quantities.items():
+        try:
+            parse(text, si)
+        except InputError:
+            continue
+        names.append(name)
+    if not names:
+        such = next(iter(quantities))
+        raise InputError(
+            f"{part} {text!r}: expected an amount such as '{such}=0.5 %', or a number with the unit of"
+            f" {' or '.join(quantities)}"
+        )
+    return names
+
+
+def _quantities(part: str, given: Any) -> Mapping[str, Any]:
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise InputError(f"{part} = {given!r}, expected amounts by quantity, such as {{'force': '0.5 %'}}")
+    return given
+
+
+def _frequency(value: Any, name: str) -> float | None:
+    from printhammer.drive.input import read_positive
+
+    if isinstance(value, str) and value.strip().lower() == NONE:
+        return None
+    return read_positive(value, "Hz", name)
+
+
+def _rate(value: Any, name: str) -> float:
+    from printhammer.drive.input import read_positive
+
+    return read_positive(value, "Hz", name)
+
+
+def _share(value: Any, name: str) -> float:
+    from printhammer.drive.input import read_number
+
+    share = read_number(value, "1", name)
+    if not (0.0 <= share <= 0.5 and math.isfinite(share)):
+        raise InputError(f"{name} = {value!r}, expected a share from 0 to 50 %")
+    return share
+
+
+_READ: Final[dict[str, Callable[[Any, str], float | None]]] = {
+    "sampling_rate": _rate,
+    "bandwidth": _frequency,
+    "outliers": _share,
+}

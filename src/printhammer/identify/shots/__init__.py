@@ -1,0 +1,1 @@
+"""Constants from displacement records of single shots."""

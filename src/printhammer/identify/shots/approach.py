@@ -1,0 +1,164 @@
+"""The way to constants that are far off: stretches that need not fit together yet.
+
+Gaps between the stretches are allowed, at a price that rises from step to step. So a wrong constant is
+corrected by what each stretch by itself shows, before errors can grow from contact to contact.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.identify.shots.gauss_newton import Prior
+    from printhammer.identify.shots.shooting import Chain, Shooting
+    from printhammer.support.arrays import FloatArray
+
+_WIDE: Final = 10.0
+"""Price of gaps at first: those of so many times the largest gap cost as much as all data together."""
+_NARROW: Final = 0.001
+"""Gap, in strokes and typical speeds, from which on they can be closed at once."""
+_RISE: Final = 0.3
+_LONGEST: Final = 0.3
+"""Largest change in one step: relative of a constant, of a state in strokes and typical speeds."""
+_HALVINGS: Final = 6
+_TRIES: Final = 2
+"""Steps at one price."""
+
+
+class Approach:
+    """Steps towards a minimum of data, priors and gaps.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        The model.
+    priors : sequence of (Prior, array)
+        What is known beside, each with the matrix that whitens it, counted in the scales of the parameters.
+    spikes : sequence of bool array
+        Samples of each shot that do not count.
+    """
+
+    def __init__(
+        self,
+        shooting: Shooting,
+        priors: Sequence[tuple[Prior, FloatArray]],
+        spikes: Sequence[npt.NDArray[np.bool_]],
+    ) -> None:
+        self.shooting = shooting
+        self.priors = list(priors)
+        self.keep = [(~rows).astype(np.float64) for rows in spikes]
+
+    def run(self, values: FloatArray, states: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
+        """Return parameters, SI, and states at the joints from which a fit without gaps can begin."""
+        values, states = values.copy(), list(states)
+        chains = self.shooting.chains(values, states, derivatives=True)
+        width = 0.0 if chains is None else _WIDE * self._widest(chains)
+        while width > _NARROW and chains is not None:
+            scales = self._scales(chains)
+            for _ in range(_TRIES):
+                cost = self._cost(values, chains, scales, width)
+                step = self._step(values, chains, scales, width)
+                length = min(1.0, _LONGEST / max(float(np.abs(step).max()), 1e-300))
+                for _ in range(_HALVINGS):
+                    new, moved = self._moved(values, states, length * step)
+                    trial = self.shooting.chains(new, moved, derivatives=True)
+                    if trial is not None and self._cost(new, trial, scales, width) < cost:
+                        break
+                    length *= 0.5
+                else:
+                    break
+                values, states, chains = new, moved, trial
+                if float(np.abs(step).max()) < 0.1 * width:
+                    break
+            width *= _RISE
+        return values, states
+
+    def _moved(
+        self, values: FloatArray, states: Sequence[FloatArray], step: FloatArray
+    ) -> tuple[FloatArray, list[FloatArray]]:
+        count = len(values)
+        first, moved = count, []
+        for state in states:
+            change = step[first : first + state.size].reshape(state.shape) * self.shooting.units
+            first += state.size
+            moved.append(state + change)
+        return values + step[:count] * self.shooting.parameters.scales, moved
+
+    def _left(self, chains: Sequence[Chain]) -> list[FloatArray]:
+        return [
+            (shot.x - self.shooting.shown(number, chain.motion)) * keep
+            for number, (shot, chain, keep) in enumerate(
+                zip(self.shooting.shots, chains, self.keep, strict=True)
+            )
+        ]
+
+    def _widest(self, chains: Sequence[Chain]) -> float:
+        gaps = [chain.gaps / self.shooting.units for chain in chains if chain.gaps.size]
+        return max((float(np.abs(gap).max()) for gap in gaps), default=0.0)
+
+    def _scales(self, chains: Sequence[Chain]) -> FloatArray:
+        found = [
+            float(np.sqrt(left @ left / keep.sum()))
+            for left, keep in zip(self._left(chains), self.keep, strict=True)
+        ]
+        return np.maximum(found, 1e-16)
+
+    def _prior(self, values: FloatArray) -> list[FloatArray]:
+        scales = self.shooting.parameters.scales
+        return [
+            white @ ((prior.mean - values[prior.which]) / scales[prior.which]) for prior, white in self.priors
+        ]
+
+    def _cost(self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float) -> float:
+        total = sum(float(off @ off) for off in self._prior(values))
+        for left, chain, scale in zip(self._left(chains), chains, scales, strict=True):
+            gaps = chain.gaps / self.shooting.units / width
+            total += float(left @ left) / scale**2 + len(left) * float((gaps * gaps).sum())
+        return total
+
+    def _step(
+        self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float
+    ) -> FloatArray:
+        """Return the step of Gauss and Newton, in scales of the parameters and units of the states."""
+        count = len(values)
+        size = count + sum(chain.gaps.size for chain in chains)
+        units = self.shooting.units
+        rows, right = [], []
+        first = count
+        for shot, (left, chain, scale) in enumerate(zip(self._left(chains), chains, scales, strict=True)):
+            _shown, derivatives = self.shooting.opened(shot, chain)
+            keep = self.keep[shot] / scale
+            row = np.zeros((len(left), size))
+            row[:, :count] = derivatives[:, :count] * keep[:, np.newaxis]
+            row[:, first : first + chain.gaps.size] = derivatives[:, count:] * keep[:, np.newaxis]
+            rows.append(row)
+            right.append(left / scale)
+            weight = np.sqrt(len(left)) / width
+            joints = len(chain.gaps)
+            for joint in range(joints):
+                row = np.zeros((2, size))
+                row[:, :count] = chain.end_by_parameter[joint] / units[:, np.newaxis]
+                here = first + 2 * joint
+                row[:, here : here + 2] = -np.eye(2)
+                if joint > 0:
+                    row[:, here - 2 : here] = chain.end_by_state[joint] * units / units[:, np.newaxis]
+                rows.append(row * weight)
+                right.append(-chain.gaps[joint] / units * weight)
+            first += chain.gaps.size
+        for (prior, white), off in zip(self.priors, self._prior(values), strict=True):
+            row = np.zeros((len(off), size))
+            row[:, prior.which] = white
+            rows.append(row)
+            right.append(off)
+        design, wanted = np.concatenate(rows), np.concatenate(right)
+        sizes = np.sqrt((design * design).sum(axis=0))
+        sizes[sizes == 0.0] = 1.0
+        design /= sizes
+        inverse = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True)
+        return np.asarray(inverse @ (design.T @ wanted) / sizes)

@@ -1,0 +1,340 @@
+"""Least squares on chains of stretches: steps for the constants that also close the gaps at the joints.
+
+Every step solves the linearised problem in which all gaps are closed; it is shortened until the data are met
+better or the gaps are smaller than at any step before (a filter: R. Fletcher and S. Leyffer, Math. Program.
+91 (2002) 239). Residuals are weighted by Huber's rule while the constants are wrong; near the solution
+outliers are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.identify.residuals import (
+    memory_factor,
+    outliers_of,
+    spikes_of,
+)
+from printhammer.identify.shots.approach import Approach
+from printhammer.identify.shots.identifiable import singular
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.identify.shots.shooting import Chain, Shooting
+    from printhammer.support.arrays import FloatArray
+
+_MOST_STEPS: Final = 40
+_FULL: Final = 0.4
+"""Largest relative change of a constant in one step."""
+_SHORTEST: Final = 1e-3
+_EXACT: Final = 1e-11
+"""Relative change of all constants at which exact data are met."""
+_NEAR, _DONE = 1.0, 1e-3
+"""Steps in standard errors at which outliers are left out, and at which the fit is done."""
+_NARROW, _CLOSED = 1e-2, 1e-8
+"""Gaps in strokes and typical speeds at which outliers are left out, and at which the fit is done."""
+_FLOOR: Final = 1e-7
+"""Noise in strokes below which no sensor is, so that nothing lies too far off."""
+_LEAST: Final = 1e-16
+"""Noise, m, by which exact data are weighted."""
+_LOST: Final = 1e-7
+"""Singular values over the largest that rounding has lost."""
+_NO_MOTION: Final = "the hammer does not move so that the records could be compared with it"
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the parameters beside the records: normal, (p - mean) with a covariance.
+
+    Attributes
+    ----------
+    which : int array, shape (k,)
+        Numbers of the parameters.
+    mean : array, shape (k,)
+        SI.
+    covariance : array, shape (k, k)
+        SI.
+    """
+
+    which: npt.NDArray[np.int64]
+    mean: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where the fit ended.
+
+    Attributes
+    ----------
+    values : array, shape (p,)
+        Parameters, SI.
+    covariance : array, shape (p, p)
+        SI.
+    states : list of array
+        States at the joints of each shot.
+    shown, by_parameter : list of array, shape (n,) and (n, p)
+        The model of each record, m, and its derivatives with respect to the parameters in their scales.
+    outliers : list of bool array
+        Samples left out.
+    scales, memories : array, shape (shots,)
+        Standard deviation of the residuals, m, and the factor by which their memory increases variances.
+    design : array
+        Rows of data and prior over their standard errors, columns counted in the scales.
+    cost : float
+        Weighted sum of squares, prior included.
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    states: list[FloatArray]
+    shown: list[FloatArray]
+    by_parameter: list[FloatArray]
+    outliers: list[npt.NDArray[np.bool_]]
+    scales: FloatArray
+    memories: FloatArray
+    design: FloatArray
+    cost: float
+
+
+class GaussNewton:
+    """The fit of the parameters of a `Shooting`.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        The model.
+    priors : sequence of Prior
+        What is known beside.
+    robust : bool
+        Whether outliers are weighed down and left out.
+    """
+
+    def __init__(self, shooting: Shooting, priors: Sequence[Prior], *, robust: bool) -> None:
+        self.shooting = shooting
+        self.priors = list(priors)
+        self.robust = robust
+        self.data = [shot.x for shot in shooting.shots]
+        self.spikes = [
+            spikes_of(shot.x, shot.noise) if robust else np.zeros(len(shot.x), bool)
+            for shot in shooting.shots
+        ]
+        self.floor = _FLOOR * shooting.stroke
+        scales = shooting.parameters.scales
+        self.whitening = []
+        for prior in self.priors:
+            size = scales[prior.which]
+            factor = np.linalg.cholesky(prior.covariance / np.outer(size, size))
+            self.whitening.append(np.linalg.inv(factor))
+
+    def design(self, values: FloatArray, states: Sequence[FloatArray]) -> FloatArray:
+        """Return the rows of data and priors over their standard errors, shape (m, p), at some values.
+
+        Raises
+        ------
+        InputError
+            There is no motion to compare the records with.
+        """
+        chains = self.shooting.chains(values, states, derivatives=True)
+        if chains is None:
+            raise InputError(_NO_MOTION)
+        parts = [self.shooting.condensed(shot, chain) for shot, chain in enumerate(chains)]
+        return self._weighted(values, parts, near=False).design
+
+    def solve(
+        self,
+        values: FloatArray,
+        states: Sequence[FloatArray],
+        held: npt.NDArray[np.bool_] | None = None,
+        noise: Solution | None = None,
+    ) -> Solution:
+        """Find the parameters.
+
+        Parameters
+        ----------
+        values : array, shape (p,)
+            Where to begin, SI.
+        states : sequence of array, shape (j, 2)
+            States at the joints of each shot to begin with.
+        held : bool array, shape (p,), optional
+            Parameters that stay where they are.
+        noise : Solution, optional
+            Whose noise and outliers are taken as known, near it.
+
+        Returns
+        -------
+        Solution
+            The solution.
+
+        Raises
+        ------
+        InputError
+            There is none near.
+        """
+        scales = self.shooting.parameters.scales
+        # A profile begins where all is near.
+        if noise is None:
+            pairs = list(zip(self.priors, self.whitening, strict=True))
+            values, states = Approach(self.shooting, pairs, self.spikes).run(values, states)
+        free = np.ones(len(values), bool) if held is None else ~held
+        values, states = values.copy(), [state.copy() for state in states]
+        chains = self.shooting.chains(values, states, derivatives=True)
+        near = noise is not None
+        passed: list[tuple[float, float]] = []
+        for _ in range(_MOST_STEPS):
+            if chains is None:
+                raise InputError(_NO_MOTION)
+            parts = [self.shooting.condensed(shot, chain) for shot, chain in enumerate(chains)]
+            here = self._weighted(values, parts, near=near, noise=noise)
+            step = np.zeros(len(values))
+            step[free], errors = _solved(here.design[:, free], here.residuals)
+            in_errors = np.abs(step[free]) / np.maximum(errors, 1e-300)
+            gap = _gap(chains, self.shooting.units)
+            small = bool((in_errors < _DONE).all()) or bool((np.abs(step) < _EXACT).all())
+            if near and small and gap < _CLOSED:
+                return self._solution(values, states, parts, here)
+            was_near, near = near, near or (bool((in_errors < _NEAR).all()) and gap < _NARROW) or small
+            if near and not was_near:
+                passed = []
+            length = min(1.0, _FULL / max(float(np.abs(step).max()), 1e-300))
+            passed.append((self._cost(values, chains, here), gap))
+            while True:
+                new = values + length * step * scales
+                moved = [
+                    state + length * (part[2] + part[3] @ step)
+                    for state, part in zip(states, parts, strict=True)
+                ]
+                trial = self.shooting.chains(new, moved, derivatives=True)
+                if trial is not None and (
+                    near
+                    or self._accepted(passed, self._cost(new, trial, here), _gap(trial, self.shooting.units))
+                ):
+                    break
+                length *= 0.5
+                if length < _SHORTEST:
+                    raise InputError(
+                        "the fit does not converge, expected constants nearer to the truth to begin with"
+                    )
+            values, states, chains = new, moved, trial
+        raise InputError(f"the fit has not converged after {_MOST_STEPS} steps")
+
+    def _weighted(
+        self,
+        values: FloatArray,
+        parts: Sequence[tuple[FloatArray, ...]],
+        *,
+        near: bool,
+        noise: Solution | None = None,
+    ) -> _Weighted:
+        """Return residuals and Jacobian of data and priors over their standard errors."""
+        rows, residuals, weights, outliers, scales, memories = [], [], [], [], [], []
+        for shot, (x, (shown, jacobian, *_rest)) in enumerate(zip(self.data, parts, strict=True)):
+            left = x - shown
+            out = outliers_of(left, self.floor) if self.robust and near else np.zeros(len(left), bool)
+            if noise is not None:
+                out, scale, memory = noise.outliers[shot], noise.scales[shot], noise.memories[shot]
+                weight = np.where(out, 0.0, 1.0)
+            elif near or not self.robust:
+                scale = max(float(np.sqrt(np.mean(left[~out] ** 2))), _LEAST)
+                weight = np.where(out, 0.0, 1.0)
+                memory = memory_factor(np.where(out, 0.0, left)) if near else 1.0
+            else:
+                # A stretch that is not met yet is no outlier, only what stands out of the record itself.
+                out, memory = self.spikes[shot], 1.0
+                scale = max(float(np.sqrt(np.mean(left[~out] ** 2))), _LEAST)
+                weight = np.where(out, 0.0, 1.0)
+            size = scale * np.sqrt(memory)
+            rows.append(jacobian * (np.sqrt(weight) / size)[:, np.newaxis])
+            residuals.append(left * np.sqrt(weight) / size)
+            weights.append(weight)
+            outliers.append(out)
+            scales.append(scale)
+            memories.append(memory)
+        for prior, white in zip(self.priors, self.whitening, strict=True):
+            size = self.shooting.parameters.scales[prior.which]
+            row = np.zeros((len(prior.which), len(values)))
+            row[:, prior.which] = white
+            rows.append(row)
+            residuals.append(white @ ((prior.mean - values[prior.which]) / size))
+        return _Weighted(
+            np.concatenate(rows),
+            np.concatenate(residuals),
+            outliers,
+            np.array(scales),
+            np.array(memories),
+            near,
+        )
+
+    def _cost(self, values: FloatArray, chains: Sequence[Chain], here: _Weighted) -> float:
+        """Return the cost of data and prior at some values, with the scales of the step."""
+        total = 0.0
+        for shot, chain in enumerate(chains):
+            left = self.data[shot] - self.shooting.shown(shot, chain.motion)
+            left = left[~self.spikes[shot]]
+            total += float(left @ left) / here.scales[shot] ** 2
+        for prior, white in zip(self.priors, self.whitening, strict=True):
+            off = white @ ((prior.mean - values[prior.which]) / self.shooting.parameters.scales[prior.which])
+            total += float(off @ off)
+        return total
+
+    @staticmethod
+    def _accepted(passed: Sequence[tuple[float, float]], cost: float, gap: float) -> bool:
+        return all(cost < (1.0 - 1e-4) * old or gap < 0.95 * wide for old, wide in passed)
+
+    def _solution(
+        self,
+        values: FloatArray,
+        states: list[FloatArray],
+        parts: Sequence[tuple[FloatArray, ...]],
+        here: _Weighted,
+    ) -> Solution:
+        scales = self.shooting.parameters.scales
+        inverse = np.linalg.pinv(here.design.T @ here.design, hermitian=True)
+        return Solution(
+            values=values,
+            covariance=inverse * np.outer(scales, scales),
+            states=states,
+            shown=[part[0] for part in parts],
+            by_parameter=[part[1] for part in parts],
+            outliers=here.outliers,
+            scales=here.scales,
+            memories=here.memories,
+            design=here.design,
+            cost=float(here.residuals @ here.residuals),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Weighted:
+    """The linear problem at a step: rows over their standard errors."""
+
+    design: FloatArray
+    residuals: FloatArray
+    outliers: list[npt.NDArray[np.bool_]]
+    scales: FloatArray
+    memories: FloatArray
+    near: bool
+
+
+def _solved(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the least-squares step and the standard errors, both in the scales of the parameters."""
+    sizes = np.sqrt((design * design).sum(axis=0))
+    sizes[sizes == 0.0] = 1.0
+    values, vectors = singular(design / sizes)
+    keep = values > _LOST * values[-1]
+    inverse = vectors * np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
+    step = inverse @ (inverse.T @ ((design / sizes).T @ residuals)) / sizes
+    errors = np.sqrt((inverse * inverse).sum(axis=1)) / sizes
+    return step, errors
+
+
+def _gap(chains: Sequence[Chain], units: FloatArray) -> float:
+    """Return the largest gap, in strokes and typical speeds."""
+    return max((float(np.abs(chain.gaps / units).max()) for chain in chains if chain.gaps.size), default=0.0)

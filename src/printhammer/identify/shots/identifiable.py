@@ -1,0 +1,189 @@
+"""What records of motion can and cannot tell: degenerate constants, weak ones, further ones."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.identify.result import Profile, student
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
+    from printhammer.support.arrays import FloatArray
+
+_DEGENERATE: Final = 1e5
+"""Condition number from which on difference quotients no longer tell the columns of a Jacobian apart."""
+_TIED: Final = 0.98
+"""Correlation of two constants that are hardly told apart."""
+_WEAK: Final = 0.1
+"""Standard error of a constant, in units of its value, that is weakly determined."""
+_SHARE: Final = 0.02
+"""Part of a constant in a direction, over the largest, from which on it is named."""
+_REACH: Final = 3.0
+_POINTS: Final = 7
+
+
+def condition_number(design: FloatArray) -> float:
+    """Return the condition number of a Jacobian with columns of unit length; infinite where one is 0."""
+    sizes = np.sqrt((design * design).sum(axis=0))
+    if not sizes.all():
+        return float("inf")
+    values, _vectors = singular(design / sizes)
+    return float(values[-1] / values[0]) if values[0] > 0.0 else float("inf")
+
+
+def singular(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return singular values, ascending, and right singular vectors as columns, of a tall matrix.
+
+    From its normal matrix, which is small: good where the condition number is not above 1e7.
+    """
+    squares, vectors = np.linalg.eigh(matrix.T @ matrix)
+    return np.sqrt(np.maximum(squares, 0.0)), vectors
+
+
+def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> None:
+    """Refuse constants that can change together without any change of the motion.
+
+    Parameters
+    ----------
+    where : str
+        Names of the files.
+    design : array, shape (m, p)
+        Jacobian over the standard errors of the data.
+    names : sequence of str, of length p
+        Of the parameters.
+
+    Raises
+    ------
+    InputError
+        There are such constants; the sentence names them.
+    """
+    sizes = np.sqrt((design * design).sum(axis=0))
+    blind = [name for name, size in zip(names, sizes, strict=True) if size == 0.0]
+    if blind:
+        raise InputError(f"{where}: nothing in the records depends on {blind[0]}, expected it not to be free")
+    values, vectors = singular(design / sizes)
+    if values[0] * _DEGENERATE > values[-1]:
+        return
+    direction = np.abs(vectors[:, 0])
+    tied = [name for name, part in zip(names, direction, strict=True) if part > _SHARE * direction.max()]
+    raise InputError(
+        f"{where}: a motion cannot tell apart {_listed(tied)}: changed together they leave the records as"
+        " they are, expected at least one of them to be held"
+    )
+
+
+def tied_constants(names: Sequence[str], values: FloatArray, covariance: FloatArray) -> list[str]:
+    """Return one sentence for each pair that is hardly told apart, and for each that is weak."""
+    errors = np.sqrt(np.diag(covariance))
+    told = []
+    for i, name in enumerate(names):
+        for j in range(i):
+            correlation = covariance[i, j] / (errors[i] * errors[j])
+            if abs(correlation) > _TIED:
+                told.append(
+                    f"{names[j]} and {name} are hardly told apart: their correlation is {correlation:.4f}"
+                )
+    for name, value, error in zip(names, values, errors, strict=True):
+        if error > _WEAK * abs(value):
+            told.append(f"{name} is known to {100.0 * error / abs(value):.2g} % only")
+    return told
+
+
+def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
+    """Return which constants are weakly determined."""
+    errors = np.sqrt(np.diag(covariance))
+    return [int(i) for i in np.flatnonzero(errors > _WEAK * np.abs(values))]
+
+
+def profile(fit: GaussNewton, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
+    """Return how much worse the fit becomes where one parameter is held at other values.
+
+    The noise is taken as found at the solution; where there is no fit, or the constant would change its sign,
+    the profile ends.
+
+    Parameters
+    ----------
+    fit : GaussNewton
+        The fit.
+    solution : Solution
+        Its solution.
+    which : int
+        Number of the parameter.
+    degrees_of_freedom : float
+        Of the estimate of the noise.
+
+    Returns
+    -------
+    Profile
+        With the interval of 95 %.
+    """
+    error = float(np.sqrt(solution.covariance[which, which]))
+    best = solution.values[which]
+    held = np.zeros(len(solution.values), bool)
+    held[which] = True
+    found = {best: 0.0}
+    for side in (-1.0, 1.0):
+        values, states = solution.values, solution.states
+        for number in range(1, _POINTS // 2 + 1):
+            place = best + side * _REACH * error * number / (_POINTS // 2)
+            if place * best <= 0.0:
+                break
+            start = values.copy()
+            start[which] = place
+            try:
+                other = fit.solve(start, states, held=held, noise=solution)
+            except InputError:
+                break
+            found[place] = max(other.cost - solution.cost, 0.0)
+            values, states = other.values, other.states
+    places = np.array(sorted(found))
+    increase = np.array([found[place] for place in places])
+    return Profile(places, increase, _interval(places, increase, best, student(degrees_of_freedom)))
+
+
+def _interval(places: FloatArray, increase: FloatArray, best: float, reach: float) -> tuple[float, float]:
+    """Return where the root of the increase, which is nearly straight, passes a number of standard errors."""
+    roots = np.sqrt(increase) * np.sign(places - best)
+    low = float(np.interp(-reach, roots, places)) if roots[0] < -reach else -np.inf
+    high = float(np.interp(reach, roots, places)) if roots[-1] > reach else np.inf
+    return low, high
+
+
+def would_be_found(
+    design: FloatArray, columns: FloatArray, names: Sequence[str], residuals: FloatArray
+) -> list[tuple[str, float, float]]:
+    """Return what the records would say of further constants, one at a time, were they free too.
+
+    Parameters
+    ----------
+    design : array, shape (m, p)
+        Jacobian of what was fitted, over the standard errors of the data.
+    columns : array, shape (m, q)
+        Likewise of further constants, per relative change.
+    names : sequence of str, of length q
+        Their names.
+    residuals : array, shape (m,)
+        Over the standard errors.
+
+    Returns
+    -------
+    list of tuple
+        Name, relative standard error, and relative change that would fit best, of each.
+    """
+    basis, _r = np.linalg.qr(design)
+    found = []
+    for name, column in zip(names, columns.T, strict=True):
+        own = column - basis @ (basis.T @ column)
+        size = float(own @ own)
+        if size > 1e-12 * float(column @ column):
+            found.append((name, size**-0.5, float(own @ residuals) / size))
+    return found
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,319 @@
+"""Constants from displacement records of single shots, by multiple shooting between contacts.
+
+The records tell the mass and what the contacts do to the motion, given the static forces. A motion shows
+forces only over the mass: if the mass and all forces are multiplied by one number, no record changes.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.identify.lowpass import time_constant
+from printhammer.identify.result import Fit, FittedConstant
+from printhammer.identify.shots.gauss_newton import GaussNewton, Prior, Solution
+from printhammer.identify.shots.identifiable import (
+    condition_number,
+    profile,
+    refuse_degenerate,
+    tied_constants,
+    weak,
+)
+from printhammer.identify.shots.notes import further, remembered, rests, tested
+from printhammer.identify.shots.pulse import Pulse, fit_pulse
+from printhammer.identify.shots.shooting import Parameters, Shooting
+from printhammer.identify.shots.shot import FEWEST, read_shot
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.identify.shots.shot import Shot
+    from printhammer.support.arrays import FloatArray
+
+_DAMPING: Final = "backstop.damping"
+_FIRST_GUESS: Final = 0.3
+"""Damping over stiffness to begin with where the hammer has none, s/m."""
+
+
+def fit_motion(
+    paths: Sequence[str | Path],
+    hammer: Hammer,
+    *,
+    free: Sequence[str] | None = None,
+    robust: bool = True,
+    bandwidth: float | None = None,
+    earlier: Sequence[Fit] = (),
+) -> Fit:
+    """Fit the mass and what else displacement records of single shots tell.
+
+    Every record is cut in free flight between its contacts. Each stretch is integrated by itself, from a
+    state of its own; the constants are common, and at the solution each stretch begins where the one before
+    ends (`printhammer.identify.shots.shooting`). The sensor is a first-order low-pass with additive noise.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Records with the columns ``time``, ``displacement`` and perhaps ``current``, units in the heading; one
+        shot a file, the firing at time 0, from rest.
+    hammer : Hammer
+        Holds all constants that are not fitted, and is where the fit begins.
+    free : sequence of str, optional
+        Keys of the constants to fit; by default the mass, and the damping of a Hertz backstop if a record
+        touches it.
+    robust : bool, optional
+        Whether outliers are left out.
+    bandwidth : float, optional
+        Of the sensor (-3 dB), Hz; by default what a comment ``# bandwidth: 200 kHz`` of a record says, and
+        else unlimited. The column of currents is taken to come through a like sensor.
+    earlier : sequence of Fit, optional
+        Fits from which constants of the hammer come. Theirs are then not exact, but known with their
+        covariance; the records may improve them, and they are among the constants found. Of a constant in
+        several fits, the first counts.
+
+    Returns
+    -------
+    Fit
+        Of kind "motion"; abscissa and data are times, s, and displacements, m.
+
+    Raises
+    ------
+    InputError
+        A record cannot be used, misses the impact, or is too short or too coarse; a constant cannot be found
+        from it, or not be told apart from others.
+    """
+    if isinstance(paths, str) or not paths:
+        raise InputError(f"paths = {paths!r}, expected a sequence of at least one record")
+    if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0.0):
+        raise InputError(f"bandwidth = {bandwidth!r} Hz, expected a positive number")
+    shots = [read_shot(path, hammer, bandwidth) for path in paths]
+    touched = any(shot.touching("backstop") for shot in shots)
+    keys = _free_keys(hammer, free, shots, touched=touched)
+    hammer = _plain(hammer, keys)
+    known = _known(hammer, earlier)
+    keys = (*keys, *(key for key in known if key not in keys))
+    pulses, notes = _pulses(hammer, shots)
+    start, parameters, priors, own = _assembled(hammer, keys, pulses, earlier)
+    shooting = Shooting(hammer, shots, own, parameters)
+    fit = GaussNewton(shooting, priors, robust=robust)
+    where = " and ".join(shot.name for shot in shots)
+    names = (*keys, *(f"the current of {shots[owner].name}" for owner in parameters.owners))
+    states = [shot.states for shot in shots]
+    refuse_degenerate(where, fit.design(start, states), names)
+    try:
+        solution = fit.solve(start, states)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    if not touched and hammer.backstop is not None:
+        notes.append("no record touches the backstop after the shot: its damping cannot be found from them")
+    return _result(hammer, shots, fit, solution, keys, notes)
+
+
+def _free_keys(
+    hammer: Hammer, free: Sequence[str] | None, shots: Sequence[Shot], *, touched: bool
+) -> tuple[str, ...]:
+    """Return the constants to fit, or say why one cannot be."""
+    hertz = hammer.backstop is not None and hammer.backstop.law == "hertz"
+    if free is None:
+        return ("mass", _DAMPING) if touched and hertz else ("mass",)
+    keys = (free,) if isinstance(free, str) else tuple(free)
+    if not keys:
+        raise InputError("free: no constants are given, expected at least one such as 'mass'")
+    where = " and ".join(shot.name for shot in shots)
+    for number, key in enumerate(keys):
+        if key in keys[:number]:
+            raise InputError(f"free: {key} is given twice, expected it once")
+        given_otherwise = hertz and key in (_DAMPING, "backstop.stiffness")
+        if (key not in hammer.constants and not given_otherwise) or key == "platen":
+            raise InputError(
+                f"free: {key!r} is no constant of {hammer.path} that moves the armature, expected one such as"
+                " 'mass'"
+            )
+        if key == _DAMPING and not touched:
+            raise InputError(
+                f"{where}: the record does not touch the backstop after the shot, expected one that does for"
+                f" {key}"
+            )
+        fewest = max((touch.count for shot in shots for touch in shot.touching("backstop")), default=0)
+        if key.startswith("backstop.") and touched and fewest < FEWEST:
+            raise InputError(
+                f"{where}: {fewest} samples in the longest contact with the backstop, expected at least"
+                f" {FEWEST} for {key}"
+            )
+    return keys
+
+
+def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
+    """Return the hammer with stiffness and damping of its backstop given as such where they are fitted."""
+    backstop = hammer.backstop
+    changes: dict[str, float | None] = {}
+    for key, value, others in (
+        (
+            "backstop.stiffness",
+            getattr(backstop, "k", None),
+            ("radius1", "radius2", "youngs_modulus1", "youngs_modulus2", "poisson_ratio1", "poisson_ratio2"),
+        ),
+        (_DAMPING, getattr(backstop, "l", None), ("restitution", "restitution_speed")),
+    ):
+        if key in keys and key not in hammer.constants:
+            changes |= {f"backstop.{name}": None for name in others if f"backstop.{name}" in hammer.constants}
+            changes[key] = value
+    if _DAMPING in keys and getattr(backstop, "l", None) == 0.0:
+        changes[_DAMPING] = _FIRST_GUESS * float(getattr(backstop, "k", 0.0))
+    hammer = hammer.replace(changes) if changes else hammer
+    for key in keys:
+        if hammer.constants[key].si == 0.0:
+            raise InputError(f"{hammer.path}: {key} is 0, expected a value from which a fit can begin")
+    return hammer
+
+
+def _known(hammer: Hammer, earlier: Sequence[Fit]) -> list[str]:
+    """Return the constants of earlier fits that the hammer has."""
+    found: list[str] = []
+    for fit in earlier:
+        for key in _usable(hammer, fit):
+            if key not in found:
+                found.append(key)
+    return found
+
+
+def _usable(hammer: Hammer, fit: Fit) -> list[str]:
+    return [key for key in fit.keys if key in hammer.constants and fit.constants[key].in_file]
+
+
+def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], list[str]]:
+    """Return the current of each shot, None where the hammer's own waveform is taken, and what is odd."""
+    pulses: list[Pulse | None] = []
+    for shot in shots:
+        if shot.current is None:
+            if hammer.waveform is None:
+                raise InputError(
+                    f"{shot.name}: neither the record has a column 'current [A]' nor {hammer.path} a"
+                    " waveform, expected one of them"
+                )
+            pulses.append(None)
+        else:
+            tau = time_constant(shot.bandwidth)
+            pulses.append(fit_pulse(shot.name, shot.t, shot.current, hammer.waveform, tau))
+    return pulses, [pulse.note for pulse in pulses if pulse is not None and pulse.note]
+
+
+def _assembled(
+    hammer: Hammer, keys: tuple[str, ...], pulses: Sequence[Pulse | None], earlier: Sequence[Fit]
+) -> tuple[FloatArray, Parameters, list[Prior], list[Pulse | None]]:
+    """Return where to begin, the parameters, what is known of them, and the current of each shot."""
+    start = [hammer.constants[key].si for key in keys]
+    priors: list[Prior] = []
+    taken: set[str] = set()
+    for fit in earlier:
+        here = [key for key in _usable(hammer, fit) if key not in taken]
+        taken |= set(here)
+        if here:
+            rows = [fit.keys.index(key) for key in here]
+            mean = np.array([fit.constants[key].value for key in here])
+            which = np.array([keys.index(key) for key in here])
+            priors.append(Prior(which, mean, _definite(fit.covariance[np.ix_(rows, rows)], mean)))
+    own: list[Pulse | None] = []
+    owners: list[int] = []
+    common = [key for key in keys if key.startswith("waveform.")]
+    for shot, pulse in enumerate(pulses):
+        if pulse is None or not pulse.names:
+            own.append(pulse)
+            continue
+        fitted = [f"waveform.{name}" for name in pulse.names]
+        if common and all(key in fitted for key in common):
+            # The constants are those of the hammer; the recorded current is one more witness of them.
+            rows = [fitted.index(key) for key in common]
+            priors.append(
+                Prior(
+                    np.array([keys.index(key) for key in common]),
+                    pulse.values[rows],
+                    _definite(pulse.covariance[np.ix_(rows, rows)], pulse.values[rows]),
+                )
+            )
+            own.append(None)
+            continue
+        first = len(start)
+        start += pulse.values.tolist()
+        owners += [shot] * len(pulse.names)
+        which = np.arange(first, len(start))
+        priors.append(Prior(which, pulse.values, _definite(pulse.covariance, pulse.values)))
+        own.append(pulse)
+    begin = np.array(start)
+    return begin, Parameters(keys, tuple(owners), np.abs(begin)), priors, own
+
+
+def _definite(covariance: FloatArray, values: FloatArray) -> FloatArray:
+    """Return a covariance with a little added, so that what is exactly known can be inverted."""
+    return covariance + np.diag((1e-12 * values) ** 2)
+
+
+def _result(
+    hammer: Hammer,
+    shots: Sequence[Shot],
+    fit: GaussNewton,
+    solution: Solution,
+    keys: tuple[str, ...],
+    notes: list[str],
+) -> Fit:
+    shooting = fit.shooting
+    count = len(keys)
+    used = [~out for out in solution.outliers]
+    informed = sum(float(rows.sum()) / memory for rows, memory in zip(used, solution.memories, strict=True))
+    degrees = max(informed - count, 1.0)
+    covariance = solution.covariance[:count, :count]
+    values = solution.values[:count]
+    constants = {
+        key: FittedConstant.of(
+            key, values[i], float(np.sqrt(covariance[i, i])), degrees, hammer.constants[key].si_unit
+        )
+        for i, key in enumerate(keys)
+    }
+    p_value, rejected = tested(shots, solution, count)
+    fitted = np.concatenate(solution.shown)
+    data = np.concatenate([shot.x for shot in shots])
+    precisions = np.concatenate(
+        [np.full(len(shot.t), scale**-2.0) for shot, scale in zip(shots, solution.scales, strict=True)]
+    )
+    given = {
+        key: f"{constant.value!r} {constant.unit}"
+        for key, constant in hammer.constants.items()
+        if key not in keys
+        and key != "platen"
+        and not (key.startswith("waveform.") and None not in shooting.pulses)
+    }
+    notes = [
+        *notes,
+        *rests(shots, solution),
+        *remembered(shots, solution),
+        *further(fit, solution, hammer, rejected),
+    ]
+    return Fit(
+        kind="motion",
+        source=tuple(shot.name.replace("\\", "/").rpartition("/")[2] for shot in shots),
+        constants=constants,
+        keys=keys,
+        covariance=covariance,
+        abscissa=np.concatenate([shot.t for shot in shots]),
+        data=data,
+        fitted=fitted,
+        residuals=data - fitted,
+        axes=(("time", "s"), ("displacement", "m")),
+        degrees_of_freedom=degrees,
+        residual_scale=float(np.sqrt(np.mean(solution.scales**2))),
+        weights=precisions / precisions.max(),
+        outliers=np.concatenate(solution.outliers),
+        condition_number=condition_number(solution.design),
+        series=np.concatenate([np.full(len(shot.t), number) for number, shot in enumerate(shots)]),
+        series_names=tuple(shot.name.replace("\\", "/").rpartition("/")[2] for shot in shots),
+        lines=np.concatenate([shot.lines for shot in shots]),
+        given=given,
+        indistinct=tuple(tied_constants(keys, values, covariance)),
+        profiles={keys[which]: profile(fit, solution, which, degrees) for which in weak(values, covariance)},
+        rejected=rejected,
+        p_value=p_value,
+        notes=tuple(notes),
+    )

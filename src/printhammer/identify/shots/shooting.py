@@ -1,0 +1,381 @@
+"""Multiple shooting: stretches of single shots, each from a state of its own, and how they fit together.
+
+The model of a record is a chain of stretches. The first begins at rest at the firing, each other one in free
+flight with displacement and velocity as unknowns of their own; where one ends, the next must begin. Gaps are
+allowed while the constants are wrong, so that no error grows through more than one contact, and are closed at
+the solution. The unknown states are eliminated from the linearised conditions (H. G. Bock, in: Modelling of
+Chemical Reaction Systems, Springer 1981, 102), so that a step costs no more than one for the constants alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.identify.lowpass import lowpass_motion, time_constant
+from printhammer.identify.shots.shot import stroke_of
+from printhammer.run.ensemble import Ensemble
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.identify.shots.pulse import Pulse
+    from printhammer.identify.shots.shot import Shot
+    from printhammer.support.arrays import FloatArray
+
+_STEP: Final = 1e-7
+"""Change for a difference quotient: relative of a constant, of a state in strokes and typical speeds."""
+_FINEST: Final = 2e-6
+"""Longest time between the states through which a low-pass is followed, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """What is fitted: constants of the hammer, and constants of the current of each shot.
+
+    Attributes
+    ----------
+    keys : tuple of str
+        Constants of the hammer.
+    owners : tuple of int
+        Of each further parameter the shot; those of one shot are the constants of its pulse.
+    scales : array
+        Sizes in which all are counted, SI.
+    """
+
+    keys: tuple[str, ...]
+    owners: tuple[int, ...]
+    scales: FloatArray
+
+    @property
+    def count(self) -> int:
+        """Number of parameters."""
+        return len(self.keys) + len(self.owners)
+
+    def of_shot(self, shot: int) -> list[int]:
+        """Return the parameters of the current of a shot."""
+        return [len(self.keys) + i for i, owner in enumerate(self.owners) if owner == shot]
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The stretches of one shot at some values of the parameters.
+
+    Attributes
+    ----------
+    motion : array, shape (g, 2)
+        Displacement, m, and velocity, m/s, at the times of the grid.
+    gaps : array, shape (j, 2)
+        End of each stretch less the beginning of the next.
+    by_parameter : array, shape (g, 2, p)
+        Derivatives of the motion with respect to the parameters, counted in their scales; p = 0 if not asked
+        for.
+    by_state : array, shape (g, 2, 2)
+        Derivatives with respect to the state at the beginning of the stretch.
+    end_by_parameter, end_by_state : array, shape (j, 2, p) and (j, 2, 2)
+        Of the state at the end of each stretch but the last.
+    """
+
+    motion: FloatArray
+    gaps: FloatArray
+    by_parameter: FloatArray
+    by_state: FloatArray
+    end_by_parameter: FloatArray
+    end_by_state: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """Times of a shot: the grid, the rows of the samples in it, and the rows at which stretches begin."""
+
+    grid: FloatArray
+    samples: npt.NDArray[np.int64]
+    begins: npt.NDArray[np.int64]
+    tau: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """One member of the ensemble: a stretch under some constants, from some state, at some times."""
+
+    hammer: Hammer
+    drive: PulseTrain
+    state: FloatArray
+    times: FloatArray
+
+
+class Shooting:
+    """Chains of stretches for several shots, integrated together.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        Its constants that are not fitted stay as they are.
+    shots : sequence of Shot
+        The records.
+    pulses : sequence of Pulse
+        The current of each; None where the hammer's own waveform is fired.
+    parameters : Parameters
+        What is fitted.
+    """
+
+    def __init__(
+        self, hammer: Hammer, shots: Sequence[Shot], pulses: Sequence[Pulse | None], parameters: Parameters
+    ) -> None:
+        self.hammer = hammer
+        self.shots = list(shots)
+        self.pulses = list(pulses)
+        self.parameters = parameters
+        self.plans = [_plan(shot) for shot in shots]
+        self.stroke = stroke_of(hammer, shots[0].x)
+        speed = max(float(np.abs(np.gradient(shot.x, shot.t)).max()) for shot in shots)
+        self.units = np.array([self.stroke, speed])
+        self.steps = _STEP * self.units
+        self.lasting = [self._lasting(pulse) for pulse in pulses]
+
+    def _lasting(self, pulse: Pulse | None) -> float:
+        waveform = self.hammer.waveform if pulse is None else pulse.waveform
+        # Half as long again, as a fit may make a pulse longer.
+        return 1.5 * waveform.support if waveform is not None else 0.0
+
+    def hammer_at(self, values: FloatArray) -> Hammer:
+        """Return the hammer with other values of the constants fitted, SI."""
+        changes = {key: float(value) for key, value in zip(self.parameters.keys, values, strict=False)}
+        return self.hammer.replace(changes) if changes else self.hammer
+
+    def _variants(
+        self, values: FloatArray, derivatives: bool
+    ) -> list[tuple[Hammer, float, list[PulseTrain]]]:
+        """Return hammer, rest state and drives at the values, and with each parameter changed a little."""
+        parameters = self.parameters
+        count = len(parameters.keys)
+        found = []
+        base, drives = self.hammer_at(values), []
+        for shot, pulse in enumerate(self.pulses):
+            own = values[parameters.of_shot(shot)]
+            drives.append(_drive(base, pulse, own))
+        found.append((base, rest_state(base), drives))
+        if not derivatives:
+            return found
+        for number in range(parameters.count):
+            moved = values.copy()
+            moved[number] += _STEP * parameters.scales[number]
+            if number < count:
+                other = base.replace(parameters.keys[number], float(moved[number]))
+                fired = [
+                    _drive(other, None, moved) if pulse is None else drive
+                    for pulse, drive in zip(self.pulses, drives, strict=True)
+                ]
+                found.append((other, rest_state(other), fired))
+            else:
+                shot = parameters.owners[number - count]
+                fired = list(drives)
+                fired[shot] = _drive(base, self.pulses[shot], moved[parameters.of_shot(shot)])
+                found.append((base, found[0][1], fired))
+        return found
+
+    def chains(
+        self, values: FloatArray, states: Sequence[FloatArray], *, derivatives: bool
+    ) -> list[Chain] | None:
+        """Integrate all stretches.
+
+        Parameters
+        ----------
+        values : array, shape (p,)
+            Of the parameters, SI.
+        states : sequence of array, shape (j, 2)
+            Displacement, m, and velocity, m/s, at the joints of each shot.
+        derivatives : bool
+            Whether to find the derivatives.
+
+        Returns
+        -------
+        list of Chain or None
+            None where there is no such hammer, or a run does not come to its end.
+        """
+        try:
+            variants = self._variants(values, derivatives)
+        except InputError:
+            return None
+        runs: list[_Run] = []
+        where: dict[tuple[int, int, int], int] = {}
+        for shot, plan in enumerate(self.plans):
+            rows = [*plan.begins.tolist(), len(plan.grid) - 1]
+            for stretch in range(len(plan.begins)):
+                times = plan.grid[rows[stretch] : rows[stretch + 1] + 1]
+                begin = None if stretch == 0 else states[shot][stretch - 1]
+                for number, (hammer, rest, fired) in enumerate(variants):
+                    if self._acts(number, shot, times[0]):
+                        where[shot, stretch, number] = len(runs)
+                        state = np.array([rest, 0.0]) if begin is None else begin
+                        runs.append(_Run(hammer, fired[shot], state, times))
+                if derivatives and begin is not None:
+                    hammer, _rest, fired = variants[0]
+                    for which, step in enumerate(np.diag(self.steps)):
+                        where[shot, stretch, -1 - which] = len(runs)
+                        runs.append(_Run(hammer, fired[shot], begin + step, times))
+        try:
+            ensemble = Ensemble(
+                [run.hammer for run in runs],
+                [run.drive for run in runs],
+                [run.times[-1] for run in runs],
+                states=[run.state for run in runs],
+                starts=[run.times[0] for run in runs],
+            )
+        except InputError:
+            return None
+        # So few runs are not worth another kernel.
+        result = ensemble.run(strobes=[run.times for run in runs], engine="plain")
+        if not result.ok.all() or result.strobes is None:
+            return None
+        table = np.stack([result.strobes.x, result.strobes.v], axis=2)
+        count = self.parameters.count if derivatives else 0
+        return [self._chain(shot, states[shot], table, where, count) for shot in range(len(self.shots))]
+
+    def _acts(self, variant: int, shot: int, start: float) -> bool:
+        """Tell whether a changed parameter can change a stretch that begins at a time, s."""
+        number = variant - 1 - len(self.parameters.keys)
+        return number < 0 or (self.parameters.owners[number] == shot and start <= self.lasting[shot])
+
+    def _chain(
+        self,
+        shot: int,
+        states: FloatArray,
+        table: FloatArray,
+        where: dict[tuple[int, int, int], int],
+        count: int,
+    ) -> Chain:
+        plan = self.plans[shot]
+        size, stretches = len(plan.grid), len(plan.begins)
+        motion, by_state = np.zeros((size, 2)), np.zeros((size, 2, 2))
+        by_parameter = np.zeros((size, 2, count))
+        ends, ends_p, ends_s = (
+            np.zeros((stretches, 2)),
+            np.zeros((stretches, 2, count)),
+            np.zeros((stretches, 2, 2)),
+        )
+        rows = [*plan.begins.tolist(), size - 1]
+        for stretch in range(stretches):
+            span = slice(rows[stretch], rows[stretch + 1] + 1)
+            long = rows[stretch + 1] + 1 - rows[stretch]
+            base = table[where[shot, stretch, 0], :long]
+            motion[span] = base
+            for number in range(count):
+                run = where.get((shot, stretch, number + 1))
+                by_parameter[span, :, number] = 0.0 if run is None else (table[run, :long] - base) / _STEP
+            for which in range(2):
+                run = where.get((shot, stretch, -1 - which))
+                change = 0.0 if run is None else (table[run, :long] - base) / self.steps[which]
+                by_state[span, :, which] = change
+            # The joint itself belongs to the stretch that begins there.
+            ends[stretch] = motion[span][-1]
+            ends_p[stretch], ends_s[stretch] = by_parameter[span][-1], by_state[span][-1]
+        return Chain(motion, ends[:-1] - states, by_parameter, by_state, ends_p[:-1], ends_s[:-1])
+
+    def shown(self, shot: int, motion: FloatArray) -> FloatArray:
+        """Return what the sensor shows at the samples of a shot.
+
+        Parameters
+        ----------
+        shot : int
+            Its number.
+        motion : array, shape (g, 2, ...)
+            Displacement and velocity on the grid, or derivatives of them.
+
+        Returns
+        -------
+        array, shape (n, ...)
+            At the samples; before the firing, at rest.
+        """
+        plan = self.plans[shot]
+        flat = motion.reshape(len(motion), 2, -1)
+        out = lowpass_motion(plan.grid, flat[:, 0], flat[:, 1], plan.tau)
+        rows = np.maximum(plan.samples, 0)
+        return out[rows].reshape(len(rows), *motion.shape[2:])
+
+    def opened(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray]:
+        """Return what the sensor shows of a shot whose stretches are independent, and how that changes.
+
+        Returns
+        -------
+        shown : array, shape (n,)
+            At the samples.
+        derivatives : array, shape (n, p + 2 j)
+            With respect to the parameters, in their scales, and to the states at the joints, in `units`.
+        """
+        plan = self.plans[shot]
+        count = chain.by_parameter.shape[2]
+        joints = len(plan.begins) - 1
+        table = np.zeros((len(plan.grid), 2, 1 + count + 2 * joints))
+        table[:, :, 0] = chain.motion
+        table[:, :, 1 : 1 + count] = chain.by_parameter
+        rows = [*plan.begins.tolist(), len(plan.grid)]
+        for joint in range(joints):
+            span = slice(rows[joint + 1], rows[joint + 2])
+            first = 1 + count + 2 * joint
+            table[span, :, first : first + 2] = chain.by_state[span] * self.units
+        out = self.shown(shot, table)
+        return out[:, 0], out[:, 1:]
+
+    def condensed(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Eliminate the states at the joints: the linear model of a shot in which no gap is left.
+
+        Returns
+        -------
+        shown : array, shape (n,)
+            What the sensor would show if the gaps were closed and the parameters as they are.
+        by_parameter : array, shape (n, p)
+            How that changes with the parameters, counted in their scales.
+        closing : array, shape (j, 2)
+            Change of the states at the joints that closes the gaps.
+        states_by_parameter : array, shape (j, 2, p)
+            How they change with the parameters.
+        """
+        plan = self.plans[shot]
+        count = chain.by_parameter.shape[2]
+        joints = len(plan.begins) - 1
+        closing, states_p = np.zeros((joints, 2)), np.zeros((joints, 2, count))
+        change, change_p = np.zeros(2), np.zeros((2, count))
+        linear = np.concatenate([chain.motion[:, :, np.newaxis], chain.by_parameter], axis=2)
+        rows = [*plan.begins.tolist(), len(plan.grid)]
+        for joint in range(joints):
+            matrix = chain.end_by_state[joint]
+            change = chain.gaps[joint] + matrix @ change
+            change_p = chain.end_by_parameter[joint] + matrix @ change_p
+            closing[joint], states_p[joint] = change, change_p
+            span = slice(rows[joint + 1], rows[joint + 2])
+            linear[span] += chain.by_state[span] @ np.concatenate([change[:, np.newaxis], change_p], axis=1)
+        out = self.shown(shot, linear)
+        return out[:, 0], out[:, 1:], closing, states_p
+
+
+def _drive(hammer: Hammer, pulse: Pulse | None, values: FloatArray) -> PulseTrain:
+    if pulse is not None:
+        return PulseTrain(pulse.changed(values.tolist()) if pulse.names else pulse.waveform)
+    if hammer.waveform is None:
+        raise InputError(f"{hammer.path}: the hammer has no waveform")
+    return PulseTrain(hammer.waveform)
+
+
+def _plan(shot: Shot) -> _Plan:
+    tau = time_constant(shot.bandwidth)
+    after = shot.t >= 0.0
+    times = shot.t[after]
+    if len(times) == 0 or times[0] > 0.0:
+        times = np.concatenate([[0.0], times])
+    if tau > 0.0:
+        each = np.maximum(1, np.ceil(np.diff(times) / _FINEST)).astype(np.int64)
+        parts = [a + (b - a) * np.arange(n) / n for a, b, n in zip(times, times[1:], each, strict=False)]
+        times = np.concatenate([*parts, times[-1:]])
+    samples = np.searchsorted(times, shot.t)
+    samples[~after] = -1
+    begins = np.concatenate([[0], samples[shot.joints]]).astype(np.int64)
+    return _Plan(times, samples, begins, tau)

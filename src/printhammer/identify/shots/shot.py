@@ -1,0 +1,280 @@
+"""The displacement record of a single shot: read, its contacts found, and cut between them.
+
+The record is cut in free flight, midway between contacts. There displacement and velocity are read off by a
+local parabola; they are where the integration of a stretch begins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.identify.residuals import noise_of_record, running_median
+from printhammer.identify.tables import read_table
+from printhammer.units import from_si, parse
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import numpy.typing as npt
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.identify.tables import Table
+    from printhammer.support.arrays import FloatArray
+
+Surface = Literal["pack", "backstop"]
+
+FEWEST: Final = 5
+"""Samples in a contact below which a record is too coarse."""
+_CLEAR: Final = 0.005
+"""Distance from a surface, in strokes, at which a contact has clearly begun or ended."""
+_WINDOW: Final = 15e-6
+"""Longest time over which samples are averaged to find contacts, s; contacts last longer."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A contact as the record shows it.
+
+    Attributes
+    ----------
+    surface : str
+        "pack" or "backstop".
+    first, last : int
+        Rows of the first and the last sample in it.
+    """
+
+    surface: Surface
+    first: int
+    last: int
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return self.last - self.first + 1
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """One record, ready to be fitted.
+
+    Attributes
+    ----------
+    name : str
+        The file, as messages name it.
+    t, x : array, shape (n,)
+        Times of the samples, s, ascending, 0 at the firing, and displacements, m.
+    current : array, shape (n,), or None
+        Current, A.
+    lines : int array, shape (n,)
+        Line of the file of each sample.
+    bandwidth : float or None
+        Of the sensor, Hz; None for one without delay.
+    noise : float
+        Of the displacement, m, from the differences of the samples.
+    touches : list of Touch
+        Contacts in order; the first is the rest at the backstop, if there is one.
+    joints : int array, shape (j,)
+        Rows at which the record is cut.
+    states : array, shape (j, 2)
+        Displacement, m, and velocity, m/s, there, as the record shows them.
+    """
+
+    name: str
+    t: FloatArray
+    x: FloatArray
+    current: FloatArray | None
+    lines: npt.NDArray[np.int64]
+    bandwidth: float | None
+    noise: float
+    touches: list[Touch]
+    joints: npt.NDArray[np.int64]
+    states: FloatArray
+
+    def touching(self, surface: Surface) -> list[Touch]:
+        """Return the contacts with one surface, but for the rest at the beginning."""
+        return [touch for touch in self.touches if touch.surface == surface and touch.first > 0]
+
+
+def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) -> Shot:
+    """Read the record of a single shot and find its contacts.
+
+    Parameters
+    ----------
+    path : path
+        CSV file with the columns ``time``, ``displacement`` and perhaps ``current``, units in the heading.
+    hammer : Hammer
+        Whose backstop and pack stand where contacts are to be found.
+    bandwidth : float, optional
+        Of the sensor, Hz; by default what a comment ``# bandwidth: 200 kHz`` says, and else unlimited.
+
+    Returns
+    -------
+    Shot
+        The record.
+
+    Raises
+    ------
+    InputError
+        The file is no such table, times do not ascend, the record begins too late or ends too early, misses
+        the impact, or has too few samples in it.
+    """
+    table = read_table(path, {"time": "s", "displacement": "m"}, optional={"current": "A"})
+    name, t, x = str(table.path), table.values["time"], table.values["displacement"]
+    bad = np.flatnonzero(np.diff(t) <= 0.0)
+    if len(bad):
+        raise InputError(
+            f"{name}: line {table.lines[bad[0] + 1]}: time {t[bad[0] + 1]:.9g} s, expected ascending times"
+        )
+    if len(t) < 4 * FEWEST:
+        raise InputError(
+            f"{name}: {len(t)} samples, expected the record of a whole shot, {4 * FEWEST} at least"
+        )
+    noise = noise_of_record(x)
+    touches, smooth, clear = find_touches(t, x, noise, hammer)
+    _check(name, t, smooth, clear, touches, hammer)
+    between = list(pairwise(touches))
+    joints = [(a.last + b.first) // 2 for a, b in between]
+    reach = [max(2, (b.first - a.last) // 2) for a, b in between]
+    local = [_state(t, x, row, near, noise) for row, near in zip(joints, reach, strict=True)]
+    return Shot(
+        name=name,
+        t=t,
+        x=x,
+        current=table.values.get("current"),
+        lines=table.lines,
+        bandwidth=_bandwidth(table) if bandwidth is None else bandwidth,
+        noise=noise,
+        touches=touches,
+        joints=np.array(joints, dtype=np.int64),
+        states=np.array(local).reshape(-1, 2),
+    )
+
+
+def find_touches(
+    t: FloatArray, x: FloatArray, noise: float, hammer: Hammer
+) -> tuple[list[Touch], FloatArray, float]:
+    """Return the contacts in a record, the smoothed record, and the distance that is clear of the noise, m.
+
+    A contact begins where the smoothed record crosses the surface, and counts if it goes clearly beyond; it
+    ends where the record crosses back, if it then goes clearly away.
+    """
+    stroke = stroke_of(hammer, x)
+    wanted = (noise / (0.25 * _CLEAR * stroke)) ** 2
+    width = int(min(max(wanted, 1.0), max(_WINDOW / float(np.median(np.diff(t))), 1.0)))
+    smooth = _smoothed(running_median(x, 5 if 5 * float(np.median(np.diff(t))) < _WINDOW else 3), width | 1)
+    clear = max(4.0 * noise / np.sqrt(width | 1), _CLEAR * stroke)
+    levels: list[tuple[Surface, FloatArray]] = []
+    if hammer.position is not None:
+        levels.append(("backstop", hammer.position - smooth))
+    if hammer.front is not None:
+        levels.append(("pack", smooth - hammer.front))
+    found = [touch for surface, depth in levels for touch in _visits(surface, depth, clear)]
+    return sorted(found, key=lambda touch: touch.first), smooth, clear
+
+
+def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
+    """Return the runs of samples behind a surface; crossings within the noise do not end them."""
+    found: list[Touch] = []
+    inside, outside = np.flatnonzero(depth > clear), np.flatnonzero(depth < -clear)
+    row = 0
+    while True:
+        after = inside[np.searchsorted(inside, row) :]
+        if len(after) == 0:
+            return found
+        first = int(after[0])
+        while first > 0 and depth[first - 1] > 0.0:
+            first -= 1
+        away = outside[np.searchsorted(outside, after[0]) :]
+        if len(away) == 0:
+            return [*found, Touch(surface, first, len(depth) - 1)]
+        row = last = int(away[0])
+        while depth[last] <= 0.0:
+            last -= 1
+        found.append(Touch(surface, first, last))
+
+
+def _check(
+    name: str, t: FloatArray, smooth: FloatArray, clear: float, touches: list[Touch], hammer: Hammer
+) -> None:
+    """Refuse a record from which nothing can be learnt."""
+    start = smooth[0] - hammer.position if hammer.position is not None else 0.0
+    if start > clear:
+        raise InputError(
+            f"{name}: the record begins at {_us(t[0])} with the armature {_um(start)} off the backstop,"
+            " expected a record from the firing at rest on"
+        )
+    if hammer.front is None:
+        return
+    packs = [touch for touch in touches if touch.surface == "pack"]
+    if not packs:
+        raise InputError(
+            f"{name}: the record misses the impact: its largest displacement is {_um(float(smooth.max()))},"
+            f" expected a record that goes beyond the front of the pack at {_um(hammer.front)}"
+        )
+    if packs[0].last == len(t) - 1:
+        raise InputError(
+            f"{name}: the record ends at {_us(t[-1])} inside the pack, expected a record of the whole impact"
+        )
+    if packs[0].count < FEWEST:
+        spacing = float(np.median(np.diff(t)))
+        raise InputError(
+            f"{name}: {packs[0].count} samples in the pack, one every {_us(spacing)}, expected at least"
+            f" {FEWEST} in a contact"
+        )
+
+
+def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> tuple[float, float]:
+    """Return displacement and velocity at a sample, from a parabola about it."""
+    rows = slice(max(row - reach, 0), row + reach + 1)
+    s = t[rows] - t[row]
+    scale = float(np.abs(s).max())
+    powers = np.stack([np.ones(len(s)), s / scale, (s / scale) ** 2], axis=1)
+    weights = np.ones(len(s))
+    for _ in range(4):
+        inverse = np.linalg.pinv(powers.T @ (powers * weights[:, np.newaxis]))
+        found = inverse @ (powers.T @ (weights * x[rows]))
+        left = np.abs(x[rows] - powers @ found)
+        weights = 1.0 / np.maximum(1.0, left / max(3.0 * float(np.median(left)), noise, 1e-15))
+    return float(found[0]), float(found[1] / scale)
+
+
+def _bandwidth(table: Table) -> float | None:
+    """Return the bandwidth that a comment of the file tells, Hz."""
+    text = table.comments.get("bandwidth", "")
+    if text in ("", "none", "unlimited"):
+        return None
+    try:
+        value = parse(text, "Hz")
+    except InputError as error:
+        raise InputError(f"{table.path}: the comment 'bandwidth': {error}") from None
+    if not (np.isfinite(value) and value > 0.0):
+        raise InputError(f"{table.path}: the comment 'bandwidth': {text}, expected a positive number")
+    return value
+
+
+def stroke_of(hammer: Hammer, x: FloatArray) -> float:
+    """Return the way from backstop to pack, m; without them, how far a record goes."""
+    if hammer.position is not None and hammer.front is not None:
+        return hammer.front - hammer.position
+    return float(np.ptp(x)) or 1e-4
+
+
+def _smoothed(x: FloatArray, width: int) -> FloatArray:
+    if width < 3:
+        return x
+    half = width // 2
+    padded = np.concatenate([np.full(half, x[:width].mean()), x, np.full(half, x[-width:].mean())])
+    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+
+
+def _us(seconds: float) -> str:
+    return f"{from_si(seconds, 's', 'us'):.4g} us"
+
+
+def _um(metres: float) -> str:
+    return f"{from_si(metres, 'm', 'um'):.4g} um"

@@ -1,0 +1,1 @@
+"""Constants of one part from static tables and rebounds."""

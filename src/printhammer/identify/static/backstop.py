@@ -1,0 +1,284 @@
+"""The backstop from the geometry of its bodies and from rebounds: k and l of equations (6) and (7).
+
+Radii, Young's moduli and Poisson ratios give k (Hertz). Rebound speeds against impact speeds give l/k, by
+the exact restitution law of `printhammer.identify.static.restitution`, whatever mass and stiffness; both together
+give l.
+
+Data: the columns ``impact speed`` and ``rebound speed``, both positive.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.identify.least_squares import solve
+from printhammer.identify.result import Fit, FittedConstant, student
+from printhammer.identify.static.assemble import Data, assemble, enough, positive
+from printhammer.identify.static.checks import judge
+from printhammer.identify.static.restitution import RestitutionLaw
+from printhammer.identify.tables import read_table
+from printhammer.parts.backstop._hertz import stiffness_from_bodies
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    import numpy.typing as npt
+
+    from printhammer.identify.least_squares import Solution
+    from printhammer.support.arrays import FloatArray
+
+RATIO: Final = "backstop.damping / backstop.stiffness"
+"""Key of l/k, s/m."""
+
+_ROWS: Final = 6
+_SPAN: Final = 1.5
+"""Ratio of the largest to the least impact speed that shows how the restitution depends on the speed."""
+
+_AXES: Final = (("impact speed", "m/s"), ("rebound speed", "m/s"))
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """A Hertz stiffness k and where it comes from.
+
+    Attributes
+    ----------
+    value : float
+        k, N/m^1.5.
+    standard_error : float
+        The same unit; 0 where it is not known.
+    how : str
+        For the source of the constant; empty where the stiffness is taken as known, and not a result.
+    """
+
+    value: float
+    standard_error: float = 0.0
+    how: str = ""
+
+    @classmethod
+    def from_bodies(
+        cls,
+        radii: Sequence[tuple[float, float]],
+        moduli: Sequence[tuple[float, float]],
+        ratios: Sequence[tuple[float, float]],
+    ) -> Stiffness:
+        """Return the stiffness of two bodies after Hertz.
+
+        Parameters
+        ----------
+        radii : sequence of tuple
+            Radius and its standard error, m, of the armature and, unless it is flat, of the backstop.
+        moduli : sequence of tuple
+            Young's moduli of both and their standard errors, Pa.
+        ratios : sequence of tuple
+            Poisson ratios of both and their standard errors.
+
+        Returns
+        -------
+        Stiffness
+            With the error that follows from those given, to first order.
+
+        Raises
+        ------
+        InputError
+            The number of values is another, or one is out of range.
+        """
+        for name, pairs, counts in (
+            ("radius", radii, (1, 2)),
+            ("Young's modulus", moduli, (2,)),
+            ("Poisson ratio", ratios, (2,)),
+        ):
+            if len(pairs) not in counts:
+                wanted = "1 (a flat backstop) or 2" if len(counts) > 1 else "2, of armature and backstop"
+                raise InputError(f"{name}: {len(pairs)} given, expected {wanted}")
+            for value, _error in pairs:
+                inside = -1.0 < value <= 0.5 if name.startswith("Poisson") else value > 0.0
+                if not inside:
+                    wanted = "more than -1 and at most 0.5" if name.startswith("Poisson") else "more than 0"
+                    raise InputError(f"{name}: {value:g}, expected {wanted}")
+        values = np.array([value for pairs in (radii, moduli, ratios) for value, _error in pairs])
+        errors = np.array([error for pairs in (radii, moduli, ratios) for _value, error in pairs])
+
+        def stiffness(given: FloatArray) -> float:
+            radius2 = float(given[1]) if len(radii) == 2 else None
+            e1, e2, nu1, nu2 = (float(part) for part in given[len(radii) :])
+            return stiffness_from_bodies(float(given[0]), radius2, (e1, e2), (nu1, nu2))
+
+        squares = 0.0
+        for k, error in enumerate(errors):
+            step = np.zeros_like(values)
+            step[k] = 1e-6 * max(abs(values[k]), 1e-3)
+            slope = (stiffness(values + step) - stiffness(values - step)) / (2.0 * step[k])
+            squares += (slope * error) ** 2
+        return cls(stiffness(values), math.sqrt(squares), "computed from radii, moduli and Poisson ratios")
+
+
+def fit_backstop(
+    path: str | Path | None = None, *, stiffness: Stiffness | float | None = None, robust: bool = True
+) -> Fit:
+    """Find the constants of the backstop.
+
+    Parameters
+    ----------
+    path : path, optional
+        Table with the columns ``impact speed`` and ``rebound speed``.
+    stiffness : Stiffness or float, optional
+        k, N/m^1.5; a float is taken as known.
+    robust : bool, optional
+        Whether rows that lie too far off are left out.
+
+    Returns
+    -------
+    Fit
+        With l/k from rebounds, "backstop.stiffness" from the bodies, and "backstop.damping" with both.
+
+    Raises
+    ------
+    InputError
+        Neither is given, the table cannot be used or is too small, or its rebounds are faster than their
+        impacts.
+    """
+    k = Stiffness(float(stiffness)) if isinstance(stiffness, (int, float)) else stiffness
+    if path is None:
+        if k is None:
+            raise InputError("the backstop: expected a table of rebounds, or the geometry of its bodies")
+        return _of_bodies(k)
+    table = read_table(path, {"impact speed": "m/s", "rebound speed": "m/s"})
+    speed, back = table.values["impact speed"], table.values["rebound speed"]
+    for name, column in table.values.items():
+        low = int(np.argmin(column))
+        if column[low] <= 0.0:
+            raise InputError(
+                f"{table.path}: line {table.lines[low]}, column {name!r}: {column[low]:g} m/s, expected a"
+                " positive speed"
+            )
+    zeros = np.zeros(len(speed), dtype=np.int64)
+    data = Data((table.path,), "backstop", speed, back, _AXES, zeros, ("rebounds",), table.lines)
+    enough(data, _ROWS, "the damping of the backstop and its error")
+    if speed.max() < _SPAN * speed.min():
+        raise InputError(
+            f"{table.path}: impact speeds from {speed.min():.4g} to {speed.max():.4g} m/s, expected a span of"
+            f" {_SPAN:g} times or more, or the restitution law cannot be tested"
+        )
+    middle = float(np.median(back / speed))
+    if middle >= 1.0:
+        raise InputError(
+            f"{table.path}: rebounds are {middle:.3g} times as fast as impacts, expected them slower"
+        )
+    law = RestitutionLaw(speed)
+    start = np.array([_ratio(middle, float(np.median(speed)))])
+    solution = solve(law, back, start, robust=robust)
+    p_value, why = judge(solution, {"slow": speed, "fast": speed**3}, speed, zeros)
+    fit = assemble(
+        data,
+        law,
+        solution,
+        [(RATIO, "s/m", False)],
+        given={},
+        indistinct=[] if k else [f"speeds give {RATIO} alone, neither of both: the stiffness is missing"],
+        rejected=_why(solution, speed, back) if why else "",
+        p_value=p_value,
+    )
+    positive(fit, table.path, {RATIO: "more rebounds at higher impact speeds"})
+    return fit if k is None else _with_stiffness(fit, k)
+
+
+def _ratio(restitution: float, speed: float) -> float:
+    """Return l/k for a restitution at a speed."""
+    from printhammer.parts.backstop._hertz import damping_from_restitution
+
+    return damping_from_restitution(1.0, restitution, speed)
+
+
+def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
+    """Say how the rebounds differ from the law."""
+    used = solution.used
+    share = (back / speed)[used]
+    constant = float(np.median(share))
+    law_misses, flat_misses = (
+        float(np.median(np.abs(misses))) for misses in ((solution.residuals / speed)[used], share - constant)
+    )
+    slow, fast = (float(np.median(share[part])) for part in _halves(speed[used]))
+    told = f"the restitution is {slow:.3g} at the slower impacts and {fast:.3g} at the faster ones"
+    if flat_misses < law_misses:
+        return f"{told}, and a constant restitution of {constant:.3g} describes the rebounds better"
+    return f"{told}, which no value of l/k gives; slow rebounds would have to lose nearly nothing"
+
+
+def _halves(speed: FloatArray) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    order = np.argsort(speed, kind="stable").astype(np.int64)
+    return order[: len(order) // 2], order[len(order) // 2 :]
+
+
+def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
+    """Return the fit with k, and with l of k and l/k."""
+    from dataclasses import replace
+
+    ratio = fit[RATIO]
+    constant = _constant(k)
+    value = ratio.value * k.value
+    error = math.hypot(ratio.standard_error * k.value, ratio.value * k.standard_error)
+    half = math.hypot(
+        0.5 * (ratio.interval[1] - ratio.interval[0]) * k.value,
+        ratio.value * 0.5 * (constant.interval[1] - constant.interval[0]),
+    )
+    whence = f" ({k.how})" if k.how else ""
+    how = f"fitted to {' and '.join(fit.source)} with the stiffness {k.value!r} N/m^1.5{whence}"
+    damping = FittedConstant(
+        "backstop.damping", value, error, (value - half, value + half), "N s/m^2.5", how=how
+    )
+    # What is known of k and of l/k has nothing in common; l follows from both.
+    slopes = {constant.key: (0.0, 1.0), damping.key: (k.value, ratio.value)}
+    found = {RATIO: ratio, constant.key: constant, damping.key: damping}
+    given = dict(fit.given)
+    if not k.how:
+        del slopes[constant.key], found[constant.key]
+        given[constant.key] = f"{k.value!r} N/m^1.5"
+    rows = np.array(list(slopes.values())) * (ratio.standard_error, k.standard_error)
+    return replace(fit, constants=found, keys=tuple(slopes), covariance=rows @ rows.T, given=given)
+
+
+def _constant(k: Stiffness) -> FittedConstant:
+    # Errors of bodies are given, not estimated from few data: the normal distribution.
+    half = student(math.inf) * k.standard_error
+    return FittedConstant(
+        "backstop.stiffness",
+        k.value,
+        k.standard_error,
+        (k.value - half, k.value + half),
+        "N/m^1.5",
+        how=k.how,
+    )
+
+
+def _of_bodies(k: Stiffness) -> Fit:
+    """Return a fit without data."""
+    none = np.empty(0)
+    whole = np.empty(0, dtype=np.int64)
+    return Fit(
+        kind="backstop",
+        source=(),
+        constants={"backstop.stiffness": _constant(k)},
+        keys=("backstop.stiffness",),
+        covariance=np.array([[k.standard_error**2]]),
+        abscissa=none,
+        data=none,
+        fitted=none,
+        residuals=none,
+        axes=_AXES,
+        degrees_of_freedom=math.inf,
+        residual_scale=0.0,
+        weights=none,
+        outliers=np.empty(0, dtype=bool),
+        condition_number=1.0,
+        series=whole,
+        series_names=(),
+        lines=whole,
+        notes=("the geometry gives the stiffness alone; the damping needs rebounds",),
+    )

@@ -1,0 +1,143 @@
+"""What residuals say of a law: a test against richer laws, a runs test, constants that go together."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.identify.least_squares import sandwich
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.identify.least_squares import Solution
+    from printhammer.support.arrays import FloatArray
+
+LEVEL: Final = 0.01
+"""A law is said to be rejected where its data have less than this probability."""
+
+_RUNS: Final = (
+    "residuals of neighbours go together: the data bend another way than the law, or the sensor is slow"
+)
+
+_HARD_TO_TELL: Final = 30.0
+"""Condition number from which on it is said which constants go together."""
+
+
+def judge(
+    solution: Solution,
+    terms: Mapping[str, FloatArray],
+    abscissa: FloatArray,
+    series: npt.NDArray[np.int64],
+) -> tuple[float, str]:
+    """Test a law against ones with one more term each, and its residuals for runs.
+
+    A term is added to the linearised, weighted fit, and Student's t tells whether it is needed, with errors
+    and degrees of freedom as those of the fit. The runs test looks at residuals in the order of the abscissa,
+    series by series. The least probability counts once for each test (Bonferroni).
+
+    Parameters
+    ----------
+    solution : Solution
+        Fit of the law.
+    terms : mapping of str to array, shape (m,)
+        What the law lacks, in the unit of the data, by what its need would mean.
+    abscissa : array, shape (m,)
+        Where each datum was measured.
+    series : array of int, shape (m,)
+        To which series each datum belongs.
+
+    Returns
+    -------
+    p_value : float
+        Probability of so much against the law if it holds; NaN where the data are exact or too few.
+    why : str
+        What speaks most against the law; empty unless it is rejected.
+    """
+    if solution.exact or solution.degrees_of_freedom < 3:
+        return math.nan, ""
+    found = {why: _need(solution, term) for why, term in terms.items()}
+    order = np.lexsort((abscissa, series))
+    found[_RUNS] = runs_p_value(solution.residuals[order][solution.used[order]])
+    known = {why: p for why, p in found.items() if not math.isnan(p)}
+    if not known:
+        return math.nan, ""
+    why = min(known, key=lambda name: known[name])
+    p_value = min(1.0, len(known) * known[why])
+    return p_value, why if p_value < LEVEL else ""
+
+
+def _need(solution: Solution, term: FloatArray) -> float:
+    """Return the probability that a law in need of no term asks for as much of it; NaN for a copy."""
+    from scipy.stats import t
+
+    root = np.sqrt(solution.variance[solution.used])
+    errors = solution.residuals[solution.used] / root
+    rows = np.column_stack([solution.jacobian, term])[solution.used] / root[:, None]
+    rows = rows / np.linalg.norm(rows, axis=0)
+    if np.linalg.matrix_rank(rows, tol=1e-9) < rows.shape[1]:
+        return math.nan
+    need = np.linalg.lstsq(rows, errors, rcond=None)[0]
+    covariance, freedoms = sandwich(rows, errors - rows @ need)
+    return 2.0 * float(t.sf(abs(need[-1]) / math.sqrt(covariance[-1, -1]), freedoms[-1]))
+
+
+def runs_p_value(values: FloatArray) -> float:
+    """Test whether the signs of residuals come in too few or too many runs.
+
+    Equation: A. Wald and J. Wolfowitz, Ann. Math. Statist. 11 (1940) 147, by the normal distribution of the
+    number of runs.
+
+    Parameters
+    ----------
+    values : array, shape (m,)
+        Residuals in the order in which they are to be looked at.
+
+    Returns
+    -------
+    float
+        Probability of a number of runs as far from the expected one; NaN for fewer than 8 of either sign.
+    """
+    from scipy.stats import norm
+
+    signs = values[values != 0.0] > 0.0
+    n, above = len(signs), int(signs.sum())
+    below = n - above
+    if min(above, below) < 8:
+        return math.nan
+    runs = 1 + int(np.count_nonzero(signs[1:] != signs[:-1]))
+    pairs = 2.0 * above * below
+    mean, variance = pairs / n + 1.0, pairs * (pairs - n) / (n * n * (n - 1.0))
+    return float(2.0 * norm.sf(abs(runs - mean) / math.sqrt(variance)))
+
+
+def together(solution: Solution, names: Sequence[str]) -> list[str]:
+    """Say which parameters the data hardly tell apart.
+
+    Parameters
+    ----------
+    solution : Solution
+        The fit.
+    names : sequence of str
+        Of its parameters; an empty name for one that is of no interest.
+
+    Returns
+    -------
+    list of str
+        A sentence with the parameters whose common change the data resist least; nothing where the condition
+        number is small.
+    """
+    if solution.condition_number < _HARD_TO_TELL:
+        return []
+    rows = solution.jacobian[solution.used] / np.sqrt(solution.variance[solution.used])[:, None]
+    weakest = np.linalg.svd(rows / np.linalg.norm(rows, axis=0))[2][-1]
+    parts = [name for name, part in zip(names, weakest, strict=True) if name and abs(part) > 0.3]
+    if len(parts) < 2:
+        return []
+    listed = f"{', '.join(parts[:-1])} and {parts[-1]}"
+    together = f"{listed} go together (condition number {solution.condition_number:.3g})"
+    return [f"{together}: the data fix a combination of them better than each alone"]

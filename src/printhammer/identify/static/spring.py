@@ -1,0 +1,135 @@
+"""The spring from its force against displacement: Bs and As of equation (4).
+
+    F = Bs - (Bs / As)(x - b)
+
+Data: the columns ``displacement``, ``force``, the spring alone, positive toward the paper.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.identify.least_squares import solve
+from printhammer.identify.static.assemble import Data, assemble, enough, positive
+from printhammer.identify.static.checks import judge
+from printhammer.identify.tables import read_table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from printhammer.identify.result import Fit
+    from printhammer.support.arrays import FloatArray
+
+_ROWS = 5
+
+
+class SpringLaw:
+    """Equation (4) at measured displacements; p = [Bs, As].
+
+    Parameters
+    ----------
+    travel : array, shape (m,)
+        Displacement from the backstop, x - b, m.
+    """
+
+    def __init__(self, travel: FloatArray) -> None:
+        self.travel = travel
+
+    def value(self, p: FloatArray) -> FloatArray:
+        """Return the force, N."""
+        force: FloatArray = p[0] * (1.0 - self.travel / p[1])
+        return force
+
+    def jacobian(self, p: FloatArray) -> FloatArray:
+        """Return its derivatives by Bs and As."""
+        return np.column_stack([1.0 - self.travel / p[1], p[0] * self.travel / (p[1] * p[1])])
+
+    def spread(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return one component: where the slope is the same, an error in x only adds to that in the force."""
+        return np.ones((len(self.travel), 1))
+
+
+def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit:
+    """Fit the spring.
+
+    Parameters
+    ----------
+    path : path
+        Table with the columns ``displacement`` and ``force``.
+    position : float
+        Position b of the backstop, m.
+    robust : bool, optional
+        Whether rows that lie too far off are left out.
+
+    Returns
+    -------
+    Fit
+        With "spring.Bs" and "spring.As".
+
+    Raises
+    ------
+    InputError
+        The table cannot be used, is too small, or its force does not fall along a positive line.
+    """
+    table = read_table(path, {"displacement": "m", "force": "N"})
+    x, force = table.values["displacement"], table.values["force"]
+    data = Data(
+        (table.path,),
+        "spring",
+        x,
+        force,
+        (("displacement", "m"), ("force", "N")),
+        np.zeros(len(x), dtype=np.int64),
+        ("spring",),
+        table.lines,
+    )
+    enough(data, _ROWS, "the two constants of the spring and their errors")
+    if len(np.unique(x)) < 3:
+        raise InputError(
+            f"{table.path}: {len(np.unique(x))} different displacements, expected 3 or more for a line"
+        )
+    law = SpringLaw(x - position)
+    solution = solve(law, force, start_of(table.path, x - position, force), robust=robust)
+    middle, half = 0.5 * (x.min() + x.max()), 0.5 * (x.max() - x.min())
+    u = (x - middle) / half
+    bent = "the force is no straight line over the displacement"
+    p_value, why = judge(solution, {bent: u * u, f"{bent}, it swings about one": u**3}, x, data.series)
+    fit = assemble(
+        data,
+        law,
+        solution,
+        [("spring.Bs", "N", True), ("spring.As", "m", True)],
+        given={"backstop.position": f"{position!r} m"},
+        rejected=why,
+        p_value=p_value,
+    )
+    wider = "more rows over a wider span of displacement"
+    positive(fit, table.path, {"spring.Bs": wider, "spring.As": wider})
+    return fit
+
+
+def start_of(path: Path, travel: FloatArray, force: FloatArray) -> FloatArray:
+    """Return Bs and As of a line that half of the rows may lie off.
+
+    Raises
+    ------
+    InputError
+        The line does not fall, or is not positive at the backstop.
+    """
+    from scipy.stats import theilslopes
+
+    slope, height = (float(part) for part in theilslopes(force, travel)[:2])
+    if not slope < 0.0:
+        raise InputError(
+            f"{path}: the spring force rises by {slope:.3g} N/m with the displacement, expected a force"
+            " toward the paper that falls"
+        )
+    if not height > 0.0:
+        raise InputError(
+            f"{path}: the spring force at the backstop is {height:.3g} N, expected a positive force, toward"
+            " the paper"
+        )
+    return np.array([height, -height / slope])

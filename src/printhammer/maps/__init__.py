@@ -1,0 +1,1 @@
+"""Frequency-time maps, computed and measured."""

@@ -1,0 +1,222 @@
+"""The frequency-time map: what a hammer does in a burst of pulses, against the firing rate.
+
+Figs. 8 and 9 of F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), show bursts of nine
+pulses at gradually rising rates.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.drive.input import read_count, read_number
+from printhammer.drive.text import inline, waveform_text
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.maps.layout import hammer_attributes, map_dataset, matching, on_times
+from printhammer.run.problem import TOLERANCE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+LOWEST: Final = 500.0
+"""Lowest rate of a map unless told otherwise, Hz."""
+
+HIGHEST: Final = 2000.0
+"""Highest rate of a map unless told otherwise, Hz."""
+
+RATES: Final = 512
+"""Number of rates of a map unless told otherwise."""
+
+TIMES: Final = 512
+"""Number of times of a map unless told otherwise."""
+
+PULSES: Final = 9
+"""Number of pulses of a burst, as in the paper."""
+
+TAIL: Final = 1e-3
+"""Time after the last firing, s, that a map shows at its lowest rate."""
+
+MOST_CELLS: Final = 200_000_000
+"""Number of displacements above which a map is refused."""
+
+
+def frequency_map(
+    hammer: Hammer,
+    rates: npt.ArrayLike | None = None,
+    *,
+    pulses: SupportsIndex = PULSES,
+    times: npt.ArrayLike | None = None,
+    waveform: Waveform | None = None,
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    overlap: Overlap = "add",
+) -> xr.Dataset:
+    """Compute the displacement against time and firing rate, from rest, and what each firing does.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    rates : array, optional
+        Firing rates, Hz, ascending; by default 512 from 500 Hz to 2 kHz.
+    pulses : int, optional
+        Number of firings at each rate.
+    times : array or int, optional
+        Times from the first firing, s, ascending, or their number, spread evenly from the first firing to
+        1 ms after the last one at the lowest rate; by default 512.
+    waveform : Waveform, optional
+        What every firing does; by default the waveform of the hammer.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+    threads : int, optional
+        By default as many as there are cores; the map does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of rates done and of all.
+    overlap : str, optional
+        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over `rate` [Hz] and `time` [s]: `displacement` [m, float32], NaN after the end of a run that could
+        not go on. Over `rate` and `firing`: `fired_at` [s], `struck`, `flight_time` [s] and `peak_force` [N]
+        of its dot, NaN for a lost dot. Over `rate`: `status`, 0 for a run that went as asked; the codes are
+        in its attributes. Provenance is in the attributes of the set.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above, or the hammer has no waveform or no rest state.
+    """
+    from printhammer.run.ensemble import Ensemble
+
+    fired = hammer.waveform if waveform is None else waveform
+    if fired is None:
+        raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+    grid = _rates(rates)
+    count = read_count(pulses, "pulses")
+    moments = _times(times, (count - 1) / float(grid[0]) + TAIL)
+    if grid.size * moments.size > MOST_CELLS:
+        raise InputError(
+            f"{grid.size} rates x {moments.size} times, expected at most {MOST_CELLS} displacements in a map"
+        )
+    drives = [PulseTrain(fired, rate=rate, pulses=count, overlap=overlap) for rate in grid.tolist()]
+    ends = np.maximum(moments[-1], (count - 1) / grid + TAIL)
+    runs = Ensemble(hammer, drives, ends, tolerance=tolerance)
+    result = runs.run(dots=True, times=moments, threads=threads, progress=progress)
+    dots, x = result.dots, result.x
+    assert dots is not None
+    assert x is not None
+    named = {0: "ok", **dict(zip(result.status.tolist(), result.status_names, strict=True))}
+    codes = ", ".join(f"{code} {name}" for code, name in sorted(named.items()))
+    variables: dict[str, npt.NDArray[Any]] = {
+        "displacement": x,
+        "fired_at": np.where(dots.fired, dots.fired_at, np.nan),
+        "struck": dots.struck,
+        "flight_time": dots.flight_time,
+        "peak_force": dots.peak_force,
+        "status": result.status.astype(np.int32),
+    }
+    attributes = {
+        "title": f"frequency-time map of {hammer.name}, bursts of {count} pulses",
+        **hammer_attributes(hammer),
+        **_provenance(fired, count, overlap, tolerance),
+    }
+    return map_dataset(grid, moments, variables, attributes, {"status": {"codes": codes}})
+
+
+def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArray, FloatArray]:
+    """Compare two maps, rate by rate, at the times of the one whose times lie further apart.
+
+    Parameters
+    ----------
+    computed, measured : xarray.Dataset
+        Maps; the one with the closer times is joined by straight lines between them.
+
+    Returns
+    -------
+    rates : array, shape (n,)
+        The rates that both have, Hz.
+    difference : array, shape (n,)
+        Root mean square of the difference of their displacements, m, over the times at which both are
+        known; NaN where there is no such time.
+    """
+    rows, others = matching(computed, measured)
+    times = max((chart["time"].values for chart in (measured, computed)), key=_spacing)
+    found = np.full(len(rows), np.nan)
+    for k, (row, other) in enumerate(zip(rows.tolist(), others.tolist(), strict=True)):
+        difference = on_times(computed, row, times) - on_times(measured, other, times)
+        known = np.isfinite(difference)
+        if known.any():
+            found[k] = np.sqrt(np.mean(np.square(difference[known])))
+    return computed["rate"].values[rows], found
+
+
+def _spacing(times: FloatArray) -> float:
+    return float(np.median(np.diff(times))) if times.size > 1 else np.inf
+
+
+def _rates(rates: npt.ArrayLike | None) -> FloatArray:
+    if rates is None:
+        return np.linspace(LOWEST, HIGHEST, RATES)
+    try:
+        found = np.atleast_1d(np.array(rates, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise InputError("rates: expected numbers, Hz") from None
+    if found.ndim != 1 or found.size == 0:
+        raise InputError(f"rates: an array of shape {found.shape}, expected a list of at least one rate, Hz")
+    odd = found[~(np.isfinite(found) & (found > 0.0))]
+    if odd.size:
+        raise InputError(f"rates: {odd[0]:.9g} Hz, expected finite numbers greater than 0 Hz")
+    falling = np.flatnonzero(np.diff(found) <= 0.0)
+    if falling.size:
+        before, after = found[falling[0] : falling[0] + 2]
+        raise InputError(f"rates: {after:.9g} Hz follows {before:.9g} Hz, expected ascending rates")
+    return found
+
+
+def _times(times: npt.ArrayLike | None, end: float) -> FloatArray:
+    if times is None:
+        return np.linspace(0.0, end, TIMES)
+    if np.ndim(times) == 0:
+        count: Any = times
+        if isinstance(count, bool) or int(count) != count or count < 2:
+            raise InputError(f"times = {count!r}, expected a whole number of at least 2, or the times, s")
+        if count > MOST_CELLS:
+            raise InputError(f"times = {count!r}, expected at most {MOST_CELLS}")
+        return np.linspace(0.0, end, int(count))
+    found = np.array(times, dtype=np.float64)
+    if found.ndim != 1 or found.size == 0 or not np.isfinite(found).all():
+        raise InputError("times: expected a list of finite numbers, s")
+    if found[0] < 0.0 or (np.diff(found) <= 0.0).any() or found[-1] <= 0.0:
+        raise InputError("times: expected ascending times, s, not negative, the last one greater than 0 s")
+    return found
+
+
+def _provenance(waveform: Waveform, pulses: int, overlap: str, tolerance: float) -> dict[str, Any]:
+    import numba
+
+    from printhammer import __version__
+
+    return {
+        "waveform": inline(waveform_text(waveform)),
+        "pulses": pulses,
+        "overlap": overlap,
+        "tolerance": repr(float(read_number(tolerance, "1", "tolerance"))),
+        "printhammer": __version__,
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+    }

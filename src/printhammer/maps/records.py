@@ -1,0 +1,231 @@
+"""Measured displacement records at several firing rates, from CSV files.
+
+Two tables are understood, each with its units in the heading, SI or any other:
+
+- one row for each sample: the columns ``rate [Hz],time [us],displacement [um]``, in any order;
+- one row for each time: ``time [us]``, then a column for each rate, such as ``500 Hz [um],1.2 kHz [um]``.
+
+Times count from the first firing. Rows may come in any order, and every rate may have times of its own. An
+empty cell, or nan, is a gap. Blank lines and lines that begin with # are passed over.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.units import parse, to_si
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    import numpy.typing as npt
+
+    from printhammer.support.arrays import FloatArray
+
+_SI: Final = {"rate": "Hz", "time": "s", "displacement": "m"}
+_HEADINGS: Final = (
+    "'rate [Hz],time [us],displacement [um]', or 'time [us]' and a column such as '500 Hz [um]' for each rate"
+)
+_GAPS: Final = ("", "nan", "na")
+
+
+@dataclass(frozen=True)
+class Record:
+    """Samples at one rate.
+
+    Attributes
+    ----------
+    rate : float
+        Firing rate, Hz.
+    times : array, shape (n,)
+        Times from the first firing, s, ascending.
+    displacement : array, shape (n,)
+        Displacement, m; NaN for a gap.
+    """
+
+    rate: float
+    times: FloatArray
+    displacement: FloatArray
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A CSV file: cells of the heading, numbers of the lines, and rows of cells."""
+
+    what: str
+    heading: list[str]
+    lines: npt.NDArray[np.int64]
+    rows: list[list[str]]
+
+    def column(self, index: int, si: str, unit: str, *, gaps: bool = False) -> FloatArray:
+        """Return a column in SI.
+
+        Raises
+        ------
+        InputError
+            The unit is of another dimension, or a cell is no finite number, nor an allowed gap.
+        """
+        name = self.heading[index]
+        try:
+            factor = to_si(1.0, unit, si)
+        except InputError as error:
+            raise InputError(f"{self.what}: column {name!r}: {error}") from None
+        values = np.empty(len(self.rows))
+        for k, row in enumerate(self.rows):
+            text = row[index].strip()
+            if gaps and text.lower() in _GAPS:
+                values[k] = math.nan
+                continue
+            try:
+                values[k] = float(text)
+            except ValueError:
+                values[k] = math.nan
+            if not math.isfinite(values[k]):
+                raise InputError(
+                    f"{self.what}: line {self.lines[k]}, column {name!r}: {text!r} is expected to be a finite"
+                    " number"
+                )
+        return values * factor
+
+
+def read_records(path: Path) -> list[Record]:
+    """Read the records of a CSV file, by rising rate.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, its heading is not one of the two, a cell is no number, or a time is given
+        twice for one rate.
+    """
+    cells = _cells(path)
+    names = [_named(cells.what, cell) for cell in cells.heading]
+    if sorted(name for name, _unit in names) == sorted(_SI):
+        found = _one_row_a_sample(cells, dict(names))
+    else:
+        found = _one_column_a_rate(cells, names)
+    return sorted(found, key=lambda record: record.rate)
+
+
+def checked(
+    what: str, rate: float, times: FloatArray, displacement: FloatArray, places: Sequence[str]
+) -> Record:
+    """Return a record with its samples in order of time.
+
+    Parameters
+    ----------
+    what : str
+        Name of the file, for messages.
+    rate : float
+        Firing rate, Hz.
+    times, displacement : array
+        Samples, SI, in any order.
+    places : sequence of str
+        Where each sample stands, for messages.
+
+    Raises
+    ------
+    InputError
+        The rate is not positive, a time is given twice, or fewer than two displacements are known.
+    """
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise InputError(f"{what}: {places[0]}: rate {rate:.9g} Hz is expected to be greater than 0 Hz")
+    order = np.argsort(times, kind="stable")
+    at, x = times[order], displacement[order]
+    twice = np.flatnonzero(np.diff(at) == 0.0)
+    if twice.size:
+        first, second = (places[order[twice[0] + k]] for k in (0, 1))
+        raise InputError(
+            f"{what}: {second}: time {at[twice[0]]:.9g} s at {rate:.9g} Hz is given before, in {first},"
+            " expected one displacement for each time"
+        )
+    known = int(np.isfinite(x).sum())
+    if known < 2:
+        raise InputError(f"{what}: {known} displacements at {rate:.9g} Hz, expected at least 2")
+    return Record(rate, at, x)
+
+
+def _one_row_a_sample(cells: Cells, units: dict[str, str]) -> list[Record]:
+    index = {_named(cells.what, cell)[0]: k for k, cell in enumerate(cells.heading)}
+    rate, time, x = (
+        cells.column(index[name], si, units[name], gaps=name == "displacement") for name, si in _SI.items()
+    )
+    found = []
+    for value in np.unique(rate):
+        rows = np.flatnonzero(rate == value)
+        places = [f"line {line}" for line in cells.lines[rows]]
+        found.append(checked(cells.what, float(value), time[rows], x[rows], places))
+    return found
+
+
+def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[Record]:
+    columns = [k for k, (name, _unit) in enumerate(names) if name == "time"]
+    if len(columns) != 1 or len(names) < 2:
+        raise InputError(f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}")
+    times = cells.column(columns[0], "s", names[columns[0]][1])
+    found: dict[float, Record] = {}
+    for k, (name, unit) in enumerate(names):
+        if k == columns[0]:
+            continue
+        if name in _SI:
+            raise InputError(
+                f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}"
+            )
+        try:
+            rate = parse(name, "Hz")
+        except InputError as error:
+            raise InputError(
+                f"{cells.what}: column {cells.heading[k]!r}: {error}; expected {_HEADINGS}"
+            ) from None
+        if rate in found:
+            raise InputError(
+                f"{cells.what}: column {cells.heading[k]!r}: the rate {rate:.9g} Hz has two columns"
+            )
+        places = [f"line {line}, column {cells.heading[k]!r}" for line in cells.lines]
+        x = cells.column(k, "m", unit, gaps=True)
+        found[rate] = checked(cells.what, rate, times, x, places)
+    return list(found.values())
+
+
+def _named(what: str, cell: str) -> tuple[str, str]:
+    """Split the cell of a heading into its name and its unit."""
+    name, _, rest = cell.partition("[")
+    unit, closed, tail = rest.partition("]")
+    if not closed or tail.strip() or not unit.strip():
+        raise InputError(f"{what}: column {cell!r} is expected to carry its unit, such as 'time [us]'")
+    name = name.strip()
+    return (name.lower() if name.lower() in _SI else name), unit.strip()
+
+
+def _cells(path: Path) -> Cells:
+    what = str(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{what}: the measured map is expected to be UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{what}: the measured map cannot be read ({reason})") from None
+    reader = csv.reader(io.StringIO(text), strict=True)
+    lines, rows = [], []
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#"):
+                lines.append(reader.line_num)
+                rows.append(row)
+    except csv.Error as error:
+        raise InputError(f"{what}: expected comma-separated values ({error})") from None
+    if len(rows) < 2:
+        raise InputError(f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples")
+    heading = [cell.strip() for cell in rows[0]]
+    for line, row in zip(lines[1:], rows[1:], strict=True):
+        if len(row) != len(heading):
+            raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(heading)}")
+    return Cells(what, heading, np.array(lines[1:], dtype=np.int64), rows[1:])

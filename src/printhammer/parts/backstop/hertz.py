@@ -1,0 +1,180 @@
+"""Hard backstop after equations (6) and (7): Hertz contact with viscoelastic loss.
+
+    Fb + Fe = k delta^1.5 - l v delta^1.5,     delta = b - x > 0
+
+Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equations (6) and (7), the latter after Hunt and
+Crossley; (6) is given the unit step that it lacks in print. k may follow from radii and Young's moduli, l
+from a restitution (`printhammer.parts.backstop._hertz`).
+Validity: quasi-static contact within the elastic limit. Weakness: (7) can pull once v > k/l; a free rebound
+never gets there, and `pull = false` forbids it where other forces drive the armature off.
+
+Packed constants: c = [k, l, 1 if it may pull else 0].
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from pydantic import model_validator
+
+from printhammer.parts.backstop._hertz import damping_from_restitution, stiffness_from_bodies
+from printhammer.parts.base import BackstopPart, register
+from printhammer.support.constants import quantity
+
+
+def backstop_elastic(c: Any, w: float) -> float:
+    """Return the Hertz force of equation (6), k w^3.
+
+    Parameters
+    ----------
+    c : float64 array
+        [k, l, pull].
+    w : float
+        sqrt(b - x), m^0.5.
+
+    Returns
+    -------
+    float
+        Force, N, not negative.
+    """
+    return float(c[0] * (w * w * w))
+
+
+def backstop_viscous(c: Any, w: float, v: float) -> float:
+    """Return the viscoelastic force of equation (7), -l v w^3.
+
+    Parameters
+    ----------
+    c : float64 array
+        [k, l, pull].
+    w, v : float
+        sqrt(b - x), m^0.5, and velocity, m/s.
+
+    Returns
+    -------
+    float
+        Force, N; cut off at -k w^3 where the backstop may not pull.
+    """
+    rate = c[1] * v
+    if rate > c[0] and c[2] == 0.0:
+        rate = c[0]
+    return float(-rate * (w * w * w))
+
+
+def backstop_energy(c: Any, w: float) -> float:
+    """Return the elastic energy of equation (6), (2/5) k w^5.
+
+    Parameters
+    ----------
+    c : float64 array
+        [k, l, pull].
+    w : float
+        sqrt(b - x), m^0.5.
+
+    Returns
+    -------
+    float
+        Energy, J.
+    """
+    w2 = w * w
+    return float(0.4 * c[0] * w2 * w2 * w)
+
+
+def backstop_switch(c: Any, w: float, v: float) -> float:
+    """Return a function that changes sign where the force is cut off.
+
+    Parameters
+    ----------
+    c : float64 array
+        [k, l, pull].
+    w, v : float
+        sqrt(b - x), m^0.5, and velocity, m/s.
+
+    Returns
+    -------
+    float
+        k - l v, N/m^1.5; 1 where the backstop may pull.
+    """
+    if c[2] != 0.0:
+        return 1.0
+    return float(c[0] - c[1] * v)
+
+
+_BODIES = (
+    "expected stiffness, or instead of it radius1 (and radius2 unless the backstop is flat), "
+    "youngs_modulus1, youngs_modulus2, poisson_ratio1 and poisson_ratio2"
+)
+_REBOUND = "expected damping, or instead of it restitution and restitution_speed"
+
+
+@register
+class HertzBackstop(BackstopPart):
+    """Constants of equations (6) and (7).
+
+    The stiffness k is given by `stiffness`, or by `radius1` and the Young's moduli and Poisson ratios of both
+    bodies (`radius2` left out: a flat). The damping l is given by `damping`, or by the `restitution` of a
+    free rebound at `restitution_speed`. The properties `k` and `l` hold the values that follow.
+    """
+
+    law: ClassVar[str] = "hertz"
+
+    position: float = quantity("m", "b", "position of the backstop")
+    stiffness: float | None = quantity("N/m^1.5", "k", "Hertz stiffness", gt=0, default=None)
+    radius1: float | None = quantity("m", "R1", "radius of the armature's contact face", gt=0, default=None)
+    radius2: float | None = quantity("m", "R2", "radius of the backstop, a flat without", gt=0, default=None)
+    youngs_modulus1: float | None = quantity(
+        "Pa", "E1", "Young's modulus of the armature", gt=0, default=None
+    )
+    youngs_modulus2: float | None = quantity(
+        "Pa", "E2", "Young's modulus of the backstop", gt=0, default=None
+    )
+    poisson_ratio1: float | None = quantity(
+        "1", "nu1", "Poisson ratio of the armature", gt=-1, le=0.5, default=None
+    )
+    poisson_ratio2: float | None = quantity(
+        "1", "nu2", "Poisson ratio of the backstop", gt=-1, le=0.5, default=None
+    )
+    damping: float | None = quantity("N s/m^2.5", "l", "damping of the backstop", ge=0, default=None)
+    restitution: float | None = quantity("1", "e", "restitution of a free rebound", gt=0, le=1, default=None)
+    restitution_speed: float | None = quantity(
+        "m/s", "v_e", "approach speed of that rebound", gt=0, default=None
+    )
+    pull: bool = True
+
+    @model_validator(mode="after")
+    def _given_once(self) -> HertzBackstop:
+        bodies = {
+            name: getattr(self, name) is not None
+            for name in ("radius1", "youngs_modulus1", "youngs_modulus2", "poisson_ratio1", "poisson_ratio2")
+        }
+        any_body = any(bodies.values()) or self.radius2 is not None
+        if (self.stiffness is not None) == any_body or (any_body and not all(bodies.values())):
+            raise ValueError(_BODIES)
+        rebound = (self.restitution is not None, self.restitution_speed is not None)
+        if (self.damping is not None) == any(rebound) or (any(rebound) and not all(rebound)):
+            raise ValueError(_REBOUND)
+        return self
+
+    @property
+    def k(self) -> float:
+        """Hertz stiffness of equation (6), N/m^1.5, as given or from the two bodies."""
+        if self.stiffness is not None:
+            return self.stiffness
+        r1, e1, e2 = self.radius1, self.youngs_modulus1, self.youngs_modulus2
+        nu1, nu2 = self.poisson_ratio1, self.poisson_ratio2
+        if r1 is None or e1 is None or e2 is None or nu1 is None or nu2 is None:
+            raise ValueError(_BODIES)
+        return stiffness_from_bodies(r1, self.radius2, (e1, e2), (nu1, nu2))
+
+    @property
+    def l(self) -> float:  # noqa: E743
+        """Damping of equation (7), N s/m^2.5, as given or from the restitution."""
+        if self.damping is not None:
+            return self.damping
+        if self.restitution is None or self.restitution_speed is None:
+            raise ValueError(_REBOUND)
+        return damping_from_restitution(self.k, self.restitution, self.restitution_speed)
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return (k, l, pull)."""
+        return (self.k, self.l, 1.0 if self.pull else 0.0)

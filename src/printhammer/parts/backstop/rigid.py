@@ -1,0 +1,51 @@
+"""Rigid backstop with a coefficient of restitution.
+
+    v_out = -e v_in
+
+Source: Newton's law of restitution, which the paper mentions as the usual way to describe hard backstops.
+Validity: a contact much shorter than everything else. Weakness: no contact time, no force; pressed against
+the stop, the armature comes to rest after infinitely many bounces in finite time.
+
+Packed constants: c = [e].
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from printhammer.parts.base import BackstopPart, register
+from printhammer.support.constants import quantity
+
+RIGID = True
+
+
+def backstop_rebound(c: Any, v_in: float) -> float:
+    """Return the velocity after a bounce.
+
+    Parameters
+    ----------
+    c : float64 array
+        [e].
+    v_in : float
+        Velocity before, m/s, negative.
+
+    Returns
+    -------
+    float
+        Velocity after, m/s, not negative.
+    """
+    return float(-c[0] * v_in)
+
+
+@register
+class RigidBackstop(BackstopPart):
+    """Position and coefficient of restitution of a rigid backstop."""
+
+    law: ClassVar[str] = "rigid"
+
+    position: float = quantity("m", "b", "position of the backstop")
+    restitution: float = quantity("1", "e", "coefficient of restitution", ge=0, le=1)
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return (e,)."""
+        return (self.restitution,)

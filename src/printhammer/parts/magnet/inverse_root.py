@@ -1,0 +1,98 @@
+"""Magnet after equation (3): permanent magnet and bucking coil as one fitted force.
+
+    Fm = F0 - (Am - Bm I)^2 / sqrt(x)
+
+Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (3), a fit to forces measured at several
+currents.
+Validity: the measured range of x and I, which the paper does not print; give it as `range_min` and
+`range_max`.
+Weakness: singular at x = 0, where the origin is arbitrary (the backstop sits at 0.002 in); the pull grows
+again once Bm I exceeds Am; no eddy currents, no back-EMF.
+
+Packed constants: c = [F0, Am, Bm].
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+from pydantic import model_validator
+
+from printhammer.parts.base import MagnetPart, register
+from printhammer.support.constants import quantity
+
+
+def magnet_force(c: Any, x: float, current: float) -> float:
+    """Return the net magnetic force of equation (3).
+
+    Parameters
+    ----------
+    c : float64 array
+        [F0, Am, Bm].
+    x : float
+        Displacement, m; the law ends at x = 0.
+    current : float
+        Coil current, A.
+
+    Returns
+    -------
+    float
+        Force, N, positive toward the paper; NaN for x <= 0.
+    """
+    if x <= 0.0:
+        return math.nan
+    pull = c[1] - c[2] * current
+    # Division and root side by side are faster than one after the other.
+    return float(c[0] - pull * pull / x * math.sqrt(x))
+
+
+def magnet_energy(c: Any, x: float) -> float:
+    """Return the potential energy of the magnet at zero current, 2 Am^2 sqrt(x) - F0 x.
+
+    Parameters
+    ----------
+    c : float64 array
+        [F0, Am, Bm].
+    x : float
+        Displacement, m.
+
+    Returns
+    -------
+    float
+        Energy, J, zero at x = 0; minus its slope is the force at zero current; NaN for x < 0.
+    """
+    if x < 0.0:
+        return math.nan
+    return float(2.0 * c[1] * c[1] * math.sqrt(x) - c[0] * x)
+
+
+@register
+class InverseRootMagnet(MagnetPart):
+    """Constants of equation (3)."""
+
+    law: ClassVar[str] = "inverse-root"
+
+    F0: float = quantity("N", "F0", "largest magnetic force", gt=0)
+    Am: float = quantity("N^0.5 m^0.25", "Am", "pull of the permanent magnet", gt=0)
+    Bm: float = quantity("N^0.5 m^0.25/A", "Bm", "reduction of the pull by the coil current", ge=0)
+    range_min: float | None = quantity("m", "x_min", "smallest displacement of the fit", ge=0, default=None)
+    range_max: float | None = quantity("m", "x_max", "largest displacement of the fit", gt=0, default=None)
+
+    @model_validator(mode="after")
+    def _range_is_ordered(self) -> InverseRootMagnet:
+        if self.range_min is not None and self.range_max is not None and self.range_min >= self.range_max:
+            raise ValueError("range_min is not below range_max")
+        return self
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """Displacements for which the law holds, `(x_min, x_max)` in m; open at 0."""
+        return (
+            0.0 if self.range_min is None else self.range_min,
+            math.inf if self.range_max is None else self.range_max,
+        )
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return (F0, Am, Bm)."""
+        return (self.F0, self.Am, self.Bm)

@@ -1,0 +1,106 @@
+"""Pack of a linear spring and a dashpot in parallel (Kelvin-Voigt).
+
+    Fp = -(K (x - xp) + C v)      for x > xp
+
+Source: the Kelvin-Voigt solid; the contact of the textbook impact oscillator.
+Validity: small indentations of a pack that recovers fully. Weakness: the dashpot acts at once at first touch,
+so the force jumps there, and near the end of a contact it would pull; `pull = false` (the default) cuts the
+force off at zero.
+
+Packed constants: c = [K, C, xp, 1 if it may pull else 0].
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from printhammer.parts.base import PackPart, register
+from printhammer.support.constants import quantity
+
+MEMORY = False
+
+
+def pack_loading(c: Any, x: float, v: float) -> float:
+    """Return the force of spring and dashpot.
+
+    Parameters
+    ----------
+    c : float64 array
+        [K, C, xp, pull].
+    x, v : float
+        Displacement, m, and velocity, m/s.
+
+    Returns
+    -------
+    float
+        Force, N, negative where it pushes the armature back; 0 for x < xp.
+    """
+    depth = x - c[2]
+    if depth < 0.0:
+        return 0.0
+    push = c[0] * depth + c[1] * v
+    if push < 0.0 and c[3] == 0.0:
+        return 0.0
+    return float(-push)
+
+
+def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
+    """Return the force of spring and dashpot; a pack without memory unloads as it loads.
+
+    Parameters
+    ----------
+    c : float64 array
+        [K, C, xp, pull].
+    x, v : float
+        Displacement, m, and velocity, m/s.
+    q : float
+        Not used.
+
+    Returns
+    -------
+    float
+        Force, N; 0 for x < xp.
+    """
+    depth = x - c[2]
+    if depth < 0.0:
+        return 0.0
+    push = c[0] * depth + c[1] * v
+    if push < 0.0 and c[3] == 0.0:
+        return 0.0
+    return float(-push)
+
+
+def pack_switch(c: Any, x: float, v: float) -> float:
+    """Return a function that changes sign where the force is cut off.
+
+    Parameters
+    ----------
+    c : float64 array
+        [K, C, xp, pull].
+    x, v : float
+        Displacement, m, and velocity, m/s.
+
+    Returns
+    -------
+    float
+        Push of spring and dashpot, N; 1 where the pack may pull.
+    """
+    if c[3] != 0.0:
+        return 1.0
+    return float(c[0] * (x - c[2]) + c[1] * v)
+
+
+@register
+class DashpotPack(PackPart):
+    """Stiffness and damping of a Kelvin-Voigt pack."""
+
+    law: ClassVar[str] = "dashpot"
+
+    stiffness: float = quantity("N/m", "K", "stiffness of the pack", ge=0)
+    damping: float = quantity("N s/m", "C", "damping of the pack", ge=0)
+    front: float = quantity("m", "xp", "front of the pack")
+    pull: bool = False
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return (K, C, xp, pull)."""
+        return (self.stiffness, self.damping, self.front, 1.0 if self.pull else 0.0)

@@ -1,0 +1,244 @@
+"""Conclusions: what an engineer would conclude about a hammer, a few numbers each with its unit.
+
+The constants of the paper's hammer are not known. These are the numbers that one would ask of it all the
+same; which of them can be trusted is seen where they are compared over a family of hammers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.chaos.scan import scan
+from printhammer.claims import Context
+from printhammer.claims.context import NotMeasurableError
+from printhammer.claims.definition import claims
+from printhammer.claims.shapes import rebounds, spread
+from printhammer.drive.trains import PulseTrain
+from printhammer.reconstruction.family.safe_rate import safe_rate
+
+if TYPE_CHECKING:
+    from printhammer.hammer.hammer import Hammer
+
+SETTLED: Final = 0.01
+"""Height of a rebound over the stroke up to which it counts as settled."""
+
+ONSET_STEP: Final = 5e-6
+"""Step of the strobe times at which chaos is looked for, s."""
+
+RATES: Final = (500, 1250, 5)
+"""First and last rate and step of the grid of bursts, Hz: from where dots are independent into the erratic
+band."""
+
+_TOGETHER: Final = 40
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a conclusion is.
+
+    Attributes
+    ----------
+    title : str
+        A few words.
+    unit : str
+        SI unit; "1" for a pure number.
+    meaning : str
+        One sentence.
+    """
+
+    title: str
+    unit: str
+    meaning: str
+
+
+QUANTITIES: Final[dict[str, Quantity]] = {
+    "safe_rate_Hz": Quantity(
+        "safe rate",
+        "Hz",
+        "Largest rate up to which every pattern of eight slots prints with the force of the single pulse"
+        " within a tenth and its flight time within 50 us, on a grid of 5 Hz.",
+    ),
+    "chaos_onset_s": Quantity(
+        "chaos onset",
+        "s",
+        "Longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms.",
+    ),
+    "flight_time_spread_s": Quantity(
+        "flight-time spread",
+        "s",
+        "Largest difference of flight times within a burst of nine pulses, over rates from 500 to 1250 Hz"
+        " on a grid of 5 Hz; lost dots have none.",
+    ),
+    "engraved_limit_Hz": Quantity(
+        "spread exceeds 30 us from",
+        "Hz",
+        "Lowest of these rates at which that difference exceeds 30 us, what engraved characters tolerate.",
+    ),
+    "dot_matrix_limit_Hz": Quantity(
+        "spread exceeds 200 us from",
+        "Hz",
+        "Lowest of these rates at which that difference exceeds 200 us, what dot-matrix printing tolerates.",
+    ),
+    "energy_per_dot_J": Quantity(
+        "energy per dot",
+        "J",
+        "Work of the coil on the armature in the cycle of a single pulse.",
+    ),
+    "pack_loss_J": Quantity("pack loss", "J", "What the pack keeps of it."),
+    "backstop_loss_J": Quantity("backstop loss", "J", "What the backstop takes of it."),
+    "settle_out_s": Quantity(
+        "settle-out",
+        "s",
+        "Time from the firing of a single pulse to the end of the last rebound higher than a hundredth of the"
+        " stroke.",
+    ),
+    "print_force_N": Quantity(
+        "print force",
+        "N",
+        "Peak force of the single-pulse dot. Mass and all forces scale together without a change of the"
+        " motion; it sets that scale.",
+    ),
+}
+"""Every conclusion, by the name of its field in `Conclusions`; the unit is the end of the name."""
+
+
+@dataclass(frozen=True)
+class Conclusions:
+    """The conclusions about one hammer; what they are is said by `QUANTITIES`.
+
+    Attributes
+    ----------
+    safe_rate_Hz : float or None
+        Safe rate, Hz; None where even the slowest rate tried prints badly.
+    chaos_onset_s : float or None
+        Longest strobe time of a strange train, s; None where there is none.
+    flight_time_spread_s : float
+        Largest peak-to-peak flight time of nine-pulse bursts, s.
+    engraved_limit_Hz, dot_matrix_limit_Hz : float or None
+        Lowest rate at which it exceeds 30 us and 200 us, Hz; None where it never does.
+    energy_per_dot_J, pack_loss_J, backstop_loss_J : float
+        Coil work of the single pulse, and what pack and backstop take, J.
+    settle_out_s : float
+        Settle-out time of the single pulse, s.
+    print_force_N : float
+        Peak force of the single-pulse dot, N.
+    """
+
+    safe_rate_Hz: float | None
+    chaos_onset_s: float | None
+    flight_time_spread_s: float
+    engraved_limit_Hz: float | None
+    dot_matrix_limit_Hz: float | None
+    energy_per_dot_J: float
+    pack_loss_J: float
+    backstop_loss_J: float
+    settle_out_s: float
+    print_force_N: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the values by name, for JSON."""
+        return asdict(self)
+
+
+def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
+    """Return the conclusions about a hammer.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer, with magnet, pack, backstop and waveform.
+    context : Context, optional
+        Runs to share; by default a new one.
+
+    Returns
+    -------
+    Conclusions
+        The conclusions.
+
+    Raises
+    ------
+    NotMeasurableError
+        The single pulse does not print, or does not return to the backstop; or a run ended early.
+    """
+    shared = Context(hammer) if context is None else context
+    force = shared.print_force
+    largest, limits = flight_times(shared)
+    energy = shared.single.energy
+    return Conclusions(
+        safe_rate_Hz=safe_rate(shared),
+        chaos_onset_s=chaos_onset(shared),
+        flight_time_spread_s=largest,
+        engraved_limit_Hz=limits["engraved_s"],
+        dot_matrix_limit_Hz=limits["dot_matrix_s"],
+        energy_per_dot_J=energy.coil_work,
+        pack_loss_J=energy.pack_loss,
+        backstop_loss_J=energy.backstop_loss,
+        settle_out_s=settle_out(shared),
+        print_force_N=force,
+    )
+
+
+def settle_out(context: Context) -> float:
+    """Return the time to the end of the last rebound higher than `SETTLED` of the stroke, s.
+
+    Raises
+    ------
+    NotMeasurableError
+        There is no such rebound, or the last one does not end.
+    """
+    limit = SETTLED * context.stroke
+    ends = [bounce.end for bounce in rebounds(context.single, context.position) if bounce.height > limit]
+    if not ends:
+        raise NotMeasurableError("The armature does not rebound from the backstop after a single pulse")
+    return ends[-1] - float(context.single.drive.times[0])
+
+
+def chaos_onset(context: Context) -> float | None:
+    """Return the longest strobe time whose train is strange, s; None where there is none."""
+    settings = claims()["no_period_doubling_cascade"].settings
+    first, last = settings["first_strobe_time_s"], settings["last_strobe_time_s"]
+    # Rounded, so that strobe times are the numbers that one would write.
+    periods: list[float] = [
+        round(first - ONSET_STEP * k, 12) for k in range(round((first - last) / ONSET_STEP) + 1)
+    ]
+    for start in range(0, len(periods), _TOGETHER):
+        some = periods[start : start + _TOGETHER]
+        for period, verdict in zip(
+            some, scan(context.hammer, some, tolerance=context.tolerance), strict=True
+        ):
+            if verdict.strange:
+                return period
+    return None
+
+
+def flight_times(context: Context) -> tuple[float, dict[str, float | None]]:
+    """Return the largest flight-time spread of bursts, s, and the rates, Hz, at which it exceeds limits.
+
+    Returns
+    -------
+    largest : float
+        Largest peak-to-peak flight time of the struck dots of a burst, s.
+    limits : dict
+        By "engraved_s" and "dot_matrix_s" the lowest rate at which it exceeds that limit of the claim
+        `flight_time_spread`; None where it never does.
+
+    Raises
+    ------
+    NotMeasurableError
+        A run ended early.
+    """
+    settings = claims()["flight_time_spread"].settings
+    rates = [float(rate) for rate in range(RATES[0], RATES[1] + 1, RATES[2])]
+    dots = context.dots(
+        [PulseTrain(context.waveform, rate=rate, pulses=settings["pulses"]) for rate in rates]
+    )
+    spreads = [
+        spread(times[struck].tolist()) if struck.any() else 0.0
+        for times, struck in zip(dots.flight_time, dots.struck, strict=True)
+    ]
+    limits = {
+        name: next((rate for rate, found in zip(rates, spreads, strict=True) if found > settings[name]), None)
+        for name in ("engraved_s", "dot_matrix_s")
+    }
+    return float(max(spreads)), limits

@@ -1,0 +1,389 @@
+"""The family: clearly different hammers that do what the paper says about as well as each other.
+
+The constants of the 1983 hammer are not unique. From the log of a search hammers are chosen of which any two
+are clearly different, each is judged again with the claims themselves, and the conclusions that one would
+draw from it are computed; what holds for all members does not depend on what the paper did not print.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.claims import Context
+from printhammer.claims.context import NotMeasurableError
+from printhammer.claims.definition import claims
+from printhammer.claims.judging import judge
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.reconstruction.family.choice import at_gauge, choose
+from printhammer.reconstruction.family.conclusions import conclude
+from printhammer.reconstruction.family.log import LEAST_PANELS, Logged, read_logs
+from printhammer.reconstruction.family.robustness import robustness
+from printhammer.reconstruction.family.shelf import Shelf
+from printhammer.reconstruction.judging.judged import FIGURE_11, STATED
+from printhammer.reconstruction.results import Family, Results, results_in, shipped_results
+from printhammer.reconstruction.search.space import hammer_of, template
+from printhammer.run.ensemble import Ensemble
+from printhammer.support.outputs import make_folder, write_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+LEAST: Final = 20
+"""Number of hammers that make a family at least."""
+
+COUNT: Final = 24
+"""Number of hammers of the family unless told otherwise."""
+
+FORMAT: Final = 1
+
+_PRINTED: Final = 2e-3
+_CELL: Final = 0.02
+_MOST: Final = 2000
+
+
+@dataclass(frozen=True)
+class Member:
+    """A hammer of the family, judged.
+
+    Attributes
+    ----------
+    constants : mapping
+        Key of a hammer file to value, SI.
+    verdicts : mapping
+        Claim to "holds" or "fails": of kind "stated" as judged here, others as the log has them.
+    panels : int
+        Verdicts of Fig. 11 that are as printed.
+    conclusions : mapping
+        See `printhammer.reconstruction.family.conclusions`.
+    """
+
+    constants: Mapping[str, float]
+    verdicts: Mapping[str, str]
+    panels: int
+    conclusions: Mapping[str, Any]
+
+
+def family_hammers(folder: str | Path | None = None) -> list[Hammer]:
+    """Return the hammers of the family, each constant with status "reconstructed".
+
+    Parameters
+    ----------
+    folder : path, optional
+        Folder with a `family.json`; by default that which ships with the program.
+
+    Returns
+    -------
+    list of Hammer
+        In the order of the table, named "hendriks-1983-family-01" and so on.
+
+    Raises
+    ------
+    InputError
+        There is no table, or it is not one.
+    """
+    results = shipped_results() if folder is None else results_in(folder)
+    table = family_table(results)
+    return [
+        hammer_of(
+            row.constants,
+            name=f"hendriks-1983-{row.name}",
+            title=f"The stored-energy print hammer of Hendriks (1983), {row.name} of its reconstructions",
+        )
+        for row in table.hammers
+    ]
+
+
+def family_table(results: Results) -> Family:
+    """Return the table of the family.
+
+    Raises
+    ------
+    InputError
+        There is none, or it is not what it should be.
+    """
+    table = results.family
+    if table is None:
+        raise InputError(f"{results.folder}: expected the file family.json of a family of hammers")
+    return table
+
+
+def write_family(
+    logs: Iterable[str | Path],
+    folder: str | Path,
+    progress: Callable[[str], None] | None = None,
+    *,
+    count: int = COUNT,
+    least: int = LEAST,
+) -> list[Member]:
+    """Choose a family from logs of judged candidates, judge it, and write `family.json` and `family.csv`.
+
+    What is judged is kept in `family.part.jsonl` in the folder until the family is complete, so that work
+    that was interrupted goes on from there.
+
+    Parameters
+    ----------
+    logs : iterable of path
+        See `printhammer.reconstruction.family.log`.
+    folder : path
+        Where to write; made if it is missing, once the logs are read.
+    progress : callable, optional
+        Told what is being done, a line each.
+    count : int, optional
+        Number of members wanted.
+    least : int, optional
+        Number of members needed.
+
+    Returns
+    -------
+    list of Member
+        The members.
+
+    Raises
+    ------
+    InputError
+        A log is not one, a hammer of it cannot be made, there are too few clearly different hammers in the
+        logs, or a file cannot be written.
+    """
+    tell = progress or (lambda _: None)
+    paths = list(logs)
+    logged = read_logs(paths)
+    found = promising(logged)
+    tell(f"{len(logged)} hammers in the logs, {len(found)} of them promising")
+    hammers = [hammer_of(row.constants) for row in found]
+    forces = print_forces(hammers)
+    printing = np.flatnonzero(np.isfinite(forces)).tolist()
+    found, hammers = [found[i] for i in printing], [hammers[i] for i in printing]
+    if not found:
+        raise InputError(_too_few(paths, 0, least))
+    tables = compared([row.constants for row in found], forces[printing].tolist())
+    place = make_folder(folder)
+    shelf = Shelf(place / "family.part.jsonl")
+    members: dict[int, Member] = {}
+
+    def accept(number: int) -> bool:
+        member = _judged(found[number], hammers[number], shelf)
+        tell(f"{found[number].source}: {_told(member)}")
+        if member is not None:
+            members[number] = member
+        return member is not None
+
+    chosen = choose(tables, count, accept)
+    if len(chosen) < least:
+        tell(f"{len(chosen)} hammers far from each other; now as many as there are")
+        chosen = max(chosen, choose(tables, count, accept, wide=False), key=len)
+    if len(chosen) < least:
+        raise InputError(_too_few(paths, len(chosen), least))
+    family = [members[number] for number in chosen]
+    rows = [
+        dict(zip(_keys([row.constants for row in found]), tables[1][number], strict=True))
+        for number in chosen
+    ]
+    write_file(place / "family.csv", csv_text(family))
+    write_file(place / "family.json", json_text(family, rows))
+    shelf.remove()
+    return family
+
+
+def _too_few(paths: Sequence[str | Path], count: int, least: int) -> str:
+    names = ", ".join(str(path) for path in paths)
+    return f"{names}: {count} clearly different hammers are in the logs, expected {least}"
+
+
+def promising(logged: Sequence[Logged], most: int = _MOST) -> list[Logged]:
+    """Return the hammers of logs that nothing speaks against, the best first, nearly equal ones only once.
+
+    Parameters
+    ----------
+    logged : sequence of Logged
+        From the logs.
+    most : int, optional
+        Number from which on nearly equal hammers count once.
+    """
+    found = sorted(
+        (row for row in logged if row.promising),
+        key=lambda row: (-(row.panels or 0), -sum(row.verdicts.values())),
+    )
+    cell = _CELL
+    while len(found) > most:
+        cells: dict[tuple[tuple[str, float, int], ...], Logged] = {}
+        for row in found:
+            cells.setdefault(_cell(row.constants, cell), row)
+        found, cell = list(cells.values()), 1.5 * cell
+    return found
+
+
+def _cell(constants: Mapping[str, float], width: float) -> tuple[tuple[str, float, int], ...]:
+    """Return in which cell of a logarithmic lattice constants lie."""
+    return tuple(
+        (key, float(np.sign(value)), round(float(np.log(abs(value))) / width) if value else 0)
+        for key, value in sorted(constants.items())
+    )
+
+
+def print_forces(hammers: Sequence[Hammer]) -> FloatArray:
+    """Return the peak forces of the single-pulse dots of hammers, N; NaN where one does not print."""
+    able = [i for i, hammer in enumerate(hammers) if hammer.waveform is not None]
+    forces = np.full(len(hammers), np.nan)
+    if able:
+        drives = [PulseTrain(waveform) for i in able if (waveform := hammers[i].waveform) is not None]
+        dots = Ensemble([hammers[i] for i in able], drives, _PRINTED).run(dots=True).dots
+        assert dots is not None
+        forces[able] = dots.peak_force[:, 0]
+    return forces
+
+
+def compared(constants: Sequence[Mapping[str, float]], forces: Sequence[float]) -> list[FloatArray]:
+    """Return the constants of hammers as they are, and at the common gauge, each of shape (n, k).
+
+    Parameters
+    ----------
+    constants : sequence of mapping
+        Key of a hammer file to value, SI; what one lacks is that of the shipped hammer.
+    forces : sequence of float
+        Peak forces of the single-pulse dots, N.
+    """
+    keys = _keys(constants)
+    units = {key: constant.si_unit for key, constant in template().constants.items()}
+    plain = [{key: row.get(key, template().constants[key].si) for key in keys} for row in constants]
+    gauged = [at_gauge(row, units, force) for row, force in zip(plain, forces, strict=True)]
+    return [
+        np.array([[row[key] for key in keys] for row in rows]).reshape(len(rows), -1)
+        for rows in (plain, gauged)
+    ]
+
+
+def _keys(constants: Sequence[Mapping[str, float]]) -> list[str]:
+    """Return the keys that any of some hammers gives, and the amplitude, in the order of the hammer file."""
+    given = {key for row in constants for key in row} | {"waveform.amplitude"}
+    return [key for key in template().constants if key in given]
+
+
+def _judged(row: Logged, hammer: Hammer, shelf: Shelf) -> Member | None:
+    """Return a hammer of a log as a member of the family; None if it is none."""
+    known = shelf.get(hammer)
+    if known is None:
+        known = _judge(hammer)
+        shelf.put(hammer, known)
+    if not known["member"]:
+        return None
+    logged = {name: "holds" if holds else "fails" for name, holds in row.verdicts.items()}
+    verdicts = {**logged, **known["verdicts"]}
+    return Member(
+        row.constants,
+        {name: verdicts[name] for name in claims() if name in verdicts},
+        known["panels"],
+        known["conclusions"],
+    )
+
+
+def _judge(hammer: Hammer) -> dict[str, Any]:
+    """Judge the stated claims, those that take longest last, and draw the conclusions if all is well."""
+    context = Context(hammer)
+    verdicts: dict[str, str] = {}
+    found: dict[str, Any] = {"member": False, "verdicts": verdicts, "panels": 0, "conclusions": {}}
+    for name in STATED:
+        verdicts[name] = judge(context, claims()[name]).verdict
+        if verdicts[name] != "holds":
+            return found
+    result = judge(context, claims()[FIGURE_11])
+    verdicts[FIGURE_11] = result.verdict
+    found["panels"] = result.value["panels_as_printed"] if result.value is not None else 0
+    if found["panels"] < LEAST_PANELS:
+        return found
+    try:
+        found["conclusions"] = conclude(hammer, context).as_dict()
+    except NotMeasurableError:
+        return found
+    found["member"] = True
+    return found
+
+
+def _told(member: Member | None) -> str:
+    if member is None:
+        return "no member"
+    rate, onset = member.conclusions["safe_rate_Hz"], member.conclusions["chaos_onset_s"]
+    safe = f"safe up to {rate:.0f} Hz" if rate is not None else "not safe at any rate"
+    strange = f"strange from {onset * 1e3:.3f} ms" if onset is not None else "never strange"
+    return f"a member, {member.panels} panels of Fig. 11 as printed, {safe}, {strange}"
+
+
+def named(number: int) -> str:
+    """Return the name of a member, the first one being number 0."""
+    return f"family-{number + 1:02d}"
+
+
+def json_text(family: Sequence[Member], gauged: Sequence[Mapping[str, float]]) -> str:
+    """Return the text of `family.json`, see `printhammer.reconstruction.results.Family`.
+
+    Parameters
+    ----------
+    family : sequence of Member
+        The members.
+    gauged : sequence of mapping
+        Their constants at the common gauge, key to value, SI.
+    """
+    told = robustness([dict(member.conclusions) for member in family], gauged)
+    rows = [
+        {
+            "name": named(number),
+            "constants": dict(member.constants),
+            "verdicts": dict(member.verdicts),
+            "panels": member.panels,
+            "conclusions": dict(member.conclusions),
+        }
+        for number, member in enumerate(family)
+    ]
+    hammers = ",\n".join(f"  {_table(row, 3)}" for row in rows)
+    conclusions = _table(
+        {name: {key: row[key] for key in ("low", "high", "robust", "text")} for name, row in told.items()}, 2
+    )
+    return f'{{\n "format": {FORMAT},\n "hammers": [\n{hammers}\n ],\n "conclusions": {conclusions}\n}}\n'
+
+
+def _table(table: Mapping[str, Any], indent: int) -> str:
+    """Return the JSON text of a table, a line for each of its entries."""
+    lines = (
+        f"{' ' * indent}{json.dumps(key)}: {json.dumps(entry, allow_nan=False)}"
+        for key, entry in table.items()
+    )
+    return "{\n" + ",\n".join(lines) + f"\n{' ' * (indent - 1)}}}"
+
+
+def csv_text(family: Sequence[Member]) -> str:
+    """Return the text of `family.csv`: a row for each member, constants and conclusions with their units."""
+    units = {key: constant.si_unit for key, constant in template().constants.items()}
+    keys = _keys([member.constants for member in family])
+    judged = [name for name in claims() if any(name in member.verdicts for member in family)]
+    conclusions = list(family[0].conclusions)
+    heading = [
+        "name",
+        *(f"{key} [{units[key]}]" for key in keys),
+        "panels of Fig. 11 as printed [1]",
+        *(f"{name.rpartition('_')[0].replace('_', ' ')} [{name.rpartition('_')[2]}]" for name in conclusions),
+        *(f"claim {name}" for name in judged),
+    ]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(heading)
+    for number, member in enumerate(family):
+        writer.writerow(
+            [
+                named(number),
+                *(repr(member.constants[key]) if key in member.constants else "" for key in keys),
+                member.panels,
+                *("" if (value := member.conclusions[name]) is None else repr(value) for name in conclusions),
+                *(member.verdicts.get(name, "") for name in judged),
+            ]
+        )
+    return text.getvalue()

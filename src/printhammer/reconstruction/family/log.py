@@ -1,0 +1,80 @@
+"""Judged candidates as hammers that may be members of the family."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.reconstruction.judging.judged import STATED
+from printhammer.reconstruction.judging.log import Key, joined, key_of, read_judged
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+LEAST_PANELS: Final = 8
+"""Number of verdicts of Fig. 11, of twelve, that a member of the family has as printed at least."""
+
+
+@dataclass(frozen=True)
+class Logged:
+    """A hammer of a log.
+
+    Attributes
+    ----------
+    constants : mapping
+        Key of a hammer file to value, SI.
+    verdicts : mapping
+        Claim to whether it holds, as far as it was judged.
+    panels : int or None
+        Verdicts of Fig. 11 that are as printed.
+    source : str
+        File, and place in it.
+    """
+
+    constants: Mapping[str, float]
+    verdicts: Mapping[str, bool]
+    panels: int | None
+    source: str
+
+    @property
+    def promising(self) -> bool:
+        """Whether nothing in the log speaks against it as a member of the family."""
+        enough = self.panels is not None and self.panels >= LEAST_PANELS
+        return enough and all(self.verdicts.get(name, True) for name in STATED)
+
+
+def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
+    """Read logs of judged candidates.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        See `printhammer.reconstruction.judging.log`.
+
+    Returns
+    -------
+    list of Logged
+        In the order of the files. A hammer that was judged several times, in whatever files, comes once, with
+        all verdicts on it, the last of each claim.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, is no such log, or has no candidates.
+    """
+    found: dict[Key, tuple[dict[str, Any], str]] = {}
+    for path in map(Path, paths):
+        for number, row in enumerate(read_judged(path, some=True), 1):
+            key = key_of(row["constants"])
+            before, source = found.get(key, (None, f"{path}, candidate {number}"))
+            found[key] = joined(before, row), source
+    return [
+        Logged(
+            {key: float(value) for key, value in row["constants"].items()},
+            row["verdicts"],
+            row.get("panels"),
+            source,
+        )
+        for row, source in found.values()
+    ]

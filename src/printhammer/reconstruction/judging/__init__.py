@@ -1,0 +1,1 @@
+"""Candidates judged by the claims, and how often claims hold by chance."""

@@ -1,0 +1,146 @@
+"""The log of judged candidates: a JSON line for each, as `printhammer.reconstruction.judging.judged` makes it."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.claims.definition import claims
+from printhammer.errors import InputError
+from printhammer.reconstruction.judging.judged import text_of
+from printhammer.support.constants import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+Key = tuple[tuple[str, float], ...]
+
+
+def key_of(constants: Mapping[str, float]) -> Key:
+    """Return what tells one candidate from another."""
+    return tuple(sorted(constants.items()))
+
+
+def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
+    """Return the candidates of a log in the order of their first lines; none where there is no file.
+
+    A candidate that was judged again comes once, with all verdicts on it, the last of each claim. A last line
+    that breaks off is left out: the program was stopped while it wrote.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
+    some : bool, optional
+        Whether there must be some.
+
+    Returns
+    -------
+    list of dict
+        Rows, see `printhammer.reconstruction.judging.judged.row_of`.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is no such log, or has no candidates where there must be some.
+    """
+    found: dict[Key, dict[str, Any]] = {}
+    for number, line in enumerate(_read(path)[0].split("\n")[:-1], 1):
+        row = _row(line, f"{path}, line {number}")
+        key = key_of(row["constants"])
+        found[key] = joined(found.get(key), row)
+    if some and not found:
+        raise InputError(f"{path}: expected judged candidates, and there are none")
+    return list(found.values())
+
+
+def joined(before: dict[str, Any] | None, row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row with what an earlier one on the same candidate knows beside."""
+    if before is None:
+        return row
+    both = {**before, **{name: value for name, value in row.items() if value is not None}}
+    for name in ("verdicts", "values"):
+        both[name] = {**before[name], **row[name]}
+    return both
+
+
+def mend(path: Path) -> None:
+    """Cut off a last line that breaks off, so that rows can be added.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written, or its end is no beginning of a judged candidate.
+    """
+    whole, rest = _read(path)
+    if not rest:
+        return
+    begin = text_of({"constants": {}})[: len(rest)].partition("}")[0]
+    if not rest.startswith(begin):
+        raise InputError(f"{path}: expected a log of judged candidates, its last line is {shown(rest)}")
+    try:
+        with path.open("r+b") as file:
+            file.truncate(len(whole.encode()))
+    except OSError as error:
+        raise InputError(f"{path}: the file cannot be written ({error.strerror or error})") from None
+
+
+def append(path: Path, row: Mapping[str, Any]) -> None:
+    """Add a row to a log.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            file.write(text_of(row))
+    except OSError as error:
+        raise InputError(f"{path}: the file cannot be written ({error.strerror or error})") from None
+
+
+def _read(path: Path) -> tuple[str, str]:
+    """Return the complete lines of a file and what stands behind the last of them."""
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        return "", ""
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8"
+        raise InputError(f"{path}: the file cannot be read ({reason})") from None
+    whole, newline, rest = text.rpartition("\n")
+    return whole + newline, rest
+
+
+def _row(line: str, where: str) -> dict[str, Any]:
+    try:
+        row = json.loads(line)
+    except ValueError:
+        row = None
+    if not isinstance(row, dict):
+        raise InputError(f"{where}: expected a judged candidate as a JSON object, not {line[:40]!r}")
+    constants = row.get("constants")
+    if not isinstance(constants, dict) or not constants:
+        raise InputError(
+            f"{where}: constants = {shown(constants)}, expected the constants of a judged candidate"
+        )
+    for key, value in constants.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"{where}: constants.{key} = {shown(value)}, expected a finite number in SI")
+    for name in ("verdicts", "values"):
+        if not isinstance(row.get(name), dict):
+            raise InputError(
+                f"{where}: {name} = {shown(row.get(name))}, expected those of a judged candidate"
+            )
+        if unknown := next((claim for claim in row[name] if claim not in claims()), None):
+            raise InputError(f"{where}: {name}.{unknown} is not known, expected the name of a claim")
+    for name, holds in row["verdicts"].items():
+        if not isinstance(holds, bool):
+            raise InputError(f"{where}: verdicts.{name} = {shown(holds)}, expected true or false")
+    panels = row.get("panels")
+    if panels is not None and (isinstance(panels, bool) or not isinstance(panels, int)):
+        raise InputError(f"{where}: panels = {shown(panels)}, expected a whole number or null")
+    return row

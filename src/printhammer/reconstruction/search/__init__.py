@@ -1,0 +1,1 @@
+"""The search for hammers that do what the paper tells."""

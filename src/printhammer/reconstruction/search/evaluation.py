@@ -1,0 +1,143 @@
+"""Scores of many points: the stages one after the other, in as many processes as there are."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from printhammer.reconstruction.search.candidates import candidates
+from printhammer.reconstruction.search.losses import Score, hung, pairs, single_pulse, statics
+from printhammer.reconstruction.search.panel_losses import panels
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from concurrent.futures import Executor
+
+    from printhammer.reconstruction.search.candidates import Candidate
+    from printhammer.support.arrays import FloatArray
+
+Aim = Literal["stated", "all"]
+"""Which claims lead a search: those of kind "stated" alone, or those of kind "shape" too."""
+
+STATED: Final = {
+    "return_from_everywhere": 4.0,
+    "single_pulse_stroke": 2.0,
+    "two_pulses_660us": 6.0,
+    "two_pulses_700us": 15.0,
+    "second_dot_lost": 6.0,
+    "integrator_comparison": 4.0,
+    "poincare": 4.0,
+}
+SHAPE: Final = {
+    "release_margin": 1.0,
+    "settle_out": 1.0,
+    "low_restitution": 1.0,
+    "backstop_force_dominates": 1.0,
+    "poincare_window": 1.0,
+    "hang_up_at_high_rate": 0.5,
+    "weak_prints_when_hung_up": 1.0,
+}
+WEIGHTS: Final[dict[str, dict[str, float]]] = {"stated": STATED, "all": {**STATED, **SHAPE}}
+"""Weights of the losses: first come the stated claims outside Fig. 11, which are conditions of all else; a
+claim of kind "shape" counts for as much as three panels of Fig. 11."""
+
+PIECE: Final = 64
+"""Points that one process looks at together."""
+
+_WORST_SINGLE: Final = 1.6
+_WORST_PAIRS: Final = 3.0
+
+
+@cache
+def losses_digest() -> str:
+    """Return a digest of the sources that decide on the losses, so that logs of different ones do not mix."""
+    digest = hashlib.sha256()
+    for name in ("space", "candidates", "losses", "panel_losses", "evaluation"):
+        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def evaluate(points: Sequence[FloatArray], aim: Aim) -> list[tuple[Candidate | None, Score]]:
+    """Score points in this thread.
+
+    Parameters
+    ----------
+    points : sequence of arrays
+        Shares of the ranges of the variables.
+    aim : str
+        Which claims count.
+    """
+    weights = WEIGHTS[aim]
+    found = candidates(points)
+    scores = [Score() for _ in points]
+    chosen = [i for i, candidate in enumerate(found) if candidate is not None]
+
+    def look(stage: Any) -> None:
+        stage([found[i] for i in chosen], [scores[i] for i in chosen])
+
+    def keep(limit: float, names: Sequence[str]) -> list[int]:
+        return [
+            i
+            for i in chosen
+            if sum(weights.get(name, 0.0) * scores[i].losses.get(name, 1.0) for name in names) < limit
+        ]
+
+    for i in chosen:
+        candidate = found[i]
+        assert candidate is not None
+        statics(candidate, scores[i])
+    look(single_pulse)
+    chosen = keep(
+        _WORST_SINGLE,
+        [
+            "return_from_everywhere",
+            "single_pulse_stroke",
+            "integrator_comparison",
+            "release_margin",
+            "settle_out",
+        ],
+    )
+    look(pairs)
+    chosen = keep(_WORST_PAIRS, ["two_pulses_660us", "two_pulses_700us", "second_dot_lost"])
+    look(panels)
+    if aim == "all":
+        look(hung)
+    return list(zip(found, scores, strict=True))
+
+
+def rows(points: Sequence[FloatArray], aim: Aim) -> list[dict[str, Any]]:
+    """Score points, each as a row of the log."""
+    found = []
+    for point, (candidate, score) in zip(points, evaluate(points, aim), strict=True):
+        found.append(
+            {
+                "point": [float(share) for share in point],
+                "total": score.total(WEIGHTS[aim]),
+                "losses": {name: round(loss, 6) for name, loss in score.losses.items()},
+                "measured": score.measured,
+                "constants": None if candidate is None else candidate.constants,
+            }
+        )
+    return found
+
+
+def scored(points: Sequence[FloatArray], aim: Aim, pool: Executor | None) -> list[dict[str, Any]]:
+    """Score points, in the order given, whatever the number of processes.
+
+    Parameters
+    ----------
+    points : sequence of arrays
+        Shares of the ranges of the variables.
+    aim : str
+        Which claims count.
+    pool : Executor or None
+        Processes; None for this one alone.
+    """
+    pieces = [points[start : start + PIECE] for start in range(0, len(points), PIECE)]
+    if pool is None:
+        done = [rows(piece, aim) for piece in pieces]
+    else:
+        done = list(pool.map(rows, pieces, [aim] * len(pieces)))
+    return [row for piece in done for row in piece]

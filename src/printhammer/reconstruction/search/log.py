@@ -1,0 +1,137 @@
+"""The log of a search: a heading, then a line for each candidate, in the order they were tried."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.support.constants import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from printhammer.support.arrays import FloatArray
+
+_HEADING: Final = {"aim", "seed"}
+_CANDIDATE: Final = {"point", "total", "constants"}
+
+
+def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return the heading and the candidates of the log of a search.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no such log.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")[:-1]
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8"
+        raise InputError(f"{path}: the log cannot be read ({reason})") from None
+    rows = []
+    for number, line in enumerate(lines, 1):
+        try:
+            row = json.loads(line)
+        except ValueError:
+            row = None
+        wanted = _HEADING if number == 1 else _CANDIDATE
+        if not isinstance(row, dict) or not wanted <= set(row):
+            what = "the heading" if number == 1 else "a candidate"
+            raise InputError(
+                f"{path}, line {number}: expected {what} of the log of a search, not {line[:40]!r}"
+            )
+        rows.append(row)
+    if not rows:
+        raise InputError(f"{path}: expected the log of a search, and there is nothing")
+    aim, seed = rows[0]["aim"], rows[0]["seed"]
+    if aim not in ("stated", "all"):
+        raise InputError(f"{path}, line 1: aim = {shown(aim)}, expected stated or all")
+    if isinstance(seed, bool) or not isinstance(seed, int):
+        raise InputError(f"{path}, line 1: seed = {shown(seed)}, expected a whole number")
+    return rows[0], rows[1:]
+
+
+class Log:
+    """A log on disk, begun or gone on with.
+
+    Parameters
+    ----------
+    path : Path
+        JSON lines; made where it is missing. A last line that breaks off is cut: the search was stopped
+        while it wrote.
+    heading : dict
+        First line: what decides on the search.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or written, holds something else, or is the log of another search.
+    """
+
+    def __init__(self, path: Path, heading: dict[str, Any]) -> None:
+        self.path = path
+        self._rows: list[dict[str, Any]] = []
+        first = json.dumps(heading)
+        text = self._text()
+        if first.startswith(text):
+            # Nothing yet, or stopped inside the heading.
+            self._write("w", first + "\n")
+            return
+        whole, _, broken = text.rpartition("\n")
+        try:
+            rows = [json.loads(line) for line in whole.split("\n")]
+        except json.JSONDecodeError as error:
+            raise InputError(f"{path}: expected JSON lines of a search ({error})") from None
+        if not all(isinstance(row, dict) for row in rows):
+            raise InputError(f"{path}: expected JSON lines of a search, each an object")
+        for key, value in heading.items():
+            if rows[0].get(key) != value:
+                told = f"{key} = {_short(rows[0].get(key))}, expected {_short(value)}"
+                raise InputError(f"{path}: the log of another search: {told}")
+        if broken:
+            self._write("w", whole + "\n")
+        self._rows = rows[1:]
+
+    def _text(self) -> str:
+        try:
+            return self.path.read_text(encoding="utf-8") if self.path.exists() else ""
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"{self.path}: the log cannot be read ({reason})") from None
+
+    def _write(self, mode: str, text: str) -> None:
+        try:
+            with self.path.open(mode, encoding="utf-8") as file:
+                file.write(text)
+        except OSError as error:
+            raise InputError(f"{self.path}: the log cannot be written ({error.strerror})") from None
+
+    def append(self, rows: Sequence[dict[str, Any]]) -> None:
+        """Add candidates."""
+        if rows:
+            self._rows += rows
+            self._write("a", "".join(json.dumps(row) + "\n" for row in rows))
+
+    def known(self, place: int, points: Sequence[FloatArray]) -> list[dict[str, Any]]:
+        """Return the candidates from a place on, as far as they are there.
+
+        Raises
+        ------
+        InputError
+            They are not those of the points that the search asks for.
+        """
+        there = self._rows[place : place + len(points)]
+        for number, (row, point) in enumerate(zip(there, points, strict=False), place + 1):
+            if not np.array_equal(row.get("point", ()), point):
+                raise InputError(f"{self.path}: candidate {number} is not the one of this search")
+        return there
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,211 @@
+"""How far the panels of Fig. 11 are from their printed verdicts, as far as short trains tell.
+
+A verdict jumps; what leads the search does not. Where a train settles that should be strange, the sooner it
+settles, the larger the loss. Where a train wanders that should be periodic, the orbit of that period is found
+by Newton's method all the same, and the more it repels, the larger the loss.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.verdict import repeats
+from printhammer.claims.definition import claims
+from printhammer.claims.verdicts import printed_verdicts
+from printhammer.drive.trains import PulseTrain
+from printhammer.reconstruction.search.candidates import TOLERANCE
+from printhammer.reconstruction.search.losses import CHUNK, Score, hinge, run_all
+from printhammer.reconstruction.search.space import geometry
+from printhammer.run.ensemble import Ensemble
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.reconstruction.search.candidates import Candidate
+    from printhammer.support.arrays import FloatArray
+
+FIRINGS: Final = 360
+"""Firings of each panel in the search; the claims themselves are about more."""
+
+_AGREE: Final = 1e-8
+"""Distance, in half-widths of the window, from which on a train counts as settled."""
+
+_LAST: Final = 40
+_LONGEST: Final = 16
+_ROUNDS: Final = 6
+_NUDGE: Final = 1e-6
+"""Difference of states that tells the derivative of the strobe map, in half-widths of the window."""
+
+_FOUND: Final = 1e-6
+_REPELS: Final = 30.0
+"""Multiplier of a periodic orbit from which on its loss is the largest."""
+
+
+def panels(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
+    """Look at the twelve panels of Fig. 11, and at their window."""
+    printed = printed_verdicts()
+    periods = list(printed)
+    for start in range(0, len(chosen), CHUNK):
+        some, own = chosen[start : start + CHUNK], scores[start : start + CHUNK]
+        drives = [
+            PulseTrain(candidate.waveform, period=period, pulses=FIRINGS + 1)
+            for candidate in some
+            for period in periods
+        ]
+        ends = [period * FIRINGS for _ in some for period in periods]
+        table = run_all(some, drives, ends, len(periods), strobes="firings").strobes
+        assert table is not None
+        wandering: list[tuple[int, int, int, FloatArray]] = []
+        losses = np.zeros((len(some), len(periods)))
+        for k, score in enumerate(own):
+            shares, found = [], []
+            for j, period in enumerate(periods):
+                row = k * len(periods) + j
+                states = np.column_stack([table.x[row], table.v[row], table.memory[row]])[:FIRINGS]
+                branch = np.where(states[:, 0] > geometry()["xp"], table.branch[row, :FIRINGS], 0)
+                shares.append(_share(states))
+                losses[k, j], name, wanted = _panel(states, branch, printed[period])
+                found.append(name)
+                if wanted:
+                    wandering.append((k, j, wanted, _closest(states, wanted)))
+            score.losses["poincare_window"] = hinge(_least_share() - min(shares), _least_share())
+            right = sum(name == wanted for name, wanted in zip(found, printed.values(), strict=True))
+            score.measured |= {"panels": right, "verdicts": found, "least_share": min(shares)}
+        for (k, j, _q, _state), multiplier in zip(
+            wandering, _multipliers(some, periods, wandering), strict=True
+        ):
+            losses[k, j] = 1.0 if math.isnan(multiplier) else _repelled(multiplier)
+        for k, score in enumerate(own):
+            score.losses["poincare"] = float(losses[k].mean())
+
+
+def _repelled(multiplier: float) -> float:
+    """Return the loss of a panel in which an orbit with that multiplier should have been reached."""
+    if multiplier <= 1.0:
+        # It attracts, but not from rest.
+        return 0.3
+    return 0.4 + 0.5 * min(math.log(multiplier) / math.log(_REPELS), 1.0)
+
+
+def _scales() -> FloatArray:
+    settings = claims()["poincare_window"].settings
+    width, speed = np.ptp(settings["window_x_m"]) / 2.0, np.ptp(settings["window_v_m_per_s"]) / 2.0
+    return np.array([width, speed, width])
+
+
+def _least_share() -> float:
+    return float(claims()["poincare_window"].band["least_share_inside"]["at_least"])
+
+
+def _share(states: FloatArray) -> float:
+    """Return the share of the strobe points that lie inside the window."""
+    settings = claims()["poincare_window"].settings
+    (left, right), (low, high) = settings["window_x_m"], settings["window_v_m_per_s"]
+    x, v = states[: settings["points"], 0], states[: settings["points"], 1]
+    return float(((x >= left) & (x <= right) & (v >= low) & (v <= high)).mean())
+
+
+def _panel(states: FloatArray, branch: npt.NDArray[np.int64], printed: str) -> tuple[float, str, int]:
+    """Return loss and name of the verdict that a short train suggests, and the period of an orbit to seek.
+
+    The last is 0 unless the loss is to be that of an orbit which the train does not settle on.
+    """
+    scales = _scales()
+    late = repeats(states[-_LAST:], branch[-_LAST:], scales, _LONGEST)
+    early = repeats(states[-2 * _LAST : -_LAST], branch[-2 * _LAST : -_LAST], scales, _LONGEST)
+    now = np.where(np.isfinite(late), np.maximum(late, 1e-12), 10.0)
+    before = np.where(np.isfinite(early), np.maximum(early, 1e-12), 10.0)
+    near = np.flatnonzero((now < 1e-6) | ((now < 0.3 * before) & (now < 1e-2)))
+    name = f"period-{near[0] + 1}" if near.size else "strange"
+    if name == printed:
+        return 0.0, name, 0
+    if printed == "strange":
+        return 0.4 + 0.6 * _haste(states, scales, int(near[0]) + 1), name, 0
+    period = int(printed.rpartition("-")[2])
+    if name == "period-1" and period == 2:
+        # The sooner it settles, the farther from doubling.
+        return 0.5 + 0.5 * _haste(states, scales, 1), name, 0
+    return 1.0, name, period
+
+
+def _haste(states: FloatArray, scales: FloatArray, period: int) -> float:
+    """Return how soon states that far apart agree: 1 for at once, 0 for not before the end."""
+    apart = np.abs((states[period:] - states[:-period]) / scales).max(axis=1)
+    agree = np.flatnonzero(apart < _AGREE)
+    count = int(agree[0]) + 1 if agree.size else len(states)
+    return 1.0 - math.log(count) / math.log(len(states))
+
+
+def _closest(states: FloatArray, period: int) -> FloatArray:
+    """Return displacement and velocity where the train came closest to repeating."""
+    apart = np.abs((states[period:, :2] - states[:-period, :2]) / _scales()[:2]).max(axis=1)
+    return np.asarray(states[int(np.nanargmin(apart)), :2] if np.isfinite(apart).any() else states[0, :2])
+
+
+def _multipliers(
+    some: Sequence[Candidate],
+    periods: Sequence[float],
+    wandering: Sequence[tuple[int, int, int, FloatArray]],
+) -> list[float]:
+    """Return the largest multiplier of each orbit, by absolute value; NaN where none is found.
+
+    Newton's method on the strobe map, its derivative by differences, from the states given. What is left of
+    the current at the next firing is left out, which is nothing that could be seen at these periods.
+    """
+    if not wandering:
+        return []
+    scales = _scales()[:2]
+    states = np.array([state for *_, state in wandering])
+    found = np.full(len(wandering), math.nan)
+    open_ = np.arange(len(wandering))
+    for _ in range(_ROUNDS):
+        if not open_.size:
+            break
+        starts = np.repeat(states[open_], 3, axis=0)
+        starts[1::3, 0] += _NUDGE * scales[0]
+        starts[2::3, 1] += _NUDGE * scales[1]
+        ends = _after(some, periods, [wandering[int(i)] for i in open_], starts)
+        kept = []
+        for n, i in enumerate(open_):
+            here = ends[3 * n : 3 * n + 3] / scales
+            slope = np.column_stack([here[1] - here[0], here[2] - here[0]]) / _NUDGE
+            miss = here[0] - states[i] / scales
+            if not np.isfinite(here).all():
+                continue
+            if np.abs(miss).max() < _FOUND:
+                found[i] = float(np.abs(np.linalg.eigvals(slope)).max())
+                continue
+            try:
+                change = np.linalg.solve(np.eye(2) - slope, miss)
+            except np.linalg.LinAlgError:
+                continue
+            change *= min(1.0, 0.3 / float(np.abs(change).max()))
+            states[i] += change * scales
+            kept.append(i)
+        open_ = np.array(kept, dtype=np.int64)
+    return found.tolist()
+
+
+def _after(
+    some: Sequence[Candidate],
+    periods: Sequence[float],
+    wanted: Sequence[tuple[int, int, int, FloatArray]],
+    starts: FloatArray,
+) -> FloatArray:
+    """Return displacement and velocity after one period of each orbit, three starts for each."""
+    hammers, drives, ends = [], [], []
+    for k, j, period, _state in wanted:
+        train = PulseTrain(some[k].waveform, period=periods[j], pulses=period)
+        hammers += [some[k].hammer] * 3
+        drives += [train] * 3
+        ends += [period * periods[j]] * 3
+    options: dict[str, Any] = {"threads": 1, "strobes": [np.array([end]) for end in ends]}
+    states = np.ascontiguousarray(starts)
+    table = Ensemble(hammers, drives, ends, states=states, tolerance=TOLERANCE).run(**options).strobes
+    assert table is not None
+    return np.column_stack([table.x[:, 0], table.v[:, 0]])

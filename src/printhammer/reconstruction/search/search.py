@@ -1,0 +1,239 @@
+"""The search: a wide sample, then evolution strategies from its best points, and steps over what is feasible.
+
+Everything follows from the seed. Each candidate is a line of the log, so that a search that was stopped goes
+on where it was: what the log holds is not computed again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.reconstruction.search.evaluation import WEIGHTS, losses_digest, scored
+from printhammer.reconstruction.search.explorer import Explorer
+from printhammer.reconstruction.search.log import Log, read_search
+from printhammer.reconstruction.search.space import VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from concurrent.futures import Executor
+    from pathlib import Path
+
+    from printhammer.reconstruction.search.evaluation import Aim
+    from printhammer.support.arrays import FloatArray
+
+FORMAT: Final = 1
+SAMPLE: Final = 16384
+"""Points of the wide sample."""
+
+ISLANDS: Final = 4
+EXPLORED: Final = 64
+"""Points of each round that explore, beside those of the islands."""
+
+POPULATION: Final = 16
+SIGMA: Final = 0.08
+"""Largest first step length of an island, in shares of the ranges."""
+
+PATIENCE: Final = 30
+"""Generations without gain after which an island begins anew."""
+
+_SEEDS: Final = 200
+"""Best points known from which islands begin."""
+
+_FAVOUR: Final = 2.0
+_TOGETHER: Final = 128
+_GAIN: Final = 1e-3
+_APART: Final = 0.03
+STARTS: Final = 64
+"""Points taken over from another search."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What decides on a search.
+
+    Attributes
+    ----------
+    aim : str
+        Which claims lead: "stated" or "all".
+    seed : int
+        Of everything random.
+    sample : int
+        Points of the wide sample.
+    starts : tuple of tuple of float
+        Further points from which islands may begin, such as the best of another search.
+    """
+
+    aim: Aim
+    seed: int
+    sample: int = SAMPLE
+    starts: tuple[tuple[float, ...], ...] = ()
+
+    def heading(self) -> dict[str, Any]:
+        """Return the first line of the log."""
+        return {
+            "format": FORMAT,
+            "aim": self.aim,
+            "seed": self.seed,
+            "sample": self.sample,
+            "starts": [list(point) for point in self.starts],
+            "islands": ISLANDS,
+            "explored": EXPLORED,
+            "population": POPULATION,
+            "weights": WEIGHTS[self.aim],
+            "losses": losses_digest(),
+            "variables": [[v.name, v.low, v.high, v.logarithmic] for v in VARIABLES],
+        }
+
+
+def starts_of(path: Path, aim: Aim, count: int = STARTS) -> tuple[tuple[float, ...], ...]:
+    """Return the best points of another search that are not next to each other.
+
+    Parameters
+    ----------
+    path : Path
+        Its log.
+    aim : str
+        Aim of the search that is to begin there.
+    count : int, optional
+        How many points at most.
+
+    Raises
+    ------
+    InputError
+        The file is not the log of a search, or a search on the stated claims would be led by others through
+        its starts.
+    """
+    from printhammer.reconstruction.judging.shortlist import shortlist
+
+    heading, rows = read_search(path)
+    if aim == "stated" and heading["aim"] != "stated":
+        raise InputError(f"{path}: aim = {heading['aim']!r}, expected the log of a search on stated claims")
+    return tuple(tuple(row["point"]) for row in shortlist(rows, count, _APART))
+
+
+def search(
+    plan: Plan,
+    path: Path,
+    *,
+    pool: Executor | None = None,
+    tell: Callable[[int, float, dict[str, Any]], None] | None = None,
+) -> Iterator[dict[str, Any]]:
+    """Search without end; every candidate is yielded after it was noted.
+
+    Parameters
+    ----------
+    plan : Plan
+        What to search for.
+    path : Path
+        Log; a search begun there goes on.
+    pool : Executor, optional
+        Processes to compute in; by default this one.
+    tell : callable, optional
+        Called after each batch with the number of candidates, the least total loss, and its row.
+
+    Yields
+    ------
+    dict
+        A row of the log.
+
+    Raises
+    ------
+    InputError
+        The log is that of another search, or the package that searches is not installed.
+    """
+    _strategies()
+    log = Log(path, plan.heading())
+    place, best = 0, None
+
+    def batch(points: list[FloatArray]) -> list[dict[str, Any]]:
+        nonlocal place, best
+        there = log.known(place, points)
+        fresh = scored(points[len(there) :], plan.aim, pool) if len(there) < len(points) else []
+        log.append(fresh)
+        found = [*there, *fresh]
+        place += len(found)
+        for row in found:
+            if best is None or row["total"] < best["total"]:
+                best = row
+        if tell is not None and best is not None:
+            tell(place, best["total"], best)
+        return found
+
+    rng = np.random.default_rng([plan.seed, len(plan.aim)])
+    start: list[dict[str, Any]] = []
+    points = [*(np.array(point) for point in plan.starts), *_wide(plan, rng)]
+    for first in range(0, len(points), _TOGETHER):
+        for row in batch(points[first : first + _TOGETHER]):
+            start.append(row)
+            yield row
+    start.sort(key=lambda row: row["total"])
+    explorer = Explorer(WEIGHTS[plan.aim], rng)
+    explorer.note(start)
+    islands = [_Island(start, rng) for _ in range(ISLANDS)]
+    while True:
+        asked = [point for island in islands for point in island.ask()]
+        found = batch(asked + explorer.ask(EXPLORED))
+        yield from found
+        explorer.note(found)
+        for number, island in enumerate(islands):
+            own = found[number * POPULATION : (number + 1) * POPULATION]
+            island.tell(own)
+            if island.done:
+                # What it found may be where another begins.
+                start.append(island.best)
+                start.sort(key=lambda row: row["total"])
+                islands[number] = _Island(start, rng)
+
+
+def _wide(plan: Plan, rng: np.random.Generator) -> list[FloatArray]:
+    from scipy.stats import qmc
+
+    sampler = qmc.Sobol(len(VARIABLES), seed=rng)
+    return list(sampler.random(plan.sample))
+
+
+def _strategies() -> Any:
+    """Return the evolution strategy of the optional package."""
+    try:
+        from cmaes import CMA
+    except ImportError:
+        raise InputError(
+            "the search needs cmaes, which is not installed: pip install 'printhammer[identify]'"
+        ) from None
+    return CMA
+
+
+class _Island:
+    """One evolution strategy, from one of the best points known."""
+
+    def __init__(self, start: list[dict[str, Any]], rng: np.random.Generator) -> None:
+        # Good ones are taken more often.
+        pick = int(min(_SEEDS, len(start)) * rng.random() ** _FAVOUR)
+        self._strategy = _strategies()(
+            mean=np.clip(np.array(start[pick]["point"]), 0.02, 0.98),
+            sigma=SIGMA * 2.0 ** -rng.integers(4),
+            bounds=np.array([[0.0, 1.0]] * len(VARIABLES)),
+            seed=int(rng.integers(2**31)),
+            population_size=POPULATION,
+        )
+        self.best = start[pick]
+        self._least, self._since = np.inf, 0
+
+    def ask(self) -> list[FloatArray]:
+        return [self._strategy.ask() for _ in range(POPULATION)]
+
+    def tell(self, found: list[dict[str, Any]]) -> None:
+        self._strategy.tell([(np.array(row["point"]), row["total"]) for row in found])
+        best = min(found, key=lambda row: float(row["total"]))
+        self._since = 0 if best["total"] < self._least - _GAIN else self._since + 1
+        if best["total"] < self._least:
+            self._least, self.best = best["total"], best
+
+    @property
+    def done(self) -> bool:
+        """Whether it gains no more."""
+        return self._since > PATIENCE or self._strategy.should_stop()

@@ -1,0 +1,1 @@
+"""Runs: one hammer or many, from a state through a drive."""

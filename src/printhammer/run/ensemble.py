@@ -1,0 +1,456 @@
+"""Ensembles: many runs, integrated together on all cores.
+
+Every member has its own hammer, drive, state, steps and contacts. What is kept of a run is only what is
+asked for, so that memory does not grow with its length. The results of a member do not depend on what else is
+in the ensemble, nor on the number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.kernel.modes import MODE_NAMES, OK, STATUS_NAMES
+from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job, kernel_of
+from printhammer.run.problem import TOLERANCE, check_tolerance, laws_of
+from printhammer.run.start import check_branch, initial_state
+from printhammer.support.threads import PIECES_A_THREAD, in_threads, thread_count
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.drive.trains import Drive
+    from printhammer.kernel.laws import Laws
+    from printhammer.run.ensemble_group import LaneKinds
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+__all__ = ["DISPLAY_TOLERANCE", "MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
+
+DISPLAY_TOLERANCE: Final = 5e-7
+"""Tolerance for pictures: displacements are good to about 1e-4 of the stroke."""
+
+Engine = Literal["auto", "plain", "lanes"]
+ENGINES: Final = get_args(Engine)
+
+
+@dataclass(frozen=True)
+class DotTable:
+    """What the firings did: arrays of shape (members, most firings of any member).
+
+    Attributes
+    ----------
+    fired : bool array
+        Whether the member has such a firing, and its run came so far.
+    fired_at : array
+        Time of the firing, s; NaN where there is none.
+    struck : bool array
+        False for a lost dot; the values of a lost dot are NaN.
+    flight_time : array
+        From firing to touch, s.
+    impact_speed : array
+        At touch, m/s.
+    peak_force : array
+        Largest pack force, N.
+    indentation : array
+        Largest indentation, m.
+    contact_time : array
+        From touch to leaving, s; NaN also while the contact is open.
+    extra_contacts : int array
+        Further pack contacts before the next firing.
+    """
+
+    fired: npt.NDArray[np.bool_]
+    fired_at: FloatArray
+    struck: npt.NDArray[np.bool_]
+    flight_time: FloatArray
+    impact_speed: FloatArray
+    peak_force: FloatArray
+    indentation: FloatArray
+    contact_time: FloatArray
+    extra_contacts: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Strobes:
+    """States at given times: arrays (members, most times of any member), NaN where a run did not get.
+
+    Attributes
+    ----------
+    t : array
+        Time, s.
+    x, v : array
+        Displacement, m, and velocity, m/s.
+    branch : int array
+        Code of the mode, see `printhammer.kernel.modes`; -1 where a run did not get.
+    memory : array
+        Displacement of the latest local maximum, m, on the unloading branch inside the pack, else 0.
+    """
+
+    t: FloatArray
+    x: FloatArray
+    v: FloatArray
+    branch: npt.NDArray[np.int64]
+    memory: FloatArray
+
+
+@dataclass(frozen=True)
+class EnsembleResult:
+    """What is kept of the runs of an ensemble.
+
+    Attributes
+    ----------
+    status : int array, shape (M,)
+        Codes of the statuses; 0 is ok.
+    reached : array, shape (M,)
+        Time at which each run ended, s.
+    steps : int array, shape (M,)
+        Number of steps of each run.
+    dots : DotTable or None
+        What the firings did, if asked for.
+    strobes : Strobes or None
+        States at the times asked for.
+    x : float32 array, shape (M, T), or None
+        Displacement at the common times, m; NaN where a run did not get.
+    """
+
+    status: npt.NDArray[np.int64]
+    reached: FloatArray
+    steps: npt.NDArray[np.int64]
+    dots: DotTable | None = None
+    strobes: Strobes | None = None
+    x: npt.NDArray[np.float32] | None = None
+
+    @property
+    def ok(self) -> npt.NDArray[np.bool_]:
+        """Which runs went as asked."""
+        return np.equal(self.status, OK)
+
+    @property
+    def status_names(self) -> list[str]:
+        """Names of the statuses."""
+        return [STATUS_NAMES[code] for code in self.status]
+
+
+class Ensemble:
+    """Many runs, integrated together, on all cores.
+
+    Parameters
+    ----------
+    hammers : Hammer or sequence of Hammer
+        One for all members, or one for each.
+    drives : Drive or sequence of Drive
+        Likewise.
+    ends : float or array
+        End of the runs, s, one for all or one for each.
+    states : tuple or array, optional
+        Displacement, m, and velocity, m/s, at the start: one for all or one row for each member; by default
+        the rest state of the member's hammer. Rows of four also hold the mode and the memory, as in
+        `Strobes`, for a start inside the pack.
+    starts : float or array, optional
+        Time of these states, s, not negative, one for all or one for each; by default 0. What was fired
+        before is under way then.
+    tolerance : float, optional
+        Error allowed in one step, in units of the way from backstop to pack and of a typical speed.
+
+    Raises
+    ------
+    InputError
+        Numbers of hammers, drives, ends, states and starts that do not fit together; an end not positive or
+        not after its start; a state not finite; a hammer without a rest state where no states are given.
+    """
+
+    def __init__(
+        self,
+        hammers: Hammer | Sequence[Hammer],
+        drives: Drive | Sequence[Drive],
+        ends: float | npt.ArrayLike,
+        *,
+        states: npt.ArrayLike | None = None,
+        starts: float | npt.ArrayLike = 0.0,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        check_tolerance(tolerance)
+        self.tolerance = tolerance
+        one_hammer, one_drive = isinstance(hammers, Hammer), not isinstance(drives, list | tuple)
+        many_hammers = [hammers] if isinstance(hammers, Hammer) else list(hammers)
+        many_drives: list[Drive] = list(drives) if isinstance(drives, list | tuple) else [drives]  # type: ignore[list-item]
+        moments, begun = _each(ends, "ends"), _each(starts, "starts")
+        rows = None if states is None else _numbers(states, "states")
+        counts = {
+            "hammers": 1 if one_hammer else len(many_hammers),
+            "drives": 1 if one_drive else len(many_drives),
+            "ends": len(moments) if np.ndim(ends) else 1,
+            "states": 1 if rows is None or rows.ndim < 2 else len(rows),
+            "starts": len(begun) if np.ndim(starts) else 1,
+        }
+        self.size = max(counts.values()) if min(counts.values()) > 0 else 0
+        for name, count in counts.items():
+            if count not in (1, self.size):
+                raise InputError(f"{name}: {count} are given, expected 1 or {self.size}")
+        wrong = ~(np.isfinite(moments) & (moments > 0.0))
+        if wrong.any():
+            raise InputError(f"ends = {float(moments[wrong][0])!r} s, expected positive numbers")
+        self.hammers: list[Hammer] = many_hammers * (self.size if len(many_hammers) == 1 else 1)
+        self.drives: list[Drive] = many_drives * (self.size if len(many_drives) == 1 else 1)
+        self.ends = np.broadcast_to(moments, (self.size,)).astype(np.float64)
+        self.states = self._states(rows)
+        self.states[:, 0] = self._checked_starts(begun)
+        self._groups: list[Group] | None = None
+
+    def _states(self, rows: FloatArray | None) -> FloatArray:
+        full = np.zeros((self.size, 5))
+        full[:, 3] = -1.0
+        if rows is None:
+            from printhammer.hammer.equilibrium import rest_state
+
+            rest: dict[int, float] = {}
+            for i, hammer in enumerate(self.hammers):
+                if id(hammer) not in rest:
+                    rest[id(hammer)] = rest_state(hammer)
+                full[i, 1] = rest[id(hammer)]
+            return full
+        if rows.ndim not in (1, 2) or rows.shape[-1] not in (2, 4):
+            raise InputError(
+                f"states: an array of shape {rows.shape}, expected rows of displacement and velocity, or of"
+                " these with branch and memory"
+            )
+        full[:, 1 : 1 + rows.shape[-1]] = rows
+        for hammer, row in zip(self.hammers, full, strict=True):
+            initial_state(hammer, (float(row[1]), float(row[2])))
+            if rows.shape[-1] == 4:
+                check_branch(hammer, row[1:].tolist())
+        return full
+
+    def _checked_starts(self, begun: FloatArray) -> FloatArray:
+        starts = np.broadcast_to(begun, (self.size,))
+        wrong = ~(np.isfinite(starts) & (starts >= 0.0) & (starts < self.ends))
+        if wrong.any():
+            start, end = float(starts[wrong][0]), float(self.ends[wrong][0])
+            raise InputError(f"starts = {start!r} s, expected a number from 0 to before the end at {end!r} s")
+        return starts
+
+    @property
+    def groups(self) -> list[Group]:
+        """The members, sorted by the laws of their parts."""
+        if self._groups is None:
+            alike: dict[Hashable, list[int]] = {}
+            laws: dict[tuple[int, str], Laws] = {}
+            kinds: dict[bytes, LaneKinds | None] = {}
+            for i, (hammer, drive) in enumerate(zip(self.hammers, self.drives, strict=True)):
+                key = (id(hammer), drive.quantity)
+                if key not in laws:
+                    laws[key] = laws_of(hammer, drive)
+                kernel = laws[key], kernel_of(drive, kinds), bool(self.states[i, 3] >= 0.0)
+                alike.setdefault(kernel, []).append(i)
+            self._groups = [
+                Group(
+                    np.array(members),
+                    [self.hammers[i] for i in members],
+                    [self.drives[i] for i in members],
+                    self.states[members],
+                    self.ends[members],
+                    self.tolerance,
+                )
+                for members in alike.values()
+            ]
+        return self._groups
+
+    def motion(self, member: int) -> Motion:
+        """Return everything about one member.
+
+        Parameters
+        ----------
+        member : int
+            Its number.
+        """
+        from printhammer.run.simulate import simulate
+
+        if self.states[member, 3] >= 0.0:
+            raise InputError(f"member {member} starts on a branch inside the pack, which a motion cannot yet")
+        if self.states[member, 0] > 0.0:
+            raise InputError(f"member {member} starts later than at time 0, which a motion cannot yet")
+        x, v = self.states[member, 1:3]
+        return simulate(
+            self.hammers[member],
+            self.drives[member],
+            duration=float(self.ends[member]),
+            state=(float(x), float(v)),
+            tolerance=self.tolerance,
+        )
+
+    def run(
+        self,
+        *,
+        dots: bool = False,
+        strobes: Literal["firings"] | Sequence[npt.ArrayLike] | None = None,
+        times: npt.ArrayLike | None = None,
+        x: npt.NDArray[np.float32] | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        engine: Engine = "auto",
+    ) -> EnsembleResult:
+        """Integrate all members.
+
+        Parameters
+        ----------
+        dots : bool, optional
+            Keep what each firing did.
+        strobes : str or sequence of arrays, optional
+            Keep the state at every firing ("firings"), or at ascending times, s, one array for each member.
+        times : array, optional
+            Keep the displacement at these ascending times, s.
+        x : float32 array, shape (M, T), optional
+            Where to put it; by default a new array.
+        threads : int, optional
+            By default as many as there are cores.
+        progress : callable, optional
+            Called now and then with the number of members done and of all.
+        engine : str, optional
+            "plain": one member at a time; "lanes": side by side, see `printhammer.kernel.lanes`; "auto": in
+            lanes where the laws of the members allow it. Results of the two differ by what the tolerance
+            allows.
+
+        Returns
+        -------
+        EnsembleResult
+            With a status for each member; a run that could not go on is no exception.
+
+        Raises
+        ------
+        InputError
+            An argument is not what is described above.
+        """
+        if engine not in ENGINES:
+            raise InputError(f"engine = {engine!r}, expected one of {', '.join(ENGINES)}")
+        workers = thread_count(threads)
+        grid = np.zeros(0) if times is None else _ascending(times, "times")
+        if x is None:
+            x = np.empty((self.size, grid.size), np.float32)
+        elif x.shape != (self.size, grid.size) or x.dtype != np.float32 or not x.flags.c_contiguous:
+            raise InputError(
+                f"x: an array of shape {x.shape} and type {x.dtype}, expected {(self.size, grid.size)} and"
+                " float32, without gaps"
+            )
+        moments = self._moments(strobes)
+        jobs = [Job(group, bool(dots), moments, grid, x) for group in self.groups]
+        _integrate(jobs, engine, workers, progress)
+        for job in jobs:
+            job.finish(x)
+        return EnsembleResult(
+            status=self._gathered([job.status for job in jobs]),
+            reached=self._gathered([job.reached for job in jobs]),
+            steps=self._gathered([job.steps for job in jobs]),
+            dots=self._dot_table(jobs) if dots else None,
+            strobes=None if strobes is None else self._strobes(jobs, moments),
+            x=None if times is None else x,
+        )
+
+    def _gathered(self, parts: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        whole = np.empty(self.size, parts[0].dtype if parts else np.int64)
+        for group, part in zip(self.groups, parts, strict=True):
+            whole[group.members] = part
+        return whole
+
+    def _spread(self, jobs: Sequence[Job], which: str) -> FloatArray:
+        """Return ragged rows of the results as one array (members, rows, columns), filled up with NaN."""
+        tables = [getattr(job, which) for job in jobs]
+        starts = [getattr(job, f"{which}_starts") for job in jobs]
+        most = max((int(np.diff(start).max(initial=0)) for start in starts), default=0)
+        whole = np.full((self.size, most, tables[0].shape[1] if tables else MOST_COLUMNS), np.nan)
+        for group, table, start in zip(self.groups, tables, starts, strict=True):
+            counts = np.diff(start)
+            column = np.arange(len(table)) - np.repeat(start[:-1], counts)
+            whole[np.repeat(group.members, counts), column] = table
+        return whole
+
+    def _dot_table(self, jobs: Sequence[Job]) -> DotTable:
+        found = self._spread(jobs, "dots")
+        fired_at = np.full(found.shape[:2], np.nan)
+        for i, drive in enumerate(self.drives):
+            fired_at[i, : len(drive.times)] = drive.times
+        reached = self._gathered([job.reached for job in jobs])
+        fired = fired_at <= reached[:, np.newaxis]
+        contacts = np.nan_to_num(found[:, :, 0]).astype(np.int64)
+        return DotTable(
+            fired=fired,
+            fired_at=fired_at,
+            struck=contacts > 0,
+            flight_time=found[:, :, 1] - fired_at,
+            impact_speed=found[:, :, 2],
+            peak_force=found[:, :, 5],
+            indentation=found[:, :, 4],
+            contact_time=found[:, :, 3] - found[:, :, 1],
+            extra_contacts=np.maximum(contacts - 1, 0),
+        )
+
+    def _strobes(self, jobs: Sequence[Job], moments: Sequence[FloatArray]) -> Strobes:
+        found = self._spread(jobs, "strobes")
+        t = np.full(found.shape[:2], np.nan)
+        for i, moment in enumerate(moments):
+            t[i, : len(moment)] = moment
+        mode = found[:, :, 2]
+        return Strobes(
+            t=t,
+            x=found[:, :, 0],
+            v=found[:, :, 1],
+            branch=np.where(np.isnan(mode), -1, np.nan_to_num(mode)).astype(np.int64),
+            memory=found[:, :, 3],
+        )
+
+    def _moments(self, strobes: Literal["firings"] | Sequence[npt.ArrayLike] | None) -> list[FloatArray]:
+        if strobes is None:
+            return [np.zeros(0)] * self.size
+        if isinstance(strobes, str):
+            if strobes != "firings":
+                raise InputError(f'strobes = {strobes!r}, expected "firings" or an array for each member')
+            return [np.asarray(drive.times, dtype=np.float64) for drive in self.drives]
+        if not isinstance(strobes, Sequence | np.ndarray):
+            raise InputError(f'strobes = {strobes!r}, expected "firings" or an array for each member')
+        if len(strobes) != self.size:
+            raise InputError(f"strobes: {len(strobes)} arrays, expected {self.size}")
+        return [_ascending(moment, "strobes") for moment in strobes]
+
+
+def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Progress | None) -> None:
+    works, lengths = [], []
+    sizes = [len(job.group.members) for job in jobs]
+    for job, size in zip(jobs, sizes, strict=True):
+        in_lanes = engine != "plain" and job.group.fits_lanes()
+        if engine == "lanes" and not in_lanes:
+            raise InputError('engine = "lanes", expected "plain" or "auto": the parts do not allow lanes')
+        job.prepare(in_lanes)
+        if in_lanes:
+            works.append(job.lane_piece)
+            lengths.append(job.share_out(threads))
+        else:
+            works.append(job.piece)
+            lengths.append(max(1, size // (PIECES_A_THREAD * threads)))
+    in_threads(works, sizes, threads, progress, lengths)
+
+
+def _each(values: npt.ArrayLike, name: str) -> FloatArray:
+    found = _numbers(values, name)
+    if found.ndim > 1:
+        raise InputError(f"{name}: an array of shape {found.shape}, expected one number for each member")
+    return np.atleast_1d(found)
+
+
+def _numbers(values: npt.ArrayLike, name: str) -> FloatArray:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {values!r}, expected numbers") from None
+
+
+def _ascending(times: npt.ArrayLike, name: str) -> FloatArray:
+    found = _numbers(times, name).reshape(-1)
+    if not np.isfinite(found).all() or (np.diff(found) < 0.0).any() or (found < 0.0).any():
+        raise InputError(f"{name}: expected ascending numbers, not negative")
+    return found

@@ -1,0 +1,330 @@
+"""Members of an ensemble whose parts have the same laws, as the arrays of the kernel, and their results."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.kernel import carry, lane_layout
+from printhammer.kernel.layout import END, MAGNET, PLACES
+from printhammer.run.problem import MAX_STEPS, Problem, scales_of
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable, Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.kernel.specialise import Kernel
+    from printhammer.support.arrays import FloatArray
+
+_NODES: Final = 2048
+_CONTACTS: Final = 256
+MOST_COLUMNS: Final = 6
+_DOT_WIDTH: Final = 6
+_STROBE_WIDTH: Final = 4
+_PIECE: Final = 4 * lane_layout.LANES
+"""Members in one piece of work for lanes."""
+_CUBIC, _EXPONENTIAL, _SINE = 0.0, 1.0, 2.0
+
+
+def starts_of(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.int64]:
+    """Return where each of some arrays begins when they are put one after the other, and the end of all."""
+    return np.concatenate([[0], np.cumsum([len(array) for array in arrays])]).astype(np.int64)
+
+
+LaneKinds = tuple[int, bool, bool]
+"""Number of rates of exponentials in the waveforms of a drive, whether there is a cubic piece, a sine."""
+
+
+def kernel_of(drive: Drive, known: dict[bytes, LaneKinds | None]) -> Hashable:
+    """Return what of a drive decides on the kernel: the overlap rule, and the kinds of its pieces."""
+    _times, _begins, pieces, replace, _force = drive.kernel_arrays()
+    form = pieces.tobytes()
+    if form not in known:
+        known[form] = closed_form(pieces)[1]
+    return bool(replace), known[form]
+
+
+class Group:
+    """Members with the same laws, overlap rule and kinds of pieces in their waveforms, started alike.
+
+    All this is decided for each member, so that one kernel serves it in whatever company.
+
+    Parameters
+    ----------
+    members : int array
+        Their numbers in the ensemble.
+    hammers, drives : sequence
+        One for each of them.
+    states : array, shape (n, 5)
+        Time, displacement, velocity, mode, memory at the start.
+    ends : array, shape (n,)
+        Ends of the runs, s.
+    tolerance : float
+        Error allowed in one step.
+    """
+
+    def __init__(
+        self,
+        members: npt.NDArray[np.int64],
+        hammers: Sequence[Hammer],
+        drives: Sequence[Drive],
+        states: FloatArray,
+        ends: FloatArray,
+        tolerance: float,
+    ) -> None:
+        self.members = members
+        self.states = states
+        self.ends = ends
+        rows: dict[tuple[Any, ...], int] = {}
+        waves: dict[bytes, int] = {}
+        peaks: dict[bytes, float] = {}
+        problems: list[Problem] = []
+        tables: list[FloatArray] = []
+        self.hammer_of = np.zeros(len(members), np.int64)
+        self.waveform_of = np.zeros(len(members), np.int64)
+        forms_of: dict[int, tuple[int, float]] = {}
+        typical: dict[tuple[Any, ...], float] = {}
+        for i, (hammer, drive) in enumerate(zip(hammers, drives, strict=True)):
+            if id(drive) not in forms_of:
+                pieces = np.asarray(drive.kernel_arrays()[2], dtype=np.float64)
+                form = pieces.tobytes()
+                if form not in waves:
+                    waves[form] = len(tables)
+                    tables.append(pieces)
+                if drive.bounded:
+                    forms_of[id(drive)] = waves[form], drive.largest_pulse
+                else:
+                    if form not in peaks:
+                        peaks[form] = drive.largest_pulse
+                    forms_of[id(drive)] = waves[form], peaks[form]
+            self.waveform_of[i], peak = forms_of[id(drive)]
+            x, v = float(states[i, 1]), float(states[i, 2])
+            key: tuple[Any, ...] = (id(hammer), peak, drive.quantity)
+            if key not in typical:
+                free = hammer.position is None or hammer.front is None
+                typical[key] = math.nan if free else scales_of(hammer, drive, (x, 0.0))[1]
+            # Only what is faster than the typical speed has scales of its own.
+            key = (
+                (*key, x, v, drive.period) if math.isnan(typical[key]) else (*key, max(abs(v), typical[key]))
+            )
+            if key not in rows:
+                rows[key] = len(problems)
+                problems.append(Problem(hammer, drive, (x, v), 0.0, tolerance))
+            self.hammer_of[i] = rows[key]
+        firings = [np.asarray(drive.times, dtype=np.float64) for drive in drives]
+        begins = [np.asarray(drive.kernel_arrays()[1], dtype=np.int64) for drive in drives]
+        self.replace = bool(drives[0].kernel_arrays()[3])
+        self.kernel: Kernel = problems[0].kernel
+        self.laws = problems[0].laws
+        width = max(problem.constants.size for problem in problems)
+        self.hammers = np.zeros((len(problems), width))
+        for row, problem in enumerate(problems):
+            self.hammers[row, : problem.constants.size] = problem.constants
+        self.controls = np.array([problem.control for problem in problems])
+        self.bounds = np.array([problem.bounds for problem in problems])
+        self.piece_starts = starts_of(tables)
+        self.pieces = np.concatenate(tables)
+        self.firing_starts = starts_of(firings)
+        self.firings = np.concatenate(firings)
+        self.begins = np.concatenate(begins)
+        self.most_firings = max(len(times) for times in firings)
+        self.uniform = len(problems) == 1 and len(tables) == 1
+        forms = [closed_form(table) for table in tables]
+        self.rates = np.array([rates for rates, _kinds in forms])
+        self.lane_kinds = forms[0][1]
+
+    def fits_lanes(self) -> bool:
+        """Tell whether there is a kernel for lanes for these members."""
+        from printhammer.kernel.specialise_lanes import suits
+
+        if self.lane_kinds is None or not suits(self.laws):
+            return False
+        used = {role: self.hammers[:, place : place + 16] for role, place in PLACES.items()}
+        used["magnet"] = self.hammers[:, MAGNET:]
+        return all(
+            not used[role][:, count:].any() for role, (_place, count) in lane_layout.PLACES.items()
+        ) and bool((self.states[:, 3] < 0.0).all())
+
+    @property
+    def lane_kernel(self) -> Kernel:
+        """The compiled kernel for lanes."""
+        from printhammer.kernel.specialise_lanes import specialise_lanes
+
+        if self.lane_kinds is None:
+            raise ValueError("no closed form of the drive")
+        return specialise_lanes(self.laws, self.lane_kinds)
+
+
+def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
+    """Return the rates of the pieces of a set of waveforms, and what kinds of pieces there are, for lanes.
+
+    None instead of the kinds where the waveforms have more rates than lanes provide for.
+    """
+    pieces = table[table[:, 1] != END]
+    kind = pieces[:, 1]
+    decays = np.unique(pieces[kind == _EXPONENTIAL, 4])
+    frequencies = np.unique(pieces[kind == _SINE, 4])
+    rates = [0.0] * lane_layout.RATES_WIDTH
+    if len(decays) > 2 or len(frequencies) > 1:
+        return rates, None
+    rates[: len(decays)] = decays
+    rates[2 : 2 + len(frequencies)] = frequencies
+    return rates, (len(decays), bool(pieces[kind == _CUBIC, 3:].any()), len(frequencies) > 0)
+
+
+class Job:
+    """One integration of a group: what to keep, and the arrays that it goes to.
+
+    Parameters
+    ----------
+    group : Group
+        The members.
+    want_dots : bool
+        Whether to keep what each firing did.
+    moments : sequence of arrays
+        Times of the strobes, s, for each member of the ensemble.
+    grid : array
+        Common times of the displacements, s.
+    x : float32 array
+        Displacements of the whole ensemble; used as it is where the group is the whole.
+    """
+
+    def __init__(
+        self,
+        group: Group,
+        want_dots: bool,
+        moments: Sequence[FloatArray],
+        grid: FloatArray,
+        x: npt.NDArray[np.float32],
+    ) -> None:
+        self.group = group
+        self.order = np.arange(len(group.members))
+        self.want_dots = want_dots
+        self.grid = grid
+        count = len(group.members)
+        own = [moments[member] for member in group.members]
+        self.strobes_starts = starts_of(own)
+        self.strobe_times = np.concatenate(own)
+        self.strobes = np.empty((self.strobe_times.size, _STROBE_WIDTH))
+        self.dots_starts = group.firing_starts
+        self.dots = np.empty((group.firings.size if want_dots else 0, _DOT_WIDTH))
+        self.status = np.zeros(count, np.int64)
+        self.steps = np.zeros(count, np.int64)
+        self.reached = np.zeros(count)
+        self.x = x if count == len(x) else np.empty((count, grid.size), np.float32)
+
+    def finish(self, x: npt.NDArray[np.float32]) -> None:
+        """Put the displacements of a group that is not the whole where they belong."""
+        if self.x is not x:
+            x[self.group.members] = self.x
+
+    def share_out(self, threads: int) -> int:
+        """Spread the members over pieces so that neighbours do not come together; return their length.
+
+        Neighbours take about the same time, and a piece is done when its longest member is.
+        """
+        count = self.order.size
+        pieces = threads * max(1, round(count / (_PIECE * threads)))
+        self.order = np.concatenate([np.arange(piece, count, pieces) for piece in range(pieces)])
+        return -(-count // pieces)
+
+    def prepare(self, lanes: bool) -> None:
+        """Have the machine code ready, in this thread, before others need it."""
+        if lanes:
+            self.lane_piece(0, 0)
+        else:
+            self._one_by_one(self.order[:0], prepare=True)
+
+    def piece(self, first: int, last: int) -> None:
+        """Integrate some members of the group one by one, in this thread."""
+        self._one_by_one(self.order[first:last])
+
+    def lane_piece(self, first: int, last: int) -> None:
+        """Integrate some members of the group side by side, in this thread."""
+        group = self.group
+        which = self.order[first:last]
+        left_over = np.empty(which.size, np.int64)
+        left = group.lane_kernel.lanes(
+            which,
+            group.hammer_of,
+            group.hammers,
+            group.controls,
+            group.bounds,
+            group.waveform_of,
+            group.piece_starts,
+            group.pieces,
+            group.rates,
+            group.firing_starts,
+            group.firings,
+            group.begins,
+            group.replace,
+            group.states,
+            group.ends,
+            self.strobes_starts,
+            self.strobe_times,
+            self.grid,
+            self.want_dots,
+            np.zeros(group.most_firings, np.int64),
+            np.zeros(1 + 7 * group.most_firings),
+            group.uniform,
+            np.zeros((lane_layout.POOLS + 1, lane_layout.POOL_SIZE)),
+            np.zeros(lane_layout.POOLS, np.int64),
+            np.zeros((lane_layout.POOLS, lane_layout.LANES), np.int64),
+            np.zeros((lane_layout.LANES, lane_layout.SLOT_WIDTH)),
+            np.zeros(lane_layout.LANES, np.int64),
+            left_over,
+            self.status,
+            self.reached,
+            self.steps,
+            self.dots,
+            self.strobes,
+            self.x,
+        )
+        self._one_by_one(left_over[:left])
+
+    def _one_by_one(self, which: npt.NDArray[np.int64], prepare: bool = False) -> None:
+        group = self.group
+        nodes, contacts = _NODES, _CONTACTS
+        under_way = np.zeros((2, group.most_firings), np.int64)
+        live = np.zeros((2, 1 + 7 * group.most_firings))
+        while which.size or prepare:
+            prepare = False
+            done = group.kernel.members(
+                which,
+                group.hammer_of,
+                group.hammers,
+                group.controls,
+                group.bounds,
+                group.waveform_of,
+                group.piece_starts,
+                group.pieces,
+                group.firing_starts,
+                group.firings,
+                group.begins,
+                group.replace,
+                group.states,
+                group.ends,
+                MAX_STEPS,
+                self.strobes_starts,
+                self.strobe_times,
+                self.grid,
+                self.want_dots,
+                under_way,
+                live,
+                np.empty((nodes, 5)),
+                np.empty((contacts, 7)),
+                np.zeros(carry.SIZE),
+                self.status,
+                self.reached,
+                self.steps,
+                self.dots,
+                self.strobes,
+                self.x,
+            )
+            which = which[done:]
+            nodes, contacts = 4 * nodes, 4 * contacts

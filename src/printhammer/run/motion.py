@@ -1,0 +1,306 @@
+"""Motion: the result of one run, and what an engineer asks of it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from importlib import import_module
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.run.coil_work import coil_work_of
+from printhammer.run.contacts import contacts_of, dots_of, loading_works
+from printhammer.run.ledger import increments_of, ledger_of
+from printhammer.run.problem import message_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    import numpy.typing as npt
+    import pandas as pd
+    import xarray as xr
+
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.coil_work import CoilWork
+    from printhammer.run.contacts import Contact, Dot
+    from printhammer.run.ledger import Ledger
+    from printhammer.run.problem import Problem, Record
+    from printhammer.support.arrays import FloatArray
+
+FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drive", "total")
+"""Names of the forces: equations (3), (4), (5), (6), (7), a drive that is a force, and their sum."""
+
+_BISECTIONS: Final = 52
+
+
+class Motion:
+    """The motion of one hammer under one drive, from `printhammer.simulate`.
+
+    Everything is computed from the recorded steps when it is first asked for, with the integrator itself,
+    never by interpolation; nothing depends on the output grid.
+    """
+
+    def __init__(self, problem: Problem, record: Record, end: float, times: FloatArray, scheme: str) -> None:
+        self._problem = problem
+        self._record = record
+        self._end = end
+        self._times = times
+        self._scheme = scheme
+
+    @property
+    def hammer(self) -> Hammer:
+        """The hammer."""
+        return self._problem.hammer
+
+    @property
+    def drive(self) -> Drive:
+        """The drive."""
+        return self._problem.drive
+
+    @property
+    def status(self) -> str:
+        """How the run ended: "ok", "range left", "runaway", "step limit" or "step underflow"."""
+        return self._record.status_name
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached its end."""
+        return self._record.status == 0
+
+    @property
+    def message(self) -> str:
+        """One sentence on how the run ended; empty if it went as asked."""
+        return message_of(self._record, self.hammer)
+
+    @property
+    def start(self) -> float:
+        """Time of the initial state, s."""
+        return float(self._record.nodes[0, 0])
+
+    @property
+    def end(self) -> float:
+        """Time of the last state, s: the end asked for, or where the run stopped."""
+        return float(self._record.nodes[-1, 0])
+
+    @property
+    def steps(self) -> int:
+        """Number of steps of the integrator."""
+        return self._record.steps
+
+    @property
+    def step_times(self) -> FloatArray:
+        """Times of the ends of all steps, s, shape (n,); every switch of the force law is among them."""
+        return self._record.nodes[:, 0].copy()
+
+    @property
+    def t(self) -> FloatArray:
+        """Times of the output grid, s, shape (n,)."""
+        return self._times
+
+    @cached_property
+    def _grid(self) -> FloatArray:
+        return self._problem.resample(self._record, self._times)
+
+    @property
+    def x(self) -> FloatArray:
+        """Displacement on the output grid, m, shape (n,)."""
+        return self._grid[:, 0]
+
+    @property
+    def v(self) -> FloatArray:
+        """Velocity on the output grid, m/s, shape (n,)."""
+        return self._grid[:, 1]
+
+    @property
+    def current(self) -> FloatArray:
+        """Coil current on the output grid, A, shape (n,); zero under a drive that is a force."""
+        return self._grid[:, 2] if self.drive.quantity == "current" else np.zeros(len(self._times))
+
+    @property
+    def force(self) -> Mapping[str, FloatArray]:
+        """Forces on the output grid by name (see `FORCES`), N, each of shape (n,)."""
+        return self._forces(self._grid)
+
+    def _forces(self, table: FloatArray) -> Mapping[str, FloatArray]:
+        drive = table[:, 2] if self.drive.quantity == "force" else np.zeros(len(table))
+        columns = [table[:, 3], table[:, 4], table[:, 5], table[:, 6], table[:, 7], drive]
+        return MappingProxyType(dict(zip(FORCES, [*columns, np.sum(columns, axis=0)], strict=True)))
+
+    def _resampled(self, t: npt.ArrayLike) -> FloatArray:
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        inside = (times >= self.start) & (times <= self.end)
+        if not inside.all():
+            raise InputError(
+                f"t = {times[~inside][0]:.9g} s lies outside the motion, expected a time from"
+                f" {self.start:.9g} s to {self.end:.9g} s"
+            )
+        order = np.argsort(times, kind="stable")
+        table = np.empty((times.size, 9))
+        table[order] = self._problem.resample(self._record, np.ascontiguousarray(times[order]))
+        return table
+
+    def at(self, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return displacement, m, and velocity, m/s, at any times of the run, s; after jumps.
+
+        Raises
+        ------
+        InputError
+            A time is outside the run.
+        """
+        table = self._resampled(t)
+        return table[:, 0], table[:, 1]
+
+    def forces_at(self, t: npt.ArrayLike) -> Mapping[str, FloatArray]:
+        """Return the forces by name, N, at any times of the run, s.
+
+        Raises
+        ------
+        InputError
+            A time is outside the run.
+        """
+        return self._forces(self._resampled(t))
+
+    @cached_property
+    def _increments(self) -> FloatArray:
+        return increments_of(self._problem, self._record)
+
+    @cached_property
+    def contacts(self) -> tuple[Contact, ...]:
+        """All contacts in order of touch, one open at the start among them."""
+        rigid = self.hammer.backstop is not None and bool(
+            getattr(import_module(self.hammer.backstop.module), "RIGID", False)
+        )
+        return tuple(contacts_of(self._problem, self._record, self._increments, rigid))
+
+    @cached_property
+    def dots(self) -> tuple[Dot, ...]:
+        """What each firing up to the end of the run did, in order."""
+        works = loading_works(self._problem, self._record, self.contacts, self._increments)
+        return tuple(dots_of(self.drive.times, self.contacts, works, self.end))
+
+    @cached_property
+    def energy(self) -> Ledger:
+        """The energy ledger of the whole run."""
+        return ledger_of(self._problem, self._record, self._increments)
+
+    @cached_property
+    def coil_work(self) -> CoilWork:
+        """The work of the coil over the whole run: net, positive, given back, and its heat."""
+        return coil_work_of(self._problem, self._record)
+
+    @cached_property
+    def strobe(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Times of the firings inside the run, s, and displacement, m, and velocity, m/s, at each."""
+        times = self.drive.times
+        times = np.array(times[(times >= self.start) & (times <= self.end)])
+        return times, *self.at(times)
+
+    @cached_property
+    def maxima(self) -> tuple[FloatArray, FloatArray]:
+        """Times, s, and displacements, m, of all local maxima of the displacement."""
+        nodes = self._record.nodes
+        before, after = nodes[:-1, 2], nodes[1:, 2]
+        rows = np.flatnonzero((before > 0.0) & (after <= 0.0) & (nodes[1:, 0] > nodes[:-1, 0]))
+        low, high = nodes[rows, 0].copy(), nodes[rows + 1, 0].copy()
+        for _ in range(_BISECTIONS if len(rows) else 0):
+            middle = 0.5 * (low + high)
+            rising = self._problem.resample(self._record, middle)[:, 1] > 0.0
+            low = np.where(rising, middle, low)
+            high = np.where(rising, high, middle)
+        times = np.where(after[rows] == 0.0, nodes[rows + 1, 0], high)
+        return times, self._problem.resample(self._record, times)[:, 0] if len(rows) else times
+
+    def peak_after(self, firing: int) -> tuple[float, float] | None:
+        """Return time, s, and displacement, m, of the largest local maximum from a firing to the next.
+
+        None if there is none; the position at the firing never counts.
+
+        Raises
+        ------
+        InputError
+            There is no firing of that number.
+        """
+        fired = self.drive.times
+        if not 0 <= firing < len(fired):
+            raise InputError(f"firing = {firing}: the drive has firings 0 to {len(fired) - 1}")
+        until = fired[firing + 1] if firing + 1 < len(fired) else np.inf
+        times, x = self.maxima
+        inside = (times > fired[firing]) & (times <= until)
+        if not inside.any():
+            return None
+        best = int(np.argmax(np.where(inside, x, -np.inf)))
+        return float(times[best]), float(x[best])
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """Where the motion comes from: fingerprints, versions, tolerance."""
+        import numba
+        import scipy
+
+        from printhammer import __version__
+
+        return {
+            "hammer": self.hammer.name,
+            "hammer_fingerprint": self.hammer.fingerprint,
+            "drive_fingerprint": self.drive.fingerprint,
+            "drive": repr(self.drive),
+            "scheme": self._scheme,
+            "tolerance": repr(self._problem.tolerance),
+            "status": self.status,
+            "printhammer": __version__,
+            "numpy": np.__version__,
+            "numba": numba.__version__,
+            "scipy": scipy.__version__,
+        }
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the output grid as a Dataset over time, with units and provenance in the attributes."""
+        from printhammer.results.export import motion_dataset
+
+        return motion_dataset(self)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the output grid as a table, units in the column names."""
+        from printhammer.results.export import motion_table
+
+        return motion_table(self)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the output grid as CSV, units in the header.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        from printhammer.results.export import write_csv
+
+        write_csv(self.to_pandas(), path)
+
+    def to_parquet(self, path: str | Path) -> None:
+        """Write the output grid as Parquet with provenance; needs the extra `tables`.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written, or pyarrow is not installed.
+        """
+        from printhammer.results.export import write_parquet
+
+        write_parquet(self.to_pandas(), path)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw displacement and current against time; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.motion").plot(self, **options)
+
+    def __repr__(self) -> str:
+        struck = sum(dot.struck for dot in self.dots)
+        return (
+            f"<Motion of {self.hammer.name}: {self.start:.6g} s to {self.end:.6g} s, {self.status},"
+            f" {struck} of {len(self.dots)} dots struck>"
+        )

@@ -1,0 +1,287 @@
+"""A hammer and a drive made ready for the kernel: laws bound, constants in one array, scales chosen.
+
+The only place that turns the objects of the public face into what the kernel works with.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.kernel import carry, layout
+from printhammer.kernel.laws import Laws
+from printhammer.kernel.modes import OK, STATUS_NAMES, STEP_LIMIT
+
+if TYPE_CHECKING:
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.kernel.specialise import Kernel
+    from printhammer.support.arrays import FloatArray
+
+TOLERANCE: Final = 2e-11
+"""Default tolerance: error allowed in one step, in units of the stroke and of a typical speed."""
+
+LEAST_TOLERANCE: Final = 1e-15
+LARGEST_TOLERANCE: Final = 1e-5
+"""With larger ones steps would be so long that the curves between their ends say little about the motion."""
+
+MAX_STEPS: Final = 50_000_000
+FAR: Final = 1e4
+"""Distance from the origin, in strokes, beyond which the armature counts as run away."""
+
+_NODES: Final = 2048
+_CONTACTS: Final = 256
+_NODES_A_FLIGHT: Final = 40
+_MOST_FLIGHTS: Final = 1e6
+
+
+@dataclass(frozen=True)
+class Record:
+    """What the kernel recorded of one run; see `printhammer.kernel.record`.
+
+    Attributes
+    ----------
+    status : int
+        Code of the status.
+    nodes : array, shape (n, 5)
+        Time, displacement, velocity, mode and memory at the ends of all steps.
+    contacts : array, shape (m, 7)
+        Surface, time and velocity in and out, first node, whether open at the start.
+    steps : int
+        Number of steps.
+    """
+
+    status: int
+    nodes: FloatArray
+    contacts: FloatArray
+    steps: int
+
+    @property
+    def status_name(self) -> str:
+        """Name of the status."""
+        return STATUS_NAMES[self.status]
+
+
+def fresh_carry(pause_after: float = math.inf) -> FloatArray:
+    """Return what the kernel's `run` needs to begin, and to pause after so many nodes."""
+    array = np.zeros(carry.SIZE)
+    array[carry.PAUSE_AFTER] = pause_after
+    return array
+
+
+def check_tolerance(tolerance: object) -> None:
+    """Refuse a tolerance with which the integrator does not work.
+
+    Raises
+    ------
+    InputError
+        Not a number between the least and the largest.
+    """
+    if not (isinstance(tolerance, float | int) and LEAST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE):
+        raise InputError(
+            f"tolerance = {tolerance!r}, expected a number from {LEAST_TOLERANCE:g} to {LARGEST_TOLERANCE:g}"
+        )
+
+
+def laws_of(hammer: Hammer, drive: Drive) -> Laws:
+    """Return the laws of the parts of a hammer under a drive, for the kernel."""
+    return Laws(
+        magnet=_module(hammer.magnet),
+        spring=_module(hammer.spring),
+        pack=_module(hammer.pack),
+        backstop=_module(hammer.backstop),
+        absent="printhammer.parts.absent",
+        force_drive=drive.quantity == "force",
+        pack_pulls=bool(getattr(hammer.pack, "pull", True)),
+        backstop_pulls=bool(getattr(hammer.backstop, "pull", True)),
+        reload_along_unloading=getattr(hammer.pack, "reloading", "") == "unloading-curve",
+    )
+
+
+def _module(part: Any) -> str:
+    return "" if part is None else str(part.module)
+
+
+def constants_of(hammer: Hammer) -> FloatArray:
+    """Return the constants of a hammer in the order of `printhammer.kernel.layout`."""
+    packed = {role: part.packed(hammer.origin) for role, part in hammer.parts.items()}
+    array = np.zeros(layout.MAGNET + max(len(packed.get("magnet", ())), 1))
+    array[layout.INVERSE_MASS] = 1.0 / hammer.mass
+    array[layout.POSITION] = hammer.origin
+    array[layout.FRONT] = hammer.front if hammer.front is not None else math.inf
+    for role, constants in packed.items():
+        if role != "magnet" and len(constants) > layout.SLOT:
+            raise InputError(
+                f"{hammer.path}: {role} has {len(constants)} packed constants, expected at most {layout.SLOT}"
+            )
+        array[layout.PLACES[role] : layout.PLACES[role] + len(constants)] = constants
+    return array
+
+
+def scales_of(hammer: Hammer, drive: Drive, state: tuple[float, float]) -> tuple[float, float]:
+    """Return a typical displacement [m] and speed [m/s] of a hammer, by which tolerances are measured.
+
+    The displacement is the way from the backstop to the pack. Without one of them it is how far the forces
+    would bring the mass in one period of the drive or of its own, or the distance of the initial state. The
+    speed is what the largest force gives the mass over that way.
+    """
+    from printhammer.hammer.static_force import StaticForce
+
+    static = StaticForce(hammer)
+    origin = hammer.origin
+    largest_value = drive.largest_pulse
+    current, push = (0.0, largest_value) if drive.quantity == "force" else (largest_value, 0.0)
+
+    def force(x: float) -> float:
+        found = [abs(static.free(x, i)) for i in (0.0, current)]
+        return push + max((f for f in found if math.isfinite(f)), default=0.0)
+
+    if hammer.position is not None and hammer.front is not None:
+        way = hammer.front - hammer.position
+    else:
+        near = force(origin)
+        step = 1e-6 * max(abs(origin), abs(state[0]), 1e-3)
+        stiffness = abs(static.free(origin + step, 0.0) - static.free(origin, 0.0)) / step
+        own = math.sqrt(hammer.mass / stiffness) if stiffness > 0.0 else 0.0
+        forced = drive.period / (2.0 * math.pi) if drive.period else 0.0
+        time = min((t for t in (own, forced) if t > 0.0), default=1e-3)
+        way = max(near * time * time / hammer.mass, abs(state[0] - origin), abs(state[1]) * time)
+        way = way or 1e-4
+    largest = max(force(origin), force(origin + way))
+    speed = max(math.sqrt(largest * way / hammer.mass), abs(state[1]))
+    return way, speed or way
+
+
+class Problem:
+    """One hammer under one drive, ready to be integrated.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    drive : Drive
+        The drive.
+    state : tuple of float
+        Displacement, m, and velocity, m/s, at the start.
+    start : float
+        Time of the initial state, s.
+    tolerance : float
+        Error allowed in one step, in units of the stroke and of a typical speed.
+    """
+
+    max_steps: int | None = None
+    """Number of steps after which a run is given up; None: `MAX_STEPS`."""
+
+    def __init__(
+        self, hammer: Hammer, drive: Drive, state: tuple[float, float], start: float, tolerance: float
+    ) -> None:
+        self.hammer = hammer
+        self.drive = drive
+        self.state = state
+        self.start = start
+        self.tolerance = tolerance
+        self.laws = laws_of(hammer, drive)
+        self.constants = constants_of(hammer)
+        firings, begins, pieces, self.replace, _force = drive.kernel_arrays()
+        # The kernel is compiled for arrays that may be written to.
+        self.firings = np.array(firings, dtype=np.float64)
+        self.begins = np.array(begins, dtype=np.int64)
+        self.pieces = np.array(pieces, dtype=np.float64)
+        self.scales = scales_of(hammer, drive, state)
+        # The eighth order is controlled through the estimates of the sixth and the seventh.
+        self.control = (*self.scales, (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance)
+        low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
+        self.bounds = (low, high, hammer.origin, FAR * self.scales[0])
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """The compiled kernel for the laws of this hammer."""
+        from printhammer.kernel.specialise import specialise
+
+        return specialise(self.laws)
+
+    def drive_arrays(self) -> tuple[Any, ...]:
+        """Return what the kernel needs of the drive, with working space of its own."""
+        count = self.firings.size
+        under_way, live = np.zeros(count, np.int64), np.zeros(1 + 7 * count)
+        return (self.firings, self.begins, self.pieces, self.replace, under_way, live)
+
+    def run(self, end: float) -> Record:
+        """Integrate to time `end`, s."""
+        # A generous guess; memory that is not written to costs nothing, a repeated run does.
+        flights = min(max(end - self.start, 0.0) * self.scales[1] / self.scales[0], _MOST_FLIGHTS)
+        capacity = _NODES + int(_NODES_A_FLIGHT * flights)
+        contact_capacity = _CONTACTS + int(flights)
+        while True:
+            firings, begins, pieces, replace, under_way, live = self.drive_arrays()
+            nodes = np.empty((capacity, 5))
+            contacts = np.empty((contact_capacity, 7))
+            status, used, touched, steps = self.kernel.run(
+                firings,
+                begins,
+                pieces,
+                replace,
+                self.constants,
+                self.start,
+                float(self.state[0]),
+                float(self.state[1]),
+                float(end),
+                self.control,
+                self.bounds,
+                self.max_steps or MAX_STEPS,
+                under_way,
+                live,
+                nodes,
+                contacts,
+                fresh_carry(),
+            )
+            if used <= capacity and touched <= contact_capacity:
+                return Record(status, nodes[:used].copy(), contacts[:touched].copy(), steps)
+            capacity = max(capacity, used)
+            contact_capacity = max(contact_capacity, touched)
+
+    def resample(self, record: Record, times: FloatArray) -> FloatArray:
+        """Return states and forces, shape (n, 9), at ascending times, s; see the kernel's `resample`."""
+        out = np.empty((times.size, 9))
+        self.kernel.resample(times, record.nodes, *self.drive_arrays(), self.constants, out)
+        return out
+
+    def peaks(self, record: Record) -> FloatArray:
+        """Return time, depth and force, shape (m, 3), at the peaks of all contacts."""
+        out = np.empty((len(record.contacts), 3))
+        self.kernel.peaks(record.contacts, record.nodes, *self.drive_arrays(), self.constants, out)
+        return out
+
+    def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
+        """Return work of coil and drive force, pack and backstop loss [J], shape (n, 4), inside steps."""
+        out = np.empty((len(steps), 4))
+        self.kernel.quadratures(
+            np.ascontiguousarray(steps, np.int64),
+            np.ascontiguousarray(starts, np.float64),
+            np.ascontiguousarray(ends, np.float64),
+            record.nodes,
+            *self.drive_arrays(),
+            self.constants,
+            out,
+        )
+        return out
+
+
+def message_of(record: Record, hammer: Hammer) -> str:
+    """Return one sentence on how a run ended; empty if it went as asked."""
+    if record.status == OK:
+        return ""
+    time, x = record.nodes[-1, 0], record.nodes[-1, 1]
+    what = {
+        "range left": "left the range in which its force law holds",
+        "runaway": "ran away",
+        "step limit": f"needed more than {record.steps - 1} steps",
+        "step underflow": "needed steps shorter than the arithmetic resolves",
+    }[STATUS_NAMES[record.status]]
+    advice = "; a longer run can be split" if record.status == STEP_LIMIT else ""
+    return f"{hammer.name} {what} at t = {time:.9g} s, x = {x:.9g} m{advice}"

@@ -1,0 +1,215 @@
+"""Runs of the paper's two integrators, recorded like those of the default one.
+
+Between the ends of its fixed steps such a run has no motion of its own: the cubic through position and
+velocity at both ends stands in for it. Touches lie at the first step end in a contact, since the schemes
+locate nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.kernel import schemes_1983
+from printhammer.kernel.modes import (
+    BACKSTOP,
+    BACKSTOP_SURFACE,
+    FREE,
+    LOADING,
+    OK,
+    PACK_SURFACE,
+    STEP_UNDERFLOW,
+    UNLOADING,
+)
+from printhammer.parts import absent
+from printhammer.run.problem import Problem, Record
+
+if TYPE_CHECKING:
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+_GAUSS = np.polynomial.legendre.leggauss(4)
+
+
+class SchemeProblem(Problem):
+    """One hammer under one drive, to be integrated with a scheme of 1983.
+
+    Parameters
+    ----------
+    hammer, drive, state, tolerance
+        As for `Problem`; the tolerance is not used.
+    scheme : str
+        "trapezoid" or "runge-kutta-4".
+    scale : float
+        Factor on all steps of the paper's schedule.
+
+    Raises
+    ------
+    InputError
+        The factor is not positive.
+    """
+
+    def __init__(
+        self,
+        hammer: Hammer,
+        drive: Drive,
+        state: tuple[float, float],
+        tolerance: float,
+        scheme: schemes_1983.Scheme,
+        scale: float,
+    ) -> None:
+        if not (math.isfinite(scale) and scale > 0.0):
+            raise InputError(f"step_scale = {scale!r}, expected a positive number")
+        super().__init__(hammer, drive, state, 0.0, tolerance)
+        self._scheme: schemes_1983.Scheme = scheme
+        self._scale = scale
+        self._modules = {role: import_module(part.module) for role, part in hammer.parts.items()}
+        self._packed = {
+            role: np.array(hammer.parts[role].packed(hammer.origin) if role in hammer.parts else ())
+            for role in ("magnet", "spring", "pack", "backstop")
+        }
+
+    def _law(self, name: str) -> Any:
+        module = self._modules.get(name.partition("_")[0], absent)
+        return getattr(module, name, None) or getattr(absent, name)
+
+    def integrate(self, end: float) -> schemes_1983.SchemeRun:
+        """Integrate to time `end`, s, and return the ends of the steps as the scheme leaves them."""
+        hammer = self.hammer
+        return schemes_1983.integrate(
+            {name: self._law(name) for name in schemes_1983.LAW_NAMES},
+            self._packed,
+            self.drive.kernel_arrays(),
+            mass=hammer.mass,
+            front=hammer.front if hammer.front is not None else math.inf,
+            position=hammer.position if hammer.position is not None else -math.inf,
+            state=self.state,
+            t_end=end,
+            scheme=self._scheme,
+            scale=self._scale,
+            rigid=self._rigid,
+            reload_along_unloading=self.laws.reload_along_unloading,
+        )
+
+    def run(self, end: float) -> Record:
+        """Integrate to time `end`, s; a run that diverged has the status of a step that cannot be taken."""
+        run = self.integrate(end)
+        nodes = self._nodes(run.t, run.x, run.v)
+        return Record(OK if run.status == "ok" else STEP_UNDERFLOW, nodes, _contacts(nodes), len(nodes) - 1)
+
+    @property
+    def _rigid(self) -> bool:
+        return bool(getattr(self._modules.get("backstop"), "RIGID", False))
+
+    def _nodes(self, t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
+        """Return step ends as nodes, each with the mode that its state is in, as the schemes see it."""
+        position, front = self.hammer.position, self.hammer.front
+        keep = np.isfinite(x) & np.isfinite(v)
+        nodes = np.zeros((int(keep.sum()), 5))
+        nodes[:, 0], nodes[:, 1], nodes[:, 2] = t[keep], x[keep], v[keep]
+        nodes[:, 3] = FREE
+        peak = 0.0
+        for node in nodes:
+            if position is not None and node[1] < position and not self._rigid:
+                node[3], node[4] = BACKSTOP, math.sqrt(position - node[1])
+            elif front is not None and node[1] > front:
+                peak = node[1] if node[2] >= 0.0 else max(peak, node[1])
+                node[3], node[4] = (LOADING, 0.0) if node[2] >= 0.0 else (UNLOADING, peak)
+            else:
+                peak = 0.0
+        return nodes
+
+    def resample(self, record: Record, times: FloatArray) -> FloatArray:
+        """Return states and forces, shape (n, 9), at ascending times, s."""
+        nodes = record.nodes
+        step = np.clip(np.searchsorted(nodes[:, 0], times, side="right") - 1, 0, max(len(nodes) - 2, 0))
+        end = np.minimum(step + 1, len(nodes) - 1)
+        h = np.maximum(nodes[end, 0] - nodes[step, 0], 1e-300)
+        s = np.clip((times - nodes[step, 0]) / h, 0.0, 1.0)
+        rise = (nodes[end, 1] - nodes[step, 1]) / h
+        v0, v1 = nodes[step, 2], nodes[end, 2]
+        c2, c3 = 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
+        x = nodes[step, 1] + h * s * (v0 + s * (c2 + s * c3))
+        v = v0 + s * (2.0 * c2 + 3.0 * s * c3)
+        value = self.drive.value(times)
+        forces = [
+            self._forces(*row)
+            for row in zip(x, v, value, nodes[step, 3], np.maximum(nodes[step, 4], x), strict=True)
+        ]
+        table = np.column_stack([x, v, value, np.array(forces).reshape(-1, 5), nodes[step, 3]])
+        return np.ascontiguousarray(table)
+
+    def _forces(self, x: float, v: float, value: float, mode: float, peak: float) -> tuple[float, ...]:
+        """Return magnet, spring, pack, elastic and viscous force, N."""
+        packed = self._packed
+        position, front = self.hammer.position, self.hammer.front
+        current = 0.0 if self.laws.force_drive else value
+        pack = elastic = viscous = 0.0
+        if front is not None and x > front:
+            if mode == UNLOADING and v < 0.0:
+                memory = self._law("pack_memory")(packed["pack"], peak)
+                pack = self._law("pack_unloading")(packed["pack"], x, v, memory)
+            else:
+                pack = self._law("pack_loading")(packed["pack"], x, v)
+        if position is not None and x < position and not self._rigid:
+            w = math.sqrt(position - x)
+            elastic = self._law("backstop_elastic")(packed["backstop"], w)
+            viscous = self._law("backstop_viscous")(packed["backstop"], w, v)
+        magnet = self._law("magnet_force")(packed["magnet"], x, current)
+        return magnet, self._law("spring_force")(packed["spring"], x), pack, elastic, viscous
+
+    def peaks(self, record: Record) -> FloatArray:
+        """Return time, depth and force, shape (m, 3), at the largest step ends of all contacts."""
+        nodes = record.nodes
+        out = np.zeros((len(record.contacts), 3))
+        table = self.resample(record, nodes[:, 0])
+        for row, contact in enumerate(record.contacts):
+            first = int(contact[5])
+            last = len(nodes) if math.isnan(contact[3]) else int(np.searchsorted(nodes[:, 0], contact[3]))
+            pack = contact[0] == PACK_SURFACE
+            depth = nodes[first:last, 1] - (self.hammer.front or 0.0)
+            force = -table[first:last, 5]
+            if not pack:
+                depth = (self.hammer.position or 0.0) - nodes[first:last, 1]
+                force = table[first:last, 6] + table[first:last, 7]
+            best = int(np.argmax(depth))
+            out[row] = nodes[first + best, 0], depth[best], float(force.max())
+        return out
+
+    def quadratures(
+        self,
+        record: Record,
+        steps: Any,  # noqa: ARG002 - the cubics are found by time
+        starts: FloatArray,
+        ends: FloatArray,
+    ) -> FloatArray:
+        """Return work of coil and drive force, pack and backstop loss [J], shape (n, 4), inside steps."""
+        points, weights = _GAUSS
+        half = 0.5 * (np.asarray(ends) - np.asarray(starts))
+        times = (np.asarray(starts) + half)[:, None] + half[:, None] * points
+        table = self.resample(record, times.ravel())
+        v = table[:, 1]
+        at_rest = np.array([self._law("magnet_force")(self._packed["magnet"], x, 0.0) for x in table[:, 0]])
+        drive = table[:, 2] * v if self.laws.force_drive else np.zeros(len(v))
+        powers = [(table[:, 3] - at_rest) * v, drive, -table[:, 5] * v, -table[:, 7] * v]
+        share = half[:, None] * weights
+        return np.column_stack([(power.reshape(share.shape) * share).sum(axis=1) for power in powers])
+
+
+def _contacts(nodes: FloatArray) -> FloatArray:
+    """Return the contacts of a run recorded at step ends, as the kernel records them."""
+    surface = np.where(nodes[:, 3] == BACKSTOP, BACKSTOP_SURFACE, -1)
+    surface = np.where((nodes[:, 3] == LOADING) | (nodes[:, 3] == UNLOADING), PACK_SURFACE, surface)
+    changes = np.flatnonzero(np.diff(surface)) + 1
+    rows = []
+    for first, last in zip(np.r_[0, changes], np.r_[changes, len(surface)], strict=True):
+        if surface[first] < 0:
+            continue
+        out = nodes[last, [0, 2]] if last < len(nodes) else [math.nan, math.nan]
+        rows.append([surface[first], *nodes[first, [0, 2]], *out, first, float(first == 0)])
+    return np.array(rows, dtype=np.float64).reshape(-1, 7)

@@ -1,0 +1,141 @@
+"""The one entry to the kernel: a hammer, a drive, and out comes the motion."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, Literal, get_args
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.run.motion import Motion
+from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
+from printhammer.run.start import initial_state
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy.typing as npt
+
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+CYCLE: Final = 4e-3
+"""Time after the last firing, s, at which a run ends unless told otherwise."""
+
+Scheme = Literal["default", "trapezoid", "runge-kutta-4"]
+SCHEMES: Final = get_args(Scheme)
+"""Integrators: located contacts and high order; the two of the paper."""
+
+_FEWEST, _MOST, _PER_SCALE = 1001, 400_001, 100
+
+
+def simulate(
+    hammer: Hammer,
+    drive: Drive,
+    *,
+    duration: float | str | None = None,
+    state: tuple[float, float] | None = None,
+    tolerance: float = TOLERANCE,
+    points: int | None = None,
+    times: npt.ArrayLike | None = None,
+    scheme: Scheme = "default",
+    step_scale: float = 1.0,
+    ledger: bool = False,
+) -> Motion:
+    """Integrate the equation of motion, equations (1) and (2), of one hammer under one drive.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    drive : Drive
+        The drive.
+    duration : float or str, optional
+        End of the run, s, or text with a unit; by default 4 ms after the last firing, and required for a
+        drive that does not end.
+    state : tuple of float, optional
+        Displacement, m, and velocity, m/s, at time 0; by default the rest state.
+    tolerance : float, optional
+        Error allowed in one step, in units of the way from backstop to pack and of a typical speed.
+    points : int, optional
+        Number of points of a uniform output grid; by default about a hundred in the time of one flight.
+    times : array, optional
+        The output grid itself, ascending, s. The motion does not depend on it.
+    scheme : str, optional
+        "default", or one of the paper's: "trapezoid", "runge-kutta-4", in fixed steps on its schedule.
+    step_scale : float, optional
+        Factor on all steps of the paper's schemes.
+    ledger : bool, optional
+        Compute the energy ledger at once; otherwise when `Motion.energy` is first asked for.
+
+    Returns
+    -------
+    Motion
+        With a status; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above, or the hammer has no rest state to start from.
+    """
+    if scheme not in SCHEMES:
+        raise InputError(f"scheme = {scheme!r}, expected one of {', '.join(SCHEMES)}")
+    check_tolerance(tolerance)
+    end = end_of_run(drive, duration)
+    start = initial_state(hammer, state)
+    if scheme == "default":
+        problem = Problem(hammer, drive, start, 0.0, tolerance)
+    else:
+        from printhammer.run.scheme_runs import SchemeProblem
+
+        problem = SchemeProblem(hammer, drive, start, tolerance, scheme, step_scale)
+    record = problem.run(end)
+    reached = float(record.nodes[-1, 0])
+    motion = Motion(problem, record, end, _grid(problem, reached, points, times), scheme)
+    if ledger:
+        _ = motion.energy
+    return motion
+
+
+def announce_compiling(callback: Callable[[str], None] | None) -> None:
+    """Have `callback` called with one sentence before machine code is made that is not kept on disk yet."""
+    from printhammer.kernel import specialise
+
+    specialise.announce = callback
+
+
+def end_of_run(drive: Drive, duration: float | str | None) -> float:
+    """Return the end of a run, s: `duration`, or 4 ms after the last firing.
+
+    Raises
+    ------
+    InputError
+        Not a positive number or a time with a unit; none for a drive that does not end.
+    """
+    if duration is None:
+        if not math.isfinite(drive.end):
+            raise InputError("duration is missing, and the drive does not end")
+        return float(drive.times[-1]) + CYCLE
+    if isinstance(duration, str):
+        from printhammer.units import parse
+
+        duration = parse(duration, "s")
+    if not (math.isfinite(duration) and duration > 0.0):
+        raise InputError(f"duration = {duration!r} s, expected a positive number")
+    return float(duration)
+
+
+def _grid(problem: Problem, end: float, points: int | None, times: npt.ArrayLike | None) -> FloatArray:
+    if times is not None:
+        grid = np.array(times, dtype=np.float64).reshape(-1)
+        if grid.size == 0 or not np.isfinite(grid).all() or (np.diff(grid) < 0.0).any() or grid[0] < 0.0:
+            raise InputError("times: expected ascending numbers, not negative, at least one")
+        return grid[grid <= end]
+    if points is None:
+        scale = problem.scales[0] / problem.scales[1]
+        points = int(min(max(_PER_SCALE * end / scale, _FEWEST), _MOST))
+    if points < 2:
+        raise InputError(f"points = {points}, expected at least 2")
+    return np.linspace(0.0, end, points)

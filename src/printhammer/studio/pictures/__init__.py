@@ -1,0 +1,1 @@
+"""What the studio computes and shows of a state."""

@@ -1,0 +1,167 @@
+"""The frequency-time map of a state: displacement against time and firing rate, as codes for colours."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.maps.frequency import TAIL
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.run.start import initial_state
+from printhammer.studio.frames import frame
+from printhammer.studio.work import Patience, alike, try_out
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.studio.states.state import State
+
+PREVIEW: Final = (64, 128)
+"""Rates and times of the map that is shown while a slider moves."""
+
+FULL: Final = (512, 512)
+"""Rates and times of the map in full detail."""
+
+GAP: Final = 65535
+"""Code of a displacement that is not known."""
+
+_RATES_OF_PIECE: Final = 64
+_TRIED: Final = 9
+
+
+def map_key(state: State) -> tuple[Any, ...]:
+    """Return what the map depends on."""
+    return (
+        state.hammer,
+        state.text,
+        state.constants,
+        state.waveform,
+        slots_of(state),
+        state.overlap,
+        state.low,
+        state.high,
+    )
+
+
+def try_map(state: State, known: State | None) -> State:
+    """Refuse a map that would take too long, by runs at some of its rates; return what it was tried on.
+
+    Parameters
+    ----------
+    state : State
+        What the map is of.
+    known : State or None
+        What was tried before; a state like it is good too.
+
+    Raises
+    ------
+    InputError
+        The map would take too long, or its rates are not ascending.
+    """
+    if not state.low < state.high:
+        raise InputError(f"map: rates from {state.low:g} Hz to {state.high:g} Hz, expected ascending ones")
+    if known is not None and alike(state, known):
+        return known
+    rates = tuple(np.linspace(state.low, state.high, _TRIED).tolist())
+    trains = _trains(state.fired, rates, slots_of(state), state.overlap)
+    for rate, train in zip(rates, trains, strict=True):
+        try_out(state, train, _end(state), f"a run of the map, at {rate:.4g} Hz,")
+    return state
+
+
+def map_frame(
+    state: State,
+    serial: int,
+    size: tuple[int, int],
+    newer: Callable[[], bool],
+    threads: int | None = None,
+) -> bytes:
+    """Return the displacement against time and rate, as 16-bit codes between two displacements.
+
+    Raises
+    ------
+    GivenUp
+        A newer state has come before it was done.
+    InputError
+        It takes too long, or the state describes no hammer or drive that could be run.
+    """
+    hammer, count = state.changed, size[0]
+    rates = np.linspace(state.low, state.high, count)
+    end = _end(state)
+    x = np.empty(size, np.float32)
+    ok = np.empty(count, bool)
+    times = np.linspace(0.0, end, size[1])
+    rest = initial_state(hammer, None)
+    patience = Patience(newer, "the map")
+
+    def piece(first: int, last: int) -> None:
+        patience.check()
+        fired = rates[first:last].tolist()
+        trains = _trains(state.fired, tuple(fired), slots_of(state), state.overlap)
+        runs = Ensemble(hammer, trains, end, states=rest, tolerance=DISPLAY_TOLERANCE)
+        ok[first:last] = runs.run(times=times, x=x[first:last], threads=1).ok
+
+    # While one piece is integrated, another is made ready.
+    in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE])
+    low, high = _limits(hammer.position, hammer.platen, x)
+    arrays = {"codes": codes_of(x, low, high)}
+    told = {
+        "rates": [state.low, state.high],
+        "end": end,
+        "low": low,
+        "high": high,
+        "front": hammer.front,
+        "pattern": state.pattern,
+        "pulses": state.pulses,
+        "failed": int((~ok).sum()),
+        "detail": "full" if size == FULL else "preview",
+        "reason": "",
+    }
+    return frame("map", serial, arrays, **told)
+
+
+def no_map(serial: int, reason: str) -> bytes:
+    """Return a map that there is not, and why."""
+    return frame("map", serial, reason=reason, detail="none")
+
+
+def slots_of(state: State) -> str:
+    """Return which slots are fired: the pattern, or as many as there are pulses."""
+    return state.pattern or "1" * state.pulses
+
+
+def _end(state: State) -> float:
+    return (len(slots_of(state)) - 1) / state.low + TAIL
+
+
+@lru_cache(maxsize=64)
+def _trains(waveform: Waveform, rates: tuple[float, ...], slots: str, overlap: Overlap) -> list[PulseTrain]:
+    """Return a train for each rate; kept, since they stay the same while a constant of the hammer changes."""
+    if "0" not in slots:
+        return [PulseTrain(waveform, rate=rate, pulses=len(slots), overlap=overlap) for rate in rates]
+    fired = np.flatnonzero([mark == "1" for mark in slots])
+    return [PulseTrain(waveform, at=(fired / rate).tolist(), overlap=overlap) for rate in rates]
+
+
+def _limits(low: float | None, high: float | None, x: Any) -> tuple[float, float]:
+    """Return the displacements between which colours lie: backstop and platen, or what there is."""
+    known = x[np.isfinite(x)]
+    first = float(known.min()) if low is None and known.size else (low or 0.0)
+    last = float(known.max()) if high is None and known.size else (high or 0.0)
+    return first, max(last, float(np.nextafter(np.float32(first), np.float32(np.inf))))
+
+
+def codes_of(x: Any, low: float, high: float) -> Any:
+    """Return displacements as whole numbers from 0 (low) to 65534 (high), 65535 where they are not known."""
+    scaled = (x - np.float32(low)) * np.float32((GAP - 1) / (high - low))
+    np.clip(scaled, 0.0, GAP - 1, out=scaled)
+    unknown = np.isnan(scaled)
+    scaled[unknown] = GAP
+    return scaled.astype(np.uint16)

@@ -1,0 +1,154 @@
+"""From a state to the curves of its single run, its dots and energies."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.motion import Motion
+from printhammer.run.problem import Problem
+from printhammer.run.simulate import end_of_run
+from printhammer.run.start import initial_state
+from printhammer.studio import bounds
+from printhammer.studio.frames import frame
+
+if TYPE_CHECKING:
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.studio.states.state import State
+    from printhammer.support.arrays import FloatArray
+
+POINTS: Final = 1600
+"""Points of a curve, at least."""
+
+MOST_ENDS: Final = 20_000
+"""Ends of steps among the points of a curve, at most."""
+
+
+def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
+    """Return the curves of a single run, and the run.
+
+    Raises
+    ------
+    InputError
+        The state describes no hammer or drive that could be run.
+    """
+    hammer, drive = state.changed, state.drive
+    motion = run_of(state)
+    times = points_of(motion.step_times)
+    places, speeds = motion.at(times)
+    force, values = motion.forces_at(times), drive.value(times)
+    fired, x, v = motion.strobe
+    arrays: dict[str, Any] = {
+        "t": times,
+        "x": np.float32(places),
+        "v": np.float32(speeds),
+        "drive": np.float32(values),
+        **{f"F {name}": np.float32(values) for name, values in force.items()},
+        "strobe t": fired,
+        "strobe x": np.float32(x),
+        "strobe v": np.float32(v),
+    }
+    told: dict[str, Any] = {
+        "status": motion.status,
+        "message": motion.message,
+        "places": {
+            "backstop": hammer.position,
+            "front": hammer.front,
+            "platen": hammer.platen,
+            "thickness": getattr(hammer.pack, "thickness", None),
+        },
+        "quantity": drive.quantity,
+        "peak": float(np.abs(values).max()),
+        "fired": drive.times.tolist(),
+        "steps": motion.steps,
+        "pulse": pulse_of(state),
+    }
+    return frame("motion", serial, arrays, **told), motion
+
+
+def run_of(state: State) -> Motion:
+    """Return the run of a state, given up after `bounds.MOST_STEPS` steps.
+
+    Raises
+    ------
+    InputError
+        As `motion_frame`.
+    """
+    return limited_run(state.changed, state.drive, end_of_run(state.drive, None), bounds.MOST_STEPS)
+
+
+def limited_run(
+    hammer: Hammer, drive: Drive, end: float, most: int, tolerance: float = DISPLAY_TOLERANCE
+) -> Motion:
+    """Return a run that is given up after some steps.
+
+    Raises
+    ------
+    InputError
+        The hammer has no rest state.
+    """
+    problem = Problem(hammer, drive, initial_state(hammer, None), 0.0, tolerance)
+    problem.max_steps = most
+    record = problem.run(end)
+    return Motion(problem, record, end, record.nodes[:, 0].copy(), "default")
+
+
+def points_of(ends: FloatArray) -> FloatArray:
+    """Return the times of a curve's points, s: close where the integrator's steps are short, as in contacts.
+
+    Every switch of a force is the end of a step, and is among them, where the steps are at most `MOST_ENDS`.
+    """
+    # What is longer than any picture is wide is thinned out.
+    ends = ends[np.unique(np.linspace(0, len(ends) - 1, min(len(ends), MOST_ENDS)).astype(int))]
+    steps = np.diff(ends)
+    least = 3 if len(steps) < POINTS else 1
+    counts = np.maximum(np.ceil(steps * POINTS / (ends[-1] - ends[0])).astype(int), least)
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    part = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
+    return np.append(np.repeat(ends[:-1], counts) + part * np.repeat(steps, counts), ends[-1])
+
+
+def pulse_of(state: State) -> dict[str, list[float]]:
+    """Return the curve of one pulse for the waveform editor, s and A or N."""
+    waveform = state.fired
+    tau = np.linspace(0.0, min(waveform.support, _shown(state)), 160)
+    return {"t": tau.tolist(), "value": waveform.value(tau).tolist()}
+
+
+def _shown(state: State) -> float:
+    # An exponential decay goes on far beyond what can be seen.
+    waveform = state.fired
+    width, decay = getattr(waveform, "width", None), getattr(waveform, "decay", None)
+    if width is None or decay is None:
+        return waveform.support
+    return float(width + 5.0 * decay)
+
+
+def dots_frame(serial: int, motion: Motion) -> bytes:
+    """Return what the firings did, and the energies of the run."""
+    dots = motion.dots
+    struck = [dot for dot in dots if dot.struck]
+    energy = motion.energy
+    told: dict[str, Any] = {
+        "dots": [_fields(dot) for dot in dots],
+        "energy": _fields(energy),
+        "quality": {
+            "fired": len(dots),
+            "struck": len(struck),
+            "extra": sum(dot.extra_contacts for dot in dots),
+            "force_low": min((dot.peak_force or 0.0 for dot in struck), default=None),
+            "force_high": max((dot.peak_force or 0.0 for dot in struck), default=None),
+            "flight_low": min((dot.flight_time or 0.0 for dot in struck), default=None),
+            "flight_high": max((dot.flight_time or 0.0 for dot in struck), default=None),
+        },
+    }
+    return frame("dots", serial, **told)
+
+
+def _fields(made: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass by name, without the copies that `dataclasses.asdict` makes."""
+    return {field.name: getattr(made, field.name) for field in fields(made)}

@@ -1,0 +1,90 @@
+"""The line that the studio prints: a text, each of its dots where and as dark as it comes out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.studio import bounds
+from printhammer.studio.frames import frame
+from printhammer.studio.work import Patience, try_through
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.printing.pattern import Pattern
+    from printhammer.studio.states.state import State
+
+_TRIED: Final = 16
+
+
+def line_key(state: State) -> tuple[Any, ...]:
+    """Return what the line depends on."""
+    return (state.hammer, state.text, state.constants, state.waveform, state.rate, state.line)
+
+
+def check_line(state: State, pattern: Pattern) -> None:
+    """Refuse a line that would take too long, by a run of some slots that are all fired.
+
+    Raises
+    ------
+    InputError
+        It would.
+    """
+    train = PulseTrain(state.fired, rate=state.rate, pulses=_TRIED, overlap=state.overlap)
+    tried = try_through(state, train, _TRIED / state.rate, f"the first {_TRIED} slots of the line")
+    runs = int(pattern.dots.any(axis=2).sum())
+    steps = runs * pattern.slots * tried.steps / _TRIED
+    if steps > bounds.MOST_WORK:
+        raise InputError(
+            f"the line would take about {steps:.2g} steps, expected at most {bounds.MOST_WORK:.2g}"
+        )
+
+
+def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
+    """Return the dots of the line; where it cannot be printed, or takes too long, the reason instead.
+
+    Raises
+    ------
+    GivenUp
+        A newer state has come before it was done.
+    """
+    from printhammer.printing.page import print_page
+    from printhammer.printing.pattern import Pattern
+
+    try:
+        hammer = state.changed
+        if state.waveform is not None:
+            hammer = hammer.replace("waveform", state.fired, source="set in the studio")
+        pattern = Pattern.from_text(state.line)
+        check_line(state, pattern)
+        page = print_page(hammer, pattern, state.rate, progress=Patience(newer, "the line").progress)
+    except InputError as error:
+        return frame("line", serial, reason=str(error))
+    (x, y), (wanted_x, wanted_y) = page.places, page.intended
+    arrays = {
+        "x": np.float32(x),
+        "y": np.float32(y),
+        "wanted x": np.float32(wanted_x),
+        "wanted y": np.float32(wanted_y),
+        "darkness": np.float32(page.darkness),
+        "fault": page.fault.astype(np.int32),
+        "extra x": np.float32(page.extra_places[0]),
+        "extra y": np.float32(page.extra_places[1]),
+    }
+    force, off = page.force_ratio[page.printed], page.placement_error[page.printed]
+    told = {
+        "wanted": int(page.lost.size),
+        "good": int(page.good.sum()),
+        "lost": int(page.lost.sum()),
+        "faults": {name: count for name, count in page.fault_counts.items() if count},
+        "wire": page.head.wire_diameter,
+        "pitch": page.head.pitch,
+        "force": [float(force.min()), float(force.max())] if force.size else None,
+        "placement": [float(off.min()), float(off.max())] if off.size else None,
+        "failed": int((page.status != "ok").sum()),
+    }
+    return frame("line", serial, arrays, reason="", **told)

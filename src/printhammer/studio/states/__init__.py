@@ -1,0 +1,1 @@
+"""The state of a studio page: hammer, drive, edits."""

@@ -1,0 +1,185 @@
+"""What the page needs to know of a hammer to offer a control for each of its constants."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.drive.waveforms.shapes import SHAPES
+from printhammer.studio import bounds
+from printhammer.units import from_si
+
+if TYPE_CHECKING:
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+
+SHOWN: Final = {
+    "m": ("um", "mil"),
+    "kg": ("g", "oz"),
+    "s": ("us", "us"),
+    "N": ("N", "lbf"),
+    "J": ("mJ", "in lbf"),
+    "m/s": ("m/s", "in/s"),
+    "Hz": ("Hz", "Hz"),
+    "N/m": ("N/mm", "lbf/in"),
+    "Pa": ("GPa", "ksi"),
+}
+"""Units in which a quantity is shown, by its SI unit: metric, inch-pound; else the SI unit itself."""
+
+EQUATIONS: Final = {
+    "mass": "m x'' = Fm + Fs + Fp + Fb + Fe",
+    "magnet.inverse-root": "Fm = F0 - (Am - Bm I)² / √x   (3)",
+    "spring.linear": "Fs = Bs - (Bs/As)(x - b)   (4)",
+    "pack.power": "Fp = -(AiEp) r^2.7, unloading -(AiEp) rmax^-8.3 r^11, r = (x - xp)/d   (5)",
+    "backstop.hertz": "Fb = k δ^1.5 (6), Fe = -l v δ^1.5 (7), δ = b - x",
+}
+"""Equations of the laws of the paper; the others are told in the first line of their part."""
+
+_SPANS: Final = {"m": 100e-6, "s": 500e-6, "kg": 1e-3, "N": 10.0}
+_PLACES: Final = ("platen", "pack.front", "backstop.position")
+
+
+def range_of(hammer: Hammer, key: str) -> tuple[float, float]:
+    """Return the range of a constant's control, SI.
+
+    Places on the axis move by half the way from backstop to platen; other constants by the factor
+    `bounds.SPAN` up and down; what is zero has a range of its dimension.
+    """
+    constant = hammer.constants[key]
+    value = constant.si
+    if key in _PLACES:
+        places = [p for p in (hammer.position, hammer.front, hammer.platen) if p is not None]
+        reach = 0.5 * (max(places) - min(places)) or _SPANS["m"]
+        return value - reach, value + reach
+    if value == 0.0:
+        return 0.0, _SPANS.get(constant.si_unit, 1.0)
+    ends = (value / bounds.SPAN, value * bounds.SPAN)
+    low, high = min(ends), max(ends)
+    field = key.rpartition(".")[2]
+    if field == "restitution":
+        high = min(high, 1.0)
+    return low, high
+
+
+def describe(hammer: Hammer) -> dict[str, Any]:
+    """Return everything about a hammer that the page shows: constants with range, unit, equation, source.
+
+    Returns
+    -------
+    dict
+        `name`, `title`, `note`, `constants` (a list), `combined` (controls that move several constants),
+        `waveform` (shape and constants, or None), `places`.
+    """
+    constants = []
+    for key, constant in hammer.constants.items():
+        if key.startswith("waveform."):
+            continue
+        low, high = range_of(hammer, key)
+        section = key.partition(".")[0]
+        part = hammer.parts.get(section)
+        constants.append(
+            {
+                "key": key,
+                "section": section if part is not None else "armature",
+                "symbol": constant.symbol,
+                "meaning": constant.meaning,
+                "value": constant.si,
+                "unit": constant.si_unit,
+                "low": low,
+                "high": high,
+                "log": low > 0.0 and key not in _PLACES,
+                "status": constant.status,
+                "source": constant.source,
+                "equation": equation_of(section, getattr(part, "law", "")),
+            }
+        )
+    return {
+        "name": hammer.name,
+        "title": hammer.title,
+        "note": hammer.note,
+        "constants": constants,
+        "combined": combined_of(hammer),
+        "waveform": None if hammer.waveform is None else fields_of(hammer.waveform),
+        "places": {"backstop": hammer.position, "front": hammer.front, "platen": hammer.platen},
+    }
+
+
+def equation_of(section: str, law: str) -> str:
+    """Return the equation of a law, or the first line of the part that tells it."""
+    known = EQUATIONS.get(f"{section}.{law}" if law else section)
+    if known is not None or not law:
+        return known or ""
+    from printhammer.parts import PARTS
+
+    text = import_module(PARTS[section, law].__module__).__doc__ or ""
+    return text.strip().partition("\n")[0]
+
+
+def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
+    """Return the controls of the paper's terminal that move several constants together.
+
+    Of platen, front of the pack and thickness two are free, since the pack lies on the platen: the platen
+    distance moves platen and front, the forms thickness moves the front toward the hammer.
+    """
+    keys = hammer.constants
+    if not {"platen", "pack.front", "pack.thickness"} <= set(keys):
+        return []
+    distance = keys["platen"].si - hammer.origin
+    thickness = keys["pack.thickness"].si
+    return [
+        {
+            "key": "platen distance",
+            "meaning": "platen from backstop; the pack moves with it",
+            "value": distance,
+            "unit": "m",
+            "low": distance - 0.8 * (keys["pack.front"].si - hammer.origin),
+            "high": 1.4 * distance,
+            "moves": {"platen": 1.0, "pack.front": 1.0},
+        },
+        {
+            "key": "forms thickness",
+            "meaning": "thickness of ribbon and paper on the platen; the front moves toward the hammer",
+            "value": thickness,
+            "unit": "m",
+            "low": 0.3 * thickness,
+            "high": thickness + 0.8 * (keys["pack.front"].si - hammer.origin),
+            "moves": {"pack.thickness": 1.0, "pack.front": -1.0},
+        },
+    ]
+
+
+def fields_of(waveform: Waveform) -> dict[str, Any]:
+    """Return shape and constants of a waveform, SI, as a state holds them."""
+    content: dict[str, Any] = getattr(waveform, "content", dict)()
+    if content:
+        columns = {name: [float(x) for x in values] for name, values in content.items()}
+        return {"shape": waveform.shape, **columns, "quantity": waveform.quantity}
+    return {"shape": waveform.shape, **waveform.model_dump()}
+
+
+def vocabulary() -> dict[str, Any]:
+    """Return what does not depend on the hammer: units with factors, shapes with their constants, bounds."""
+    from printhammer.support.constants import quantities
+
+    units = {
+        si: [{"name": _signed(name), "factor": from_si(1.0, si, name)} for name in names]
+        for si, names in SHOWN.items()
+    }
+    shapes = {
+        name: [
+            {"name": field, "unit": note.si, "meaning": note.meaning, "positive": note.gt is not None}
+            for field, note in quantities(shape).items()
+        ]
+        for name, shape in SHAPES.items()
+    }
+    limits = {
+        "pulses": bounds.MOST_PULSES,
+        "rates": bounds.RATES,
+        "file": bounds.LARGEST_FILE,
+        "line": bounds.LONGEST_TEXT,
+    }
+    return {"units": units, "shapes": shapes, "limits": limits}
+
+
+def _signed(unit: str) -> str:
+    return unit.replace("us", "µs").replace("um", "µm").replace("in lbf", "in·lbf")

@@ -1,0 +1,91 @@
+"""Files that are dropped onto the page: a hammer file, a measured current, a measured displacement."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from typing import Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.studio.bounds import MOST_SAMPLES
+from printhammer.studio.frames import frame
+from printhammer.studio.states.state import dropped_hammer
+from printhammer.units import to_si
+
+_COLUMNS: Final = {"displacement": "m", "current": "A", "force": "N"}
+_EXPECTED: Final = "'time [us],displacement [um]', 'time [us],current [A]' or 'time [us],force [N]'"
+
+
+def dropped(serial: int, name: str, text: str) -> bytes:
+    """Return what a dropped file holds: a hammer, or a curve of displacement, current or force.
+
+    Raises
+    ------
+    InputError
+        It is neither.
+    """
+    where = name[-80:] or "dropped file"
+    if name.lower().endswith(".toml"):
+        hammer = dropped_hammer(text)
+        return frame("dropped", serial, what="hammer", name=hammer.name, text=text)
+    what, times, values = read_curve(text, where)
+    return frame("dropped", serial, {"t": times, "values": values}, what=what, name=where)
+
+
+def read_curve(text: str, where: str) -> tuple[str, np.ndarray, np.ndarray]:
+    """Read a CSV of time and one other column, units in the heading; lines that begin with # are passed over.
+
+    Returns
+    -------
+    what : str
+        "displacement", "current" or "force".
+    times, values : array
+        SI, times ascending; thinned evenly to at most `MOST_SAMPLES`.
+
+    Raises
+    ------
+    InputError
+        It is no such table.
+    """
+    try:
+        read = list(csv.reader(io.StringIO(text), strict=True))
+    except csv.Error as error:
+        raise InputError(f"{where}: expected comma-separated values ({error})") from None
+    rows = [row for row in read if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")]
+    if not rows:
+        raise InputError(f"{where}: the file is empty, expected the heading {_EXPECTED}")
+    names, units = zip(*(_heading(cell, where) for cell in rows[0]), strict=True)
+    if len(names) != 2 or names[0] != "time" or names[1] not in _COLUMNS:
+        raise InputError(f"{where}: columns {', '.join(map(repr, names))}, expected {_EXPECTED}")
+    numbers = np.array([_numbers(row, f"{where}: row {k}") for k, row in enumerate(rows[1:], 2)])
+    if len(numbers) < 2 or (np.diff(numbers[:, 0]) <= 0.0).any():
+        raise InputError(f"{where}: expected at least 2 samples at increasing times")
+    keep = np.unique(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_SAMPLES)).astype(int))
+    try:
+        factors = to_si(1.0, units[0], "s"), to_si(1.0, units[1], _COLUMNS[names[1]])
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    return names[1], numbers[keep, 0] * factors[0], numbers[keep, 1] * factors[1]
+
+
+def _heading(cell: str, where: str) -> tuple[str, str]:
+    name, opened, rest = cell.strip().partition("[")
+    unit, closed, tail = rest.partition("]")
+    if not (opened and closed and unit.strip()) or tail.strip():
+        raise InputError(
+            f"{where}: heading {cell.strip()!r} is expected to carry a unit, such as 'time [us]'"
+        )
+    return name.strip().lower(), unit.strip()
+
+
+def _numbers(row: list[str], where: str) -> list[float]:
+    try:
+        values = [float(cell) for cell in row]
+    except ValueError:
+        values = []
+    if len(values) != 2 or not all(math.isfinite(value) for value in values):
+        raise InputError(f"{where} is expected to hold 2 finite numbers")
+    return values

@@ -1,0 +1,62 @@
+"""The hammers that one studio offers by name: those of the program, and the one that it opened with."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from printhammer.hammer.hammer import Hammer
+
+DEFAULT: Final = "hendriks-1983"
+"""Hammer that a studio opens with unless told otherwise."""
+
+
+class Shelf:
+    """Hammers by name; a name is never taken for a path.
+
+    Parameters
+    ----------
+    guest : Hammer, optional
+        The hammer that the studio opens with; it may stand in the place of one that comes with the program.
+    """
+
+    def __init__(self, guest: Hammer | None = None) -> None:
+        self.guest = guest
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all hammers, the one that the studio opens with first."""
+        from printhammer.hammer.hammer import shipped
+
+        others = sorted(shipped(), key=lambda name: (name != DEFAULT, name))
+        if self.guest is None:
+            return others
+        return [self.guest.name, *(name for name in others if name != self.guest.name)]
+
+    def is_guest(self, name: str) -> bool:
+        """Whether this is the hammer that the studio opened with, and not one that comes with the program."""
+        return self.guest is not None and name == self.guest.name
+
+    def hammer(self, name: str) -> Hammer:
+        """Return a hammer.
+
+        Raises
+        ------
+        InputError
+            It is not offered.
+        """
+        if self.guest is not None and name == self.guest.name:
+            return self.guest
+        if name not in self.names:
+            raise InputError(f"hammer = {name!r}, expected one of {', '.join(self.names)}")
+        return _shipped(name)
+
+
+@lru_cache(maxsize=16)
+def _shipped(name: str) -> Hammer:
+    from printhammer.hammer.hammer import load
+
+    return load(name)

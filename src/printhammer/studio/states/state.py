@@ -1,0 +1,288 @@
+"""The state of a studio: which hammer, what of it is changed, how it is fired, and what is looked at.
+
+It is what the browser sends, keeps in its history and writes into the address; the server keeps none.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.shapes import SHAPES, Sampled, Waveform
+from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.studio import bounds
+from printhammer.studio.states.shelf import Shelf
+from printhammer.support.constants import quantities
+
+if TYPE_CHECKING:
+    from printhammer.drive.base import Overlap
+
+VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe", "energy", "line")
+"""Names of the views."""
+
+
+class ProtocolError(Exception):
+    """A message that the page would never send; it ends the connection, and its text is the reason."""
+
+
+@dataclass(frozen=True)
+class State:
+    """What the user has set; all numbers SI.
+
+    Attributes
+    ----------
+    hammer : str
+        Name of a hammer that the studio offers; not looked at where `text` is given.
+    text : str
+        Text of a hammer file that was dropped, or empty.
+    constants : tuple of (str, float)
+        Constants that are changed, by dotted key, sorted.
+    waveform : tuple of (str, value), or None
+        The pulse that is fired, ``shape`` and its constants; None for the hammer's own.
+    rate : float
+        Firing rate, Hz.
+    pulses : int
+        Number of firings.
+    pattern : str
+        Instead of all pulses: which of the slots are fired, such as "1101".
+    overlap : str
+        "add" or "replace".
+    low, high : float
+        Rates of the map, Hz.
+    line : str
+        Text that is printed.
+    views : tuple of str
+        Views that are shown, see `VIEWS`.
+    shelf : Shelf
+        Where hammers are looked up by name; no part of what the page sends.
+    """
+
+    hammer: str
+    text: str
+    constants: tuple[tuple[str, float], ...]
+    waveform: tuple[tuple[str, Any], ...] | None
+    rate: float
+    pulses: int
+    pattern: str
+    overlap: Overlap
+    low: float
+    high: float
+    line: str
+    views: tuple[str, ...]
+    shelf: Shelf = field(default_factory=Shelf, compare=False, repr=False)
+
+    @cached_property
+    def base(self) -> Hammer:
+        """The hammer before any change."""
+        return dropped_hammer(self.text) if self.text else self.shelf.hammer(self.hammer)
+
+    @cached_property
+    def changed(self) -> Hammer:
+        """The hammer with its changed constants.
+
+        Raises
+        ------
+        InputError
+            There is no such constant, it is too far from the hammer's own, or the hammer would not be one.
+        """
+        from printhammer.studio.states.controls import range_of
+
+        base = self.base
+        for key, value in self.constants:
+            constant = base.constants.get(key)
+            if constant is None or key.startswith("waveform."):
+                known = ", ".join(name for name in base.constants if not name.startswith("waveform."))
+                raise InputError(f"constants.{key} is not known, expected one of {known}")
+            low, high = range_of(base, key)
+            if not low <= value <= high:
+                raise InputError(f"{key} = {value:.9g} {constant.si_unit}, expected {low:.6g} to {high:.6g}")
+        return base.replace(dict(self.constants), source="set in the studio") if self.constants else base
+
+    @cached_property
+    def fired(self) -> Waveform:
+        """What every firing does.
+
+        Raises
+        ------
+        InputError
+            The hammer has no waveform, or the waveform is none.
+        """
+        if self.waveform is None:
+            if self.changed.waveform is None:
+                raise InputError(
+                    f"the hammer {self.base.name!r} has no [waveform], expected one set in the editor"
+                )
+            return self.changed.waveform
+        fields = dict(self.waveform)
+        shape = fields.pop("shape")
+        if shape == Sampled.shape:
+            return Sampled.from_samples(fields["times"], fields["values"], quantity=fields["quantity"])
+        return SHAPES[shape](**fields)
+
+    @cached_property
+    def drive(self) -> PulseTrain:
+        """The drive."""
+        if not self.pattern:
+            return PulseTrain(self.fired, rate=self.rate, pulses=self.pulses, overlap=self.overlap)
+        times = [slot / self.rate for slot, mark in enumerate(self.pattern) if mark == "1"]
+        return PulseTrain(self.fired, at=times, overlap=self.overlap)
+
+
+@lru_cache(maxsize=8)
+def dropped_hammer(text: str) -> Hammer:
+    """Read the text of a dropped hammer file, which may name no other file.
+
+    Raises
+    ------
+    InputError
+        It is no hammer file, or names a table beside it.
+    """
+    # The time to read a key of many dots grows with the square of their number.
+    if any(part.count(".") > bounds.MOST_DOTS for part in re.split(r"[\n,=\[\]{}]", text)):
+        most = bounds.MOST_DOTS
+        raise InputError(f"dropped file: expected a TOML file, without keys of more than {most} dots")
+    try:
+        document = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"dropped file: expected a TOML file ({' '.join(str(error).split())})") from None
+    for name, section in document.items():
+        if isinstance(section, Mapping) and "file" in section:
+            raise InputError(f"dropped file: {name}.file names another file, which the studio does not read")
+    hammer = Hammer.from_toml(text, name="dropped file")
+    hammer.check()
+    return hammer
+
+
+def read_state(given: Any, shelf: Shelf | None = None) -> State:
+    """Read a state from a message.
+
+    Parameters
+    ----------
+    given
+        What the message holds.
+    shelf : Shelf, optional
+        The hammers that are offered; by default those that come with the program.
+
+    Raises
+    ------
+    ProtocolError
+        A key is missing, unknown, of the wrong kind or out of bounds: the page would never send it.
+    """
+    keys = set(State.__dataclass_fields__) - {"shelf"}
+    table = _table(given, "state", keys)
+    missing = keys - set(table)
+    if missing:
+        raise ProtocolError(f"state.{min(missing)} is missing")
+    return State(
+        hammer=_text(table["hammer"], "hammer", 100),
+        text=_text(table["text"], "text", bounds.LARGEST_FILE),
+        constants=_constants(table["constants"]),
+        waveform=_waveform(table["waveform"]),
+        rate=_number(table["rate"], "rate", *bounds.RATES),
+        pulses=_count(table["pulses"]),
+        pattern=_pattern(table["pattern"]),
+        overlap=_choice(table["overlap"], "overlap", ("add", "replace")),
+        low=_number(table["low"], "low", *bounds.RATES),
+        high=_number(table["high"], "high", *bounds.RATES),
+        line=_text(table["line"], "line", bounds.LONGEST_TEXT),
+        views=_views(table["views"]),
+        shelf=shelf or Shelf(),
+    )
+
+
+def _table(given: Any, where: str, known: set[str]) -> dict[str, Any]:
+    if not isinstance(given, dict):
+        raise ProtocolError(f"{where} is expected to be a table")
+    for key in given:
+        if key not in known:
+            raise ProtocolError(f"{where} has the unknown key {key[:40]!r}")
+    return given
+
+
+def _text(given: Any, where: str, most: int) -> str:
+    if not isinstance(given, str) or len(given) > most:
+        raise ProtocolError(f"{where} is expected to be a text of at most {most} characters")
+    return given
+
+
+def _number(given: Any, where: str, low: float = -math.inf, high: float = math.inf) -> float:
+    if isinstance(given, bool) or not isinstance(given, int | float):
+        raise ProtocolError(f"{where} is expected to be a number")
+    try:
+        value = float(given)
+    except OverflowError:
+        value = math.inf
+    if not (math.isfinite(value) and low <= value <= high):
+        raise ProtocolError(f"{where} is expected to be a finite number from {low:g} to {high:g}")
+    return value
+
+
+def _count(given: Any) -> int:
+    if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= bounds.MOST_PULSES:
+        raise ProtocolError(f"pulses is expected to be a whole number from 1 to {bounds.MOST_PULSES}")
+    return given
+
+
+def _choice(given: Any, where: str, known: tuple[str, ...]) -> Any:
+    if given not in known:
+        raise ProtocolError(f"{where} is expected to be one of {', '.join(known)}")
+    return given
+
+
+def _pattern(given: Any) -> str:
+    pattern = _text(given, "pattern", bounds.MOST_PULSES)
+    if pattern and not re.fullmatch(r"[01]*1[01]*", pattern):
+        raise ProtocolError("pattern is expected to be of 0 and 1, with at least one 1")
+    return pattern
+
+
+def _constants(given: Any) -> tuple[tuple[str, float], ...]:
+    if not isinstance(given, dict) or len(given) > 64:
+        raise ProtocolError("constants is expected to be a table of at most 64 numbers")
+    return tuple(
+        sorted((_text(key, "constants", 60), _number(value, key[:60])) for key, value in given.items())
+    )
+
+
+def _views(given: Any) -> tuple[str, ...]:
+    if not isinstance(given, list) or len(given) > len(VIEWS):
+        raise ProtocolError("views is expected to be a list of views")
+    return tuple(_choice(view, "views", VIEWS) for view in given)
+
+
+def _waveform(given: Any) -> tuple[tuple[str, Any], ...] | None:
+    if given is None:
+        return None
+    if not isinstance(given, dict) or not isinstance(given.get("shape"), str) or given["shape"] not in SHAPES:
+        raise ProtocolError(f"waveform.shape is expected to be one of {', '.join(SHAPES)}")
+    shape = given["shape"]
+    if shape == Sampled.shape:
+        table = _table(given, "waveform", {"shape", "times", "values", "quantity"})
+        columns = {name: _samples(table.get(name), f"waveform.{name}") for name in ("times", "values")}
+        quantity = _choice(table.get("quantity"), "waveform.quantity", ("current", "force"))
+        return (("shape", shape), *columns.items(), ("quantity", quantity))
+    fields = quantities(SHAPES[shape])
+    table = _table(given, "waveform", {"shape", "quantity", *fields})
+    found: list[tuple[str, Any]] = [("shape", shape)]
+    for name, note in fields.items():
+        if name not in table:
+            raise ProtocolError(f"waveform.{name} is missing")
+        most = bounds.LARGEST_CURRENT if note.si == "A" else bounds.LONGEST_TIME
+        found.append((name, _number(table[name], f"waveform.{name}", -most, most)))
+    if "quantity" in table:
+        found.append(("quantity", _choice(table["quantity"], "waveform.quantity", ("current", "force"))))
+    return tuple(found)
+
+
+def _samples(given: Any, where: str) -> tuple[float, ...]:
+    if not isinstance(given, list) or len(given) > bounds.MOST_SAMPLES:
+        raise ProtocolError(f"{where} is expected to be a list of at most {bounds.MOST_SAMPLES} numbers")
+    most = bounds.LARGEST_CURRENT if where.endswith("values") else bounds.LONGEST_TIME
+    return tuple(_number(value, where, -most, most) for value in given)

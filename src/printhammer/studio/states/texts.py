@@ -1,0 +1,85 @@
+"""A state as texts that leave the studio: hammer file, drive file, Python, command."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from printhammer.drive.waveforms.shapes import Sampled
+
+if TYPE_CHECKING:
+    from printhammer.studio.states.state import State
+
+HAMMER_FILE: Final = "studio-hammer.toml"
+DRIVE_FILE: Final = "studio-drive.toml"
+
+
+def texts_of(state: State) -> dict[str, str]:
+    """Return a state as "hammer" and "drive", TOML, and as "python" and "command" that give the same run.
+
+    Raises
+    ------
+    InputError
+        The state describes no hammer or drive.
+    """
+    return {
+        "hammer": state.changed.to_toml(),
+        "drive": state.drive.to_toml(),
+        "python": python_of(state),
+        "command": command_of(state),
+    }
+
+
+def python_of(state: State) -> str:
+    """Return a script that makes the same hammer, drive and motion."""
+    lines = ["import printhammer as ph", ""]
+    if state.text:
+        lines.append(f"hammer = ph.Hammer.from_toml({state.text!r})")
+    else:
+        lines.append(f"hammer = ph.load({_name(state)!r})")
+    if state.constants:
+        lines.append("hammer = hammer.replace(")
+        lines.append("    {")
+        lines += [f"        {key!r}: {value!r}," for key, value in state.constants]
+        lines.append("    }")
+        lines.append(")")
+    waveform = "hammer.waveform"
+    if state.waveform is not None:
+        made = state.fired
+        lines.insert(1, f"from printhammer.drive.waveforms.shapes import {type(made).__name__}")
+        fields = dict(state.waveform)
+        fields.pop("shape")
+        name = type(made).__name__
+        if isinstance(made, Sampled):
+            columns = f"{list(fields['times'])!r}, {list(fields['values'])!r}"
+            lines.append(f"waveform = {name}.from_samples({columns}, quantity={fields['quantity']!r})")
+        else:
+            lines.append(
+                f"waveform = {name}({', '.join(f'{key}={value!r}' for key, value in fields.items())})"
+            )
+        waveform = "waveform"
+    overlap = "" if state.overlap == "add" else f", overlap={state.overlap!r}"
+    if state.pattern:
+        lines.append(
+            f"times = [slot / {state.rate!r} for slot, mark in enumerate({state.pattern!r}) if mark == '1']"
+        )
+        lines.append(f"drive = ph.PulseTrain({waveform}, at=times{overlap})")
+    else:
+        lines.append(
+            f"drive = ph.PulseTrain({waveform}, rate={state.rate!r}, pulses={state.pulses}{overlap})"
+        )
+    lines += ["motion = ph.simulate(hammer, drive)", "print(*motion.dots, sep='\\n')", ""]
+    return "\n".join(lines)
+
+
+def command_of(state: State) -> str:
+    """Return the command for the same run; what is changed is read from the files that the studio saves."""
+    plain = not (state.text or state.constants)
+    hammer = _name(state) if plain else HAMMER_FILE
+    if state.waveform is None and not state.pattern:
+        overlap = "" if state.overlap == "add" else f" --overlap {state.overlap}"
+        return f"printhammer run {hammer} --rate '{state.rate!r} Hz' --pulses {state.pulses}{overlap}"
+    return f"printhammer run {hammer} --drive {DRIVE_FILE}"
+
+
+def _name(state: State) -> str:
+    return state.base.path if state.shelf.is_guest(state.hammer) else state.hammer

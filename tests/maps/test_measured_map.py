@@ -1,0 +1,219 @@
+"""Measured maps: what was recorded comes back, in whatever form, and odd files are told in one sentence."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import printhammer as ph
+from printhammer.maps.layout import UNITS, save_map
+from printhammer.maps.measured import load_measured_map
+
+Write = Callable[[str], Path]
+
+LONG = """# laser vibrometer
+rate [kHz], time [us], displacement [um]
+0.5,0,50
+0.5,10,60
+
+0.5,20,80
+1.2,0,51
+1.2,10,71
+1.2,20,111
+"""
+WIDE = """time [ms],1.2 kHz [um],500 Hz [mil]
+0.00,51,2
+0.02,111,4
+0.01,71,3
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def written(text: str) -> Path:
+        path = tmp_path / "measured.csv"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return written
+
+
+def test_one_row_for_each_sample(write: Write) -> None:
+    found = load_measured_map(write(LONG))
+    np.testing.assert_allclose(found["rate"], [500.0, 1200.0], rtol=1e-14)
+    np.testing.assert_allclose(found["time"], [0.0, 10e-6, 20e-6], rtol=1e-14)
+    np.testing.assert_allclose(
+        found["displacement"], [[50e-6, 60e-6, 80e-6], [51e-6, 71e-6, 111e-6]], rtol=1e-6
+    )
+    assert found["displacement"].dtype == np.float32
+    assert found["displacement"].dims == ("rate", "time")
+    for name, variable in found.variables.items():
+        assert (variable.attrs["units"], variable.attrs["long_name"]) == UNITS[str(name)]
+    assert found.attrs["source"] == "measured.csv"
+
+
+def test_one_column_for_each_rate(write: Write) -> None:
+    found = load_measured_map(write(WIDE))
+    np.testing.assert_array_equal(found["rate"], [500.0, 1200.0])
+    np.testing.assert_allclose(
+        found["displacement"], [[50.8e-6, 76.2e-6, 101.6e-6], [51e-6, 71e-6, 111e-6]], rtol=1e-6
+    )
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.permutations(LONG.splitlines()[2:]))
+def test_rows_come_in_any_order(tmp_path: Path, rows: list[str]) -> None:
+    path = tmp_path / "shuffled.csv"
+    path.write_text("\n".join([*LONG.splitlines()[:2], *rows]), encoding="utf-8")
+    straight = tmp_path / "straight.csv"
+    straight.write_text(LONG, encoding="utf-8")
+    xr.testing.assert_equal(load_measured_map(path), load_measured_map(straight))
+
+
+def test_gaps_stay_gaps(write: Write) -> None:
+    text = LONG.replace("0.5,10,60", "0.5,10,nan").replace("1.2,20,111", "1.2,20,")
+    found = load_measured_map(write(text))["displacement"].values
+    np.testing.assert_array_equal(np.isfinite(found), [[True, False, True], [True, True, False]])
+
+
+def test_every_rate_may_have_times_of_its_own(write: Write) -> None:
+    rows = ["rate [Hz],time [us],displacement [um]"]
+    rows += [f"500,{t},{2 * t + 7}" for t in range(0, 101, 10)]
+    rows += [f"700,{t},{3 * t}" for t in range(25, 76, 5)]
+    found = load_measured_map(write("\n".join(rows)))
+    # The closest samples, 5 us apart, from the first time of any record to the last.
+    t = found["time"].values
+    np.testing.assert_allclose(t, np.arange(0, 101, 5) * 1e-6, rtol=1e-12, atol=1e-18)
+    slow, fast = found["displacement"].values
+    np.testing.assert_allclose(slow, 2.0 * t + 7e-6, rtol=1e-6)
+    inside = (t > 24.9e-6) & (t < 75.1e-6)
+    np.testing.assert_array_equal(np.isfinite(fast), inside)
+    np.testing.assert_allclose(fast[inside], 3.0 * t[inside], rtol=1e-6)
+
+
+def test_times_may_be_asked_for(write: Write) -> None:
+    found = load_measured_map(write(LONG), times=[5e-6, 15e-6, 25e-6])
+    np.testing.assert_allclose(
+        found["displacement"], [[55e-6, 70e-6, np.nan], [61e-6, 91e-6, np.nan]], rtol=1e-6
+    )
+    with pytest.raises(ph.InputError, match="times: expected ascending numbers, s"):
+        load_measured_map(write(LONG), times=[1.0, 0.0])
+
+
+@pytest.mark.parametrize("engine", ["scipy", "zarr"])
+def test_a_computed_map_is_read_as_a_measured_one(hammer: "ph.Hammer", tmp_path: Path, engine: str) -> None:
+    chart = ph.frequency_map(hammer, [500.0, 900.0], times=101)
+    path = tmp_path / ("map.zarr" if engine == "zarr" else "map.nc")
+    save_map(chart, path)
+    found = load_measured_map(path)
+    xr.testing.assert_equal(found, chart[["displacement"]].drop_vars("firing", errors="ignore"))
+
+
+def test_netcdf_with_other_units_order_and_times(tmp_path: Path) -> None:
+    time = np.array([[0.0, 1.0, 2.0], [0.0, 2.0, np.nan]])
+    x = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 9.0]])
+    data = xr.Dataset(
+        {
+            "displacement": (("sample", "rate"), x.T, {"units": "mil"}),
+            "time": (("rate", "sample"), time, {"units": "ms"}),
+            "temperature": ((), 20.0),
+        },
+        coords={"rate": ("rate", [1.5, 0.5], {"units": "kHz"})},
+    )
+    path = tmp_path / "laboratory.nc"
+    data.to_netcdf(path, engine="scipy")
+    found = load_measured_map(path)
+    np.testing.assert_array_equal(found["rate"], [500.0, 1500.0])
+    np.testing.assert_allclose(found["time"], [0.0, 1e-3, 2e-3])
+    np.testing.assert_allclose(
+        found["displacement"], [[101.6e-6, 114.3e-6, 127e-6], [25.4e-6, 50.8e-6, 76.2e-6]], rtol=1e-6
+    )
+
+
+BAD_TABLES = {
+    "no unit": (LONG.replace("time [us]", "time"), r"column 'time' is expected to carry its unit"),
+    "unknown unit": (LONG.replace("[us]", "[uz]"), r"column 'time \[uz\]': the unit 'uz' is not known"),
+    "other dimension": (LONG.replace("[um]", "[N]"), r"column 'displacement \[N\]': .* expected a length"),
+    "word": (LONG.replace("1.2,10,71", "1.2,10,much"), r"line 8, column 'displacement \[um\]': 'much'"),
+    "infinite": (LONG.replace("1.2,10,71", "1.2,10,inf"), r"line 8, column 'displacement \[um\]': 'inf'"),
+    "no time": (LONG.replace("1.2,10,71", "1.2,,71"), r"line 8, column 'time \[us\]': ''"),
+    "rate of zero": (LONG.replace("1.2,", "0,"), r"line 7: rate 0 Hz is expected to be greater"),
+    "twice": (LONG.replace("1.2,10,71", "1.2,20,71"), r"line 9: time 2e-05 s at 1200 Hz .* in line 8,"),
+    "one sample": (LONG + "1.7,0,50\n", r"1 displacements at 1700 Hz, expected at least 2"),
+    "cells": (LONG.replace("1.2,10,71", "1.2,10"), r"line 8 has 2 cells, expected 3"),
+    "another column": (
+        LONG.replace("displacement", "velocity"),
+        r"columns 'rate \[kHz\]', .*'velocity \[um\]', expected 'rate \[Hz\]",
+    ),
+    "no rate": (WIDE.replace("1.2 kHz", "left"), r"column 'left \[um\]': .*; expected 'rate \[Hz\]"),
+    "rate in metres": (WIDE.replace("1.2 kHz", "1.2 m"), r"column '1.2 m \[um\]': .*expected a frequency"),
+    "rate twice": (WIDE.replace("1.2 kHz", "0.5 kHz"), r"the rate 500 Hz has two columns"),
+    "empty": ("", r"0 rows, expected the heading"),
+    "heading alone": (WIDE.splitlines()[0], r"1 rows, expected the heading .* and samples"),
+    "quotes": ('time [us],500 Hz [um]\n"0,1\n', r"expected comma-separated values"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_TABLES)
+def test_odd_tables_are_told_with_column_and_line(write: Write, kind: str) -> None:
+    text, said = BAD_TABLES[kind]
+    with pytest.raises(ph.InputError, match=rf"^[^\n]*measured\.csv: [^\n]*{said}[^\n]*$"):
+        load_measured_map(write(text))
+
+
+def test_odd_files(tmp_path: Path) -> None:
+    with pytest.raises(ph.InputError, match=r"nowhere\.csv: the measured map cannot be read \(No such file"):
+        load_measured_map(tmp_path / "nowhere.csv")
+    with pytest.raises(ph.InputError, match=r"the measured map cannot be read"):
+        load_measured_map(tmp_path / "nowhere.zarr")
+    for start in (b"CDF\x01", b"\x89HDF\r\n\x1a\n"):
+        (tmp_path / "broken.nc").write_bytes(start + b"broken")
+        with pytest.raises(ph.InputError, match=r"^[^\n]*broken\.nc: (the measured map cannot|NetCDF-4)"):
+            load_measured_map(tmp_path / "broken.nc")
+    (tmp_path / "latin.csv").write_bytes("time [µs],500 Hz [µm]\n".encode("latin-1"))
+    with pytest.raises(ph.InputError, match=r"latin\.csv: the measured map is expected to be UTF-8 text"):
+        load_measured_map(tmp_path / "latin.csv")
+
+
+def laboratory(**changes: object) -> xr.Dataset:
+    data = {
+        "rate": ("rate", [500.0, 900.0], {"units": "Hz"}),
+        "time": ("time", [0.0, 1e-3], {"units": "s"}),
+        "displacement": (("rate", "time"), np.ones((2, 2)), {"units": "m"}),
+        **changes,
+    }
+    return xr.Dataset({name: entry for name, entry in data.items() if entry is not None})
+
+
+BAD_SETS = {
+    "no displacement": ({"displacement": None}, r"expected the variable displacement, there is rate, time"),
+    "no unit": ({"time": ("time", [0.0, 1.0])}, r"time is expected to carry its unit in the attribute units"),
+    "other unit": ({"time": ("time", [0.0, 1.0], {"units": "m"})}, r"time: .* expected a time"),
+    "one dimension": (
+        {"displacement": ("rate", [1.0, 2.0], {"units": "m"})},
+        r"displacement lies over rate,",
+    ),
+    "other dimension": ({"time": ("t", [0.0], {"units": "s"})}, r"time lies over t, expected time"),
+    "infinite": (
+        {"displacement": (("rate", "time"), np.full((2, 2), np.inf), {"units": "m"})},
+        r"displacement is expected to hold finite numbers",
+    ),
+    "rate twice": ({"rate": ("rate", [500.0, 500.0], {"units": "Hz"})}, r"row 2: rate 500 Hz .*given twice"),
+    "text": (
+        {"displacement": (("rate", "time"), np.full((2, 2), "a"), {"units": "m"})},
+        r"displacement is expected to hold numbers",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_SETS)
+def test_odd_data_sets(tmp_path: Path, kind: str) -> None:
+    changes, said = BAD_SETS[kind]
+    path = tmp_path / "laboratory.nc"
+    laboratory(**changes).to_netcdf(path, engine="scipy")
+    with pytest.raises(ph.InputError, match=rf"^[^\n]*laboratory\.nc: [^\n]*{said}[^\n]*$"):
+        load_measured_map(path)
