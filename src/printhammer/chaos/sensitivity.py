@@ -1,8 +1,8 @@
 """Sensitivities: how flight time, force and energy change with every constant of the hammer and the pulse.
 
-The derivatives come from the tangent flow of the constants along one run (`printhammer.derivatives.constants`), not
-from differences of runs. The table that follows also tells how tolerances of the constants show in what is
-printed.
+The derivatives come from the tangent flow of the constants along one run
+(`printhammer.derivatives.constants`), not from differences of runs. The table that follows also tells how
+tolerances of the constants show in what is printed.
 """
 
 from __future__ import annotations
