@@ -10,7 +10,7 @@ import numpy.typing as npt
 from tests import hammers
 
 import printhammer as ph
-from printhammer.kernel.lane_layout import LANES
+from printhammer.kernel.lanes.layout import LANES
 from printhammer.run.ensemble import Ensemble, EnsembleResult
 
 SIZE = 3 * LANES + 100

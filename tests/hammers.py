@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.derivatives import constants as constant_flow
+from printhammer.derivatives import constants
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
-from printhammer.kernel import specialise, specialise_sensitivity
-from printhammer.kernel.reference import ReferenceRun, reference
+from printhammer.kernel.compile import specialise
+from printhammer.kernel.compile import variational as specialise_sensitivity
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
@@ -30,6 +30,7 @@ from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.linear import LinearSpring
 from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.reference.integrator import ReferenceRun, reference
 from printhammer.run.problem import Problem
 
 CRUDE = Path(__file__).parent / "data" / "hendriks-1983.toml"
@@ -273,7 +274,7 @@ def interpreted() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Problem, "kernel", property(lambda problem: _plain(problem.laws)))
-        patch.setattr(constant_flow, "with_sensitivity", _plain_sensitivity)
+        patch.setattr(constants, "with_sensitivity", _plain_sensitivity)
         yield
 
 
@@ -281,7 +282,7 @@ def interpreted() -> Iterator[None]:
 def _plain(laws: Any) -> specialise.Kernel:
     # What all kernels share must be compiled as usual, for those that are.
     for name in ("hermite", "landing"):
-        import_module(f"printhammer.kernel.{name}")
+        import_module(f"printhammer.kernel.methods.{name}")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numba.config, "DISABLE_JIT", True)
         return specialise._specialised.__wrapped__(laws)

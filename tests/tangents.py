@@ -9,8 +9,8 @@ import numpy as np
 
 import printhammer as ph
 from printhammer.derivatives.states import TangentMap, tangent_map
-from printhammer.kernel import carry
-from printhammer.kernel.modes import RELOADING, UNLOADING
+from printhammer.kernel.model.modes import RELOADING, UNLOADING
+from printhammer.kernel.single import carry
 from printhammer.run.problem import Problem, fresh_carry
 
 SHARP = 1e-13

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 import printhammer as ph
-from printhammer.kernel.reference import horizon, reference
+from printhammer.reference.integrator import horizon, reference
 
 HAMMER = ph.load("hendriks-1983")
 SINGLE = ph.PulseTrain(HAMMER.waveform)

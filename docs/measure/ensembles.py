@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 import printhammer as ph
-from printhammer.kernel.reference import horizon, reference
+from printhammer.reference.integrator import horizon, reference
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.problem import TOLERANCE
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import printhammer as ph
-from printhammer.kernel.reference import reference
+from printhammer.reference.integrator import reference
 
 HAMMER = ph.load("hendriks-1983")
 RUNS = (

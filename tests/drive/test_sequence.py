@@ -16,8 +16,8 @@ from printhammer.drive.segments import END as END_OF_TABLE
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sine, Trapezoid, Waveform
 from printhammer.errors import InputError
-from printhammer.kernel import pulses
-from printhammer.kernel.layout import END
+from printhammer.kernel.model import pulses
+from printhammer.kernel.model.layout import END
 
 PULSE = Rectangle(amplitude=0.9, width=350e-6, rise=1e-5, decay=2.4e-5)
 SHORT = Trapezoid(amplitude=0.5, rise=0.0, width=2e-4, fall=0.0)

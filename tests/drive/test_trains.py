@@ -10,7 +10,7 @@ from printhammer.drive.input import even_times
 from printhammer.drive.trains import Burst, Drive, Overlap, PulseTrain, SineForce
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Sine, Trapezoid, Waveform
 from printhammer.errors import InputError
-from printhammer.kernel.layout import END
+from printhammer.kernel.model.layout import END
 
 PULSE = Rectangle(amplitude=0.9, width=350e-6, rise=1e-5, decay=2.4e-5)
 

@@ -9,7 +9,6 @@ from tests.truth import oracles
 
 from printhammer.drive.trains import PulseTrain, SineForce
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle
-from printhammer.kernel.reference import reference
 from printhammer.kernel.schemes_1983 import (
     CONTACT_STEP,
     FREE_STEP,
@@ -25,6 +24,7 @@ from printhammer.parts.backstop.rigid import RigidBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.reference.integrator import reference
 
 MASS = 4e-4
 MAGNET = InverseRootMagnet(F0=2.47, Am=0.437, Bm=0.0931)

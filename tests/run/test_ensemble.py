@@ -10,7 +10,7 @@ from tests import hammers
 from tests.hammers import STOP, made_of
 
 import printhammer as ph
-from printhammer.kernel.modes import HELD_UNLOADING, LOADING, RELOADING, STATUS_NAMES, UNLOADING
+from printhammer.kernel.model.modes import HELD_UNLOADING, LOADING, RELOADING, STATUS_NAMES, UNLOADING
 from printhammer.run.ensemble import Ensemble, EnsembleResult
 
 DOTS = ("flight_time", "impact_speed", "peak_force", "indentation", "contact_time")

@@ -10,7 +10,7 @@ from tests.hammers import STOP, STROKE, made_of
 
 import printhammer as ph
 from printhammer.drive.waveforms.shapes import Rectangle
-from printhammer.kernel.lane_layout import LANES
+from printhammer.kernel.lanes.layout import LANES
 from printhammer.run.ensemble import Ensemble, EnsembleResult
 
 APART = 2e-8

@@ -10,7 +10,7 @@ import pytest
 from tests.hammers import TRUTH, Draw
 
 import printhammer as ph
-from printhammer.kernel.reference import ReferenceRun, reference
+from printhammer.reference.integrator import ReferenceRun, reference
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble, EnsembleResult
 from printhammer.run.problem import TOLERANCE
 

@@ -6,7 +6,7 @@ import pytest
 from tests import hammers
 
 import printhammer as ph
-from printhammer.kernel.reference import reference
+from printhammer.reference.integrator import reference
 
 HAMMER = hammers.crude()
 C = {key: constant.si for key, constant in HAMMER.constants.items()}

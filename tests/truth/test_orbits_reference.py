@@ -10,7 +10,7 @@ from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.chaos import Orbit, Orbits
-from printhammer.kernel.reference import ReferenceRun, reference
+from printhammer.reference.integrator import ReferenceRun, reference
 
 TIGHT = 1e-14
 

@@ -5,10 +5,10 @@ import pytest
 from tests.hammers import CRUDE, TRUTH
 
 import printhammer as ph
-from printhammer.kernel.reference import reference
 from printhammer.printing.page import Page, print_page
 from printhammer.printing.pattern import Pattern
 from printhammer.printing.slots import FIRST_SLOT
+from printhammer.reference.integrator import reference
 
 RATE = 1500.0
 ROWS = ("#.##.#", "######")

@@ -12,8 +12,6 @@ from tests.truth import oracles
 
 from printhammer.drive.trains import PulseTrain, SineForce
 from printhammer.drive.waveforms.shapes import Rectangle
-from printhammer.kernel.reference import ReferenceRun, _Run, horizon, reference
-from printhammer.kernel.reference_series import ORDER
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
@@ -23,6 +21,8 @@ from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.linear import LinearSpring
 from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.reference.integrator import ReferenceRun, _Run, horizon, reference
+from printhammer.reference.series import ORDER
 
 MASS = 4e-4
 MAGNET = InverseRootMagnet(F0=2.47, Am=0.437, Bm=0.0931)

@@ -5,8 +5,8 @@ import pytest
 from tests.hammers import crude
 
 import printhammer as ph
-from printhammer.kernel.reference import reference
 from printhammer.printing.slots import slot_times
+from printhammer.reference.integrator import reference
 
 
 @pytest.mark.slow

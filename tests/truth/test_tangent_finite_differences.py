@@ -27,7 +27,7 @@ from tests.tangents import SHARP, before_slow_touches, deviation, richardson, sc
 import printhammer as ph
 from printhammer.derivatives.states import TangentMap, tangent_map
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.kernel.modes import (
+from printhammer.kernel.model.modes import (
     BACKSTOP,
     BACKSTOP_RELEASED,
     FREE,
@@ -36,7 +36,7 @@ from printhammer.kernel.modes import (
     RELOADING,
     UNLOADING,
 )
-from printhammer.kernel.reference import reference
+from printhammer.reference.integrator import reference
 from printhammer.run.problem import Problem
 
 WANTED = 1e-6

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.bench.problem import ENDS, FIRST, GRID, checked, ensemble_tasks
-from printhammer.kernel.reference import reference
+from printhammer.reference.integrator import reference
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task

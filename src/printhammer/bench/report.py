@@ -260,7 +260,7 @@ figures can be compared over time. Read the ratios: speeds are those of one mach
 
 _SINGLE = """\
 A train of 1.35 ms from rest. Error: the largest deviation of the displacement from the reference
-(`src/printhammer/kernel/reference.py`, tolerance 1e-14) over the first 3 ms, on a grid of 1 us. Speed:
+(`src/printhammer/reference/integrator.py`, tolerance 1e-14) over the first 3 ms, on a grid of 1 us. Speed:
 hammer-seconds per second of processor time without output, over 50 pulses; 20 for numbalsoda, 3 ms for
 solvers that call Python at every step. All solvers have their turn in each of seven rounds, so that a
 busy machine slows all alike, and the best turn counts. The first call compiles and is stated apart. The

@@ -1,7 +1,7 @@
 """The tangent flow of constants: how a motion changes with the constants of hammer and drive.
 
-The columns of `printhammer.kernel.influence` carried along a recorded run, in a second pass as for the
-tangent flow of the state (`printhammer.derivatives.states`). docs/tangent.md has the derivation.
+The columns of `printhammer.kernel.variational.influence` carried along a recorded run, in a second pass as
+for the tangent flow of the state (`printhammer.derivatives.states`). docs/tangent.md has the derivation.
 """
 
 from __future__ import annotations
@@ -15,7 +15,18 @@ import numpy as np
 
 from printhammer.derivatives.parameters import as_arrays, parameters, rest_changes
 from printhammer.errors import InputError
-from printhammer.kernel.influence import (
+from printhammer.kernel.compile.variational import with_sensitivity
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING
+from printhammer.kernel.model.modes import (
+    HELD_UNLOADING,
+    LOADING,
+    OK,
+    RELOADING,
+    RESTING,
+    STATUS_NAMES,
+    UNLOADING,
+)
+from printhammer.kernel.variational.influence import (
     BACKSTOP_MOVES,
     FIELD_MOVES,
     MIDDLE,
@@ -25,9 +36,6 @@ from printhammer.kernel.influence import (
     VARIED,
     width,
 )
-from printhammer.kernel.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING
-from printhammer.kernel.modes import HELD_UNLOADING, LOADING, OK, RELOADING, RESTING, STATUS_NAMES, UNLOADING
-from printhammer.kernel.specialise_sensitivity import with_sensitivity
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.start import initial_state
 
@@ -39,7 +47,7 @@ if TYPE_CHECKING:
     from printhammer.derivatives.parameters import Parameter
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.specialise import Kernel
+    from printhammer.kernel.compile.specialise import Kernel
     from printhammer.run.problem import Record
     from printhammer.support.arrays import FloatArray
 

@@ -16,8 +16,8 @@ import numpy as np
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.kernel import carry
-from printhammer.kernel.modes import HELD_UNLOADING, OK, PAUSED, RELOADING, STATUS_NAMES, UNLOADING
+from printhammer.kernel.model.modes import HELD_UNLOADING, OK, PAUSED, RELOADING, STATUS_NAMES, UNLOADING
+from printhammer.kernel.single import carry
 from printhammer.run.problem import MAX_STEPS, TOLERANCE, Problem, check_tolerance
 from printhammer.run.start import initial_state
 from printhammer.support.threads import in_threads, thread_count
@@ -56,7 +56,7 @@ class TangentMap:
     state_at_start, state_at_end : tuple of float
         Displacement, m, velocity, m/s, and latest local maximum, m (0 where it is not part of the state).
     branch_at_start, branch_at_end : int
-        Codes of the modes, see `printhammer.kernel.modes`; -1 where the run did not get.
+        Codes of the modes, see `printhammer.kernel.model.modes`; -1 where the run did not get.
     smooth : bool
         False where the motion in between passes a touch without velocity, where the state has no derivative.
     status : str

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from printhammer.kernel.layout import END
+from printhammer.kernel.model.layout import END
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

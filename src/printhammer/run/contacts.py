@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from printhammer.kernel.modes import PACK_SURFACE
+from printhammer.kernel.model.modes import PACK_SURFACE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.kernel.modes import MODE_NAMES, OK, STATUS_NAMES
+from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job, kernel_of
 from printhammer.run.problem import TOLERANCE, check_tolerance, laws_of
 from printhammer.run.start import check_branch, initial_state
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.drive.trains import Drive
-    from printhammer.kernel.laws import Laws
+    from printhammer.kernel.model.laws import Laws
     from printhammer.run.ensemble_group import LaneKinds
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
@@ -88,7 +88,7 @@ class Strobes:
     x, v : array
         Displacement, m, and velocity, m/s.
     branch : int array
-        Code of the mode, see `printhammer.kernel.modes`; -1 where a run did not get.
+        Code of the mode, see `printhammer.kernel.model.modes`; -1 where a run did not get.
     memory : array
         Displacement of the latest local maximum, m, on the unloading branch inside the pack, else 0.
     """

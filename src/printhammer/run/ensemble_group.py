@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.kernel import carry, lane_layout
-from printhammer.kernel.layout import END, MAGNET, PLACES
+from printhammer.kernel.lanes import layout as lane_layout
+from printhammer.kernel.model.layout import END, MAGNET, PLACES
+from printhammer.kernel.single import carry
 from printhammer.run.problem import MAX_STEPS, Problem, scales_of
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.specialise import Kernel
+    from printhammer.kernel.compile.specialise import Kernel
     from printhammer.support.arrays import FloatArray
 
 _NODES: Final = 2048
@@ -140,7 +141,7 @@ class Group:
 
     def fits_lanes(self) -> bool:
         """Tell whether there is a kernel for lanes for these members."""
-        from printhammer.kernel.specialise_lanes import suits
+        from printhammer.kernel.compile.lanes import suits
 
         if self.lane_kinds is None or not suits(self.laws):
             return False
@@ -153,7 +154,7 @@ class Group:
     @property
     def lane_kernel(self) -> Kernel:
         """The compiled kernel for lanes."""
-        from printhammer.kernel.specialise_lanes import specialise_lanes
+        from printhammer.kernel.compile.lanes import specialise_lanes
 
         if self.lane_kinds is None:
             raise ValueError("no closed form of the drive")

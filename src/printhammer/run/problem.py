@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.kernel import carry, layout
-from printhammer.kernel.laws import Laws
-from printhammer.kernel.modes import OK, STATUS_NAMES, STEP_LIMIT
+from printhammer.kernel.model import layout
+from printhammer.kernel.model.laws import Laws
+from printhammer.kernel.model.modes import OK, STATUS_NAMES, STEP_LIMIT
+from printhammer.kernel.single import carry
 
 if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.specialise import Kernel
+    from printhammer.kernel.compile.specialise import Kernel
     from printhammer.support.arrays import FloatArray
 
 TOLERANCE: Final = 2e-11
@@ -42,7 +43,7 @@ _MOST_FLIGHTS: Final = 1e6
 
 @dataclass(frozen=True)
 class Record:
-    """What the kernel recorded of one run; see `printhammer.kernel.record`.
+    """What the kernel recorded of one run; see `printhammer.kernel.single.record`.
 
     Attributes
     ----------
@@ -108,7 +109,7 @@ def _module(part: Any) -> str:
 
 
 def constants_of(hammer: Hammer) -> FloatArray:
-    """Return the constants of a hammer in the order of `printhammer.kernel.layout`."""
+    """Return the constants of a hammer in the order of `printhammer.kernel.model.layout`."""
     packed = {role: part.packed(hammer.origin) for role, part in hammer.parts.items()}
     array = np.zeros(layout.MAGNET + max(len(packed.get("magnet", ())), 1))
     array[layout.INVERSE_MASS] = 1.0 / hammer.mass
@@ -201,7 +202,7 @@ class Problem:
     @cached_property
     def kernel(self) -> Kernel:
         """The compiled kernel for the laws of this hammer."""
-        from printhammer.kernel.specialise import specialise
+        from printhammer.kernel.compile.specialise import specialise
 
         return specialise(self.laws)
 

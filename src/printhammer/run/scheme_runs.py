@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.kernel import schemes_1983
-from printhammer.kernel.modes import (
+from printhammer.kernel.model.modes import (
     BACKSTOP,
     BACKSTOP_SURFACE,
     FREE,

@@ -101,7 +101,7 @@ def simulate(
 
 def announce_compiling(callback: Callable[[str], None] | None) -> None:
     """Have `callback` called with one sentence before machine code is made that is not kept on disk yet."""
-    from printhammer.kernel import specialise
+    from printhammer.kernel.compile import specialise
 
     specialise.announce = callback
 

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from printhammer.errors import InputError
-from printhammer.kernel.modes import LOADING, RELOADING, UNLOADING
+from printhammer.kernel.model.modes import LOADING, RELOADING, UNLOADING
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.kernel import carry
-from printhammer.kernel.modes import BACKSTOP_SURFACE, PACK_SURFACE, PAUSED, STATUS_NAMES
+from printhammer.kernel.model.modes import BACKSTOP_SURFACE, PACK_SURFACE, PAUSED, STATUS_NAMES
+from printhammer.kernel.single import carry
 from printhammer.run.problem import MAX_STEPS, fresh_carry
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""Compiling: the compiler's setting, and the kernel of one combination of laws."""

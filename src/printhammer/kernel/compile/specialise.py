@@ -1,0 +1,242 @@
+"""One compiled kernel for each combination of laws.
+
+The kernel's template modules are ordinary source files whose law functions are names without a value. For a
+given :class:`~printhammer.kernel.model.laws.Laws` they are executed once more under a module name of their
+own, with the chosen laws put in place, so that the compiler sees every call and can inline it. The module
+name holds a digest of all sources involved: machine code cached on disk is used again for the same sources,
+and never for others.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import importlib.util
+import inspect
+import sys
+import threading
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.kernel.model.laws import Laws
+
+TEMPLATES = (
+    "model.pulses",
+    "model.forces",
+    "methods.nystrom8",
+    "methods.dop853",
+    "methods.landing",
+    "methods.contact",
+    "single.record",
+    "single.rest",
+    "single.run",
+    "single.resample",
+    "methods.quadrature",
+    "single.stretch",
+    "lanes.members",
+    "model.slopes",
+    "variational.variation",
+    "variational.tangent",
+)
+"""Template modules of the kernel in the order in which they use one another."""
+
+ENTRIES = ("run", "resample", "quadratures", "peaks", "members", "tangent", "lanes", "sensitivity")
+"""Names of the entry points."""
+
+_PLAIN = (
+    "model.modes",
+    "model.layout",
+    "single.carry",
+    "methods.hermite",
+    "compile.compiling",
+    "methods.dop853_tableau",
+    "methods.nystrom8_tableau",
+)
+
+_LAW_FUNCTIONS = {
+    "magnet": ("magnet_force", "magnet_energy"),
+    "spring": ("spring_force", "spring_energy"),
+    "pack": ("pack_loading", "pack_memory", "pack_unloading", "pack_switch"),
+    "backstop": (
+        "backstop_elastic",
+        "backstop_viscous",
+        "backstop_energy",
+        "backstop_switch",
+        "backstop_rebound",
+    ),
+}
+
+announce: Callable[[str], None] | None = None
+"""Called with one sentence before machine code is made that is not in the cache on disk."""
+
+
+class Kernel:
+    """The compiled functions of one combination of laws.
+
+    Attributes
+    ----------
+    run, resample, quadratures, peaks, members, tangent
+        Entry points; see the template modules of the same names.
+    label : str
+        What the kernel is for.
+    digest : str
+        Of all its sources.
+    namespace : dict
+        All that its modules define, for what builds on them.
+    """
+
+    def __init__(
+        self, modules: dict[str, ModuleType], label: str, namespace: dict[str, Any], digest: str
+    ) -> None:
+        self.namespace = namespace
+        self.digest = digest
+        self.label = label
+        self._announced = False
+        self._entries = {
+            name: getattr(module, name)
+            for module in modules.values()
+            for name in ENTRIES
+            if hasattr(module, name) and getattr(module, name).__module__ == module.__name__
+        }
+
+    def __getattr__(self, name: str) -> Any:
+        """Return an entry point, announcing its compilation if its machine code is not on disk yet."""
+        try:
+            function = self.__dict__["_entries"][name]
+        except KeyError:
+            raise AttributeError(name) from None
+        if announce is not None and not self._announced and not _is_ready(function):
+            self._announced = True
+            announce(f"compiling the kernel for {self.label} (once; kept on disk)")
+        return function
+
+
+def _is_ready(function: Any) -> bool:
+    """Tell whether `function` is compiled in this process or has machine code on disk."""
+    if not hasattr(function, "signatures") or function.signatures:
+        # Plain Python where NUMBA_DISABLE_JIT is set.
+        return True
+    python = function.py_func
+    folder = Path(function.stats.cache_path)
+    return any(folder.glob(f"{Path(inspect.getfile(python)).stem}.{python.__qualname__}-*.nbc"))
+
+
+def _source(module: ModuleType) -> bytes:
+    return inspect.getsource(module).encode()
+
+
+def source_file(name: str) -> Path:
+    """Return the file of a module of the kernel, named from there, such as "model.forces"."""
+    return Path(__file__).parents[1].joinpath(*name.split(".")).with_suffix(".py")
+
+
+def law_bindings(laws: Laws) -> tuple[dict[str, Any], bytes]:
+    """Return the plain law functions and flags by name, and the text of all sources they come from."""
+    absent = importlib.import_module(laws.absent)
+    bindings: dict[str, Any] = {}
+    text = _source(absent)
+    for role, functions in _LAW_FUNCTIONS.items():
+        name = getattr(laws, role)
+        module = importlib.import_module(name) if name else absent
+        text += _source(module)
+        for function in functions:
+            bindings[function] = getattr(module, function, None) or getattr(absent, function)
+        bindings[f"HAS_{role.upper()}"] = bool(name)
+        if role == "pack":
+            bindings["MEMORY"] = bool(getattr(module, "MEMORY", False))
+        if role == "backstop":
+            bindings["RIGID"] = bool(getattr(module, "RIGID", False))
+    bindings["FORCE_DRIVE"] = laws.force_drive
+    bindings["PACK_PULLS"] = laws.pack_pulls
+    bindings["BACKSTOP_PULLS"] = laws.backstop_pulls
+    bindings["RELOAD_ALONG_UNLOADING"] = laws.reload_along_unloading
+    return bindings, text
+
+
+one_at_a_time = threading.RLock()
+
+
+def specialise(laws: Laws) -> Kernel:
+    """Return the kernel compiled for `laws`; the same object for equal laws.
+
+    Parameters
+    ----------
+    laws : Laws
+        Names of the modules that hold the laws, and the flags.
+
+    Returns
+    -------
+    Kernel
+        Its entry points compile on their first call, or load their machine code from disk.
+
+    Raises
+    ------
+    ImportError
+        If a module named in `laws` cannot be imported.
+    """
+    with one_at_a_time:
+        return _specialised(laws)
+
+
+@functools.cache
+def _specialised(laws: Laws) -> Kernel:
+    import numba
+
+    bindings, text = law_bindings(laws)
+    for name in _PLAIN:
+        text += source_file(name).read_bytes()
+    sources = hashlib.sha256(text + repr((laws, numba.__version__)).encode())
+    compiled = importlib.import_module("printhammer.kernel.compile.compiling").compiled
+    namespace = {
+        name: _compile_law(value, compiled) if isinstance(value, FunctionType) else value
+        for name, value in bindings.items()
+    }
+    modules: dict[str, ModuleType] = {}
+    for name in TEMPLATES:
+        # A template uses only those before it: a change of a later one leaves its machine code valid.
+        sources.update(source_file(name).read_bytes())
+        namespace["DIGEST"] = digest = sources.hexdigest()[:16]
+        module = execute(name, digest, namespace)
+        modules[name] = module
+        namespace.update(
+            {
+                key: value
+                for key, value in vars(module).items()
+                if hasattr(value, "py_func")
+                or (isinstance(value, FunctionType) and value.__module__ == module.__name__)
+            }
+        )
+    parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
+    return Kernel(modules, ", ".join(parts) or "a free mass", namespace, digest)
+
+
+def _compile_law(function: FunctionType, compiled: Callable[..., Any]) -> Any:
+    """Compile a law, together with the helpers of its own module that it calls."""
+    helpers = {
+        name: value
+        for name in function.__code__.co_names
+        if isinstance(value := function.__globals__.get(name), FunctionType)
+    }
+    if helpers:
+        scope = dict(function.__globals__)
+        scope.update({name: _compile_law(helper, compiled) for name, helper in helpers.items()})
+        function = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
+    return compiled(function)
+
+
+def execute(template: str, tag: str, namespace: dict[str, Any]) -> ModuleType:
+    """Execute a template as a module of its own, told by `tag`, in which `namespace` is already defined."""
+    path, name = source_file(template), f"printhammer.kernel.{template}_{tag}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} cannot be loaded as a template of the kernel")
+    module = importlib.util.module_from_spec(spec)
+    vars(module).update(namespace)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module

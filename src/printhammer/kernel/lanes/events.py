@@ -1,0 +1,457 @@
+"""What happens to a member between two steps of its lane: switches, edges of the drive, samples.
+
+Scalar code on one lane at a time. A member is a row of numbers `slot` beside its lane: what the steps do not
+need. Whatever is out of the ordinary (a touch without velocity, rest, a range left, a reloading) makes the
+member leave the lanes: :func:`printhammer.kernel.lanes.members.members` then runs it from its beginning.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.lanes import layout as R
+from printhammer.kernel.methods.hermite import position_root, rises_through
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION
+from printhammer.kernel.model.modes import (
+    BACKSTOP,
+    EDGE,
+    FREE,
+    LEFT_BACKSTOP,
+    LEFT_FRONT,
+    LOADING,
+    NEAR_TOUCH,
+    NO_SWITCH,
+    REACHED_BACKSTOP,
+    REACHED_FRONT,
+    REVERSAL,
+    UNLOADING,
+    UNRESOLVED,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.lanes.drive import add_up
+    from printhammer.kernel.lanes.steps import lane_acceleration, lane_contact_rate
+    from printhammer.kernel.methods.contact import leave, reach_time
+    from printhammer.kernel.methods.landing import first_switch, land_on_level, land_on_reversal
+    from printhammer.kernel.model.forces import Hammer, pack_force
+    from printhammer.kernel.model.laws import RELOAD_ALONG_UNLOADING, pack_memory
+    from printhammer.kernel.model.pulses import Drive, edges_at
+    from printhammer.kernel.single.resample import state_in_step
+    from printhammer.kernel.single.run import contact_unit
+    from printhammer.kernel.single.stretch import firing_before
+
+MODE_OF = (FREE, LOADING, UNLOADING, BACKSTOP)
+"""Mode of the members in each pool."""
+
+STAYS = -1
+LEAVES = -2
+"""In place of a pool: the member goes back to the plain kernel."""
+DONE = -3
+
+
+@inlined
+def place(lane: int) -> int:
+    """Return where the rows of a lane begin in its pool."""
+    return (lane // R.BLOCK) * R.BLOCK_SIZE + lane % R.BLOCK
+
+
+@compiled
+def copy_lane(source: Any, i: int, target: Any, j: int, rows: int) -> None:
+    """Copy the first rows of a lane at place `i` to another pool or place."""
+    for row in range(rows):
+        target[row * R.BLOCK + j] = source[row * R.BLOCK + i]
+
+
+@compiled
+def quintic(part: float, h: float, x0: float, v0: float, a0: float, x1: float, v1: float, a1: float) -> float:
+    """Return, at `part` of a step, the quintic through its displacements, velocities, accelerations."""
+    # Remainder over the cubic Taylor polynomial at the start.
+    b0 = h * v0
+    c0 = 0.5 * h * h * a0
+    d = x1 - (x0 + b0 + c0)
+    e = h * v1 - (b0 + 2.0 * c0)
+    f = h * h * (a1 - a0)
+    p3 = 10.0 * d - 4.0 * e + 0.5 * f
+    p4 = -15.0 * d + 7.0 * e - f
+    p5 = 6.0 * d - 3.0 * e + 0.5 * f
+    return x0 + part * (b0 + part * (c0 + part * (p3 + part * (p4 + part * p5))))
+
+
+@compiled
+def sixth_term(pool: Any, i: int, which: int) -> float:
+    """Return k with which k u^3 (u - 1)^3 corrects the quintic of the latest step off the backstop.
+
+    It makes the acceleration in the middle of the step, u = 1/2, that of the force there.
+    """
+    h = pool[R.LENGTH * R.BLOCK + i]
+    x0, x1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
+    v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
+    a0, a1 = pool[R.OLD_A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
+    middle = quintic(0.5, h, x0, v0, a0, x1, v1, a1)
+    t = pool[R.OLD_T * R.BLOCK + i] + 0.5 * h
+    memory = pool[R.MEMORY * R.BLOCK + i]
+    a = lane_acceleration(pool, i, t, middle, 0.0, MODE_OF[which], memory)
+    # The second derivative of the quintic in the middle, in the same unit.
+    bend = 1.5 * h * (v1 - v0) - 0.25 * h * h * (a0 + a1)
+    return float((a * h * h - bend) / 0.375)
+
+
+@compiled
+def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth: float, fine: bool) -> float:
+    """Return the displacement [m] at a time inside the step that a lane took last."""
+    x0, x1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
+    v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
+    a0, a1 = pool[R.OLD_A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
+    h = pool[R.LENGTH * R.BLOCK + i]
+    if not time > pool[R.OLD_T * R.BLOCK + i]:
+        # A run may end where a step begins.
+        return float(b - x0 * x0 if which == R.CONTACT_POOL else x0)
+    if which != R.CONTACT_POOL:
+        u = (time - pool[R.OLD_T * R.BLOCK + i]) / h
+        bump = u * (u - 1.0)
+        return float(quintic(u, h, x0, v0, a0, x1, v1, a1) + sixth * bump * bump * bump)
+    if not fine and x1 > 0.5 * x0 and x0 > 0.5 * x1:
+        # Away from the end of the contact the displacement is smooth in time as well.
+        t0 = pool[R.OLD_T * R.BLOCK + i]
+        h = pool[R.NEW_T * R.BLOCK + i] - t0
+        a0, a1 = 0.5 * a0 / x0, 0.5 * a1 / x1
+        return quintic((time - t0) / h, h, b - x0 * x0, v0, a0, b - x1 * x1, v1, a1)
+    part = part_at(pool, i, time)
+    w = quintic(part, h, x0, -v0, -a0, x1, -v1, -a1)
+    return b - w * w
+
+
+@compiled
+def part_at(pool: Any, i: int, time: float) -> float:
+    """Return at which part of its latest step in s a lane of the contact pool was at a time."""
+    t0, t1 = pool[R.OLD_T * R.BLOCK + i], pool[R.NEW_T * R.BLOCK + i]
+    w0, w1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
+    v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
+    a0, a1 = pool[R.OLD_A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
+    h = pool[R.LENGTH * R.BLOCK + i]
+    low, high = 0.0, 1.0
+    # The step may reach beyond the end of the contact, where w < 0 and time runs backward.
+    part = (time - t0) / (t1 - t0) if time < t1 and w1 > 0.0 else 0.5
+    for _ in range(60):
+        # dt/ds = 2 w, d2t/ds2 = -2 v
+        found = quintic(part, h, t0, 2.0 * w0, -2.0 * v0, t1, 2.0 * w1, -2.0 * v1)
+        w = quintic(part, h, w0, -v0, -a0, w1, -v1, -a1)
+        if found > time or w <= 0.0:
+            high = part
+        else:
+            low = part
+        change = (time - found) / (2.0 * w * h) if w > 0.0 else 1.0
+        if abs(change) <= 1e-10:
+            break
+        part += change
+        if not (low < part < high):
+            part = 0.5 * (low + high)
+    return part
+
+
+@compiled
+def note_samples(
+    pool: Any,
+    i: int,
+    which: int,
+    until: float,
+    last: bool,
+    fine: bool,
+    slot: Any,
+    grid: Any,
+    x: Any,
+    b: float,
+) -> None:
+    """Take the samples of a lane's latest step before the time `until`, and with `last` at it.
+
+    With `fine`, samples take one more force to be exact to an order more.
+    """
+    m = int(slot[R.MEMBER])
+    sample = int(slot[R.NEXT_SAMPLE])
+    sixth = np.nan if fine and which != R.CONTACT_POOL else 0.0
+    while sample < grid.size and (grid[sample] < until or (last and grid[sample] == until)):
+        if sixth != sixth:  # noqa: PLR0124
+            sixth = sixth_term(pool, i, which)
+        x[m, sample] = position_in_step(pool, i, which, grid[sample], b, sixth, fine)
+        sample += 1
+    slot[R.NEXT_SAMPLE] = sample
+    due = grid[sample] if sample < grid.size else np.inf
+    pool[R.SAMPLE * R.BLOCK + i] = min(due, slot[R.NEXT_TIME])
+
+
+@compiled
+def note_strobes(
+    pool: Any,
+    i: int,
+    which: int,
+    until: float,
+    last: bool,
+    slot: Any,
+    times: Any,
+    strobes: Any,
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Drive,
+    hammer: Hammer,
+) -> None:
+    """Take the strobes of a lane's latest step before the time `until`, and with `last` at it.
+
+    A strobe at a node waits for the node's mode, which the next step has.
+    """
+    strobe = int(slot[R.NEXT_STROBE])
+    t0 = pool[R.OLD_T * R.BLOCK + i]
+    x0 = pool[R.OLD_X * R.BLOCK + i]
+    v0 = pool[R.OLD_V * R.BLOCK + i]
+    mode = MODE_OF[which]
+    kept = 0.0
+    if which == R.CONTACT_POOL:
+        kept = x0
+        x0 = hammer[POSITION] - kept * kept
+    elif which == R.UNLOADING_POOL:
+        kept = pool[R.PEAK * R.BLOCK + i]
+    edges_at(t0, firings, begins, pieces, replace, under_way, live)
+    while strobe < times.size and (times[strobe] < until or (last and times[strobe] == until)):
+        x, v, _w = state_in_step(times[strobe], t0, x0, v0, mode, kept, hammer, live)
+        strobes[strobe, 0] = x
+        strobes[strobe, 1] = v
+        strobes[strobe, 2] = mode
+        strobes[strobe, 3] = kept if mode == UNLOADING else 0.0
+        strobe += 1
+    slot[R.NEXT_STROBE] = strobe
+    slot[R.NEXT_TIME] = times[strobe] if strobe < times.size else np.inf
+
+
+@compiled
+def enter_contact(pool: Any, i: int, v: float, slot: Any, control: Any) -> int:
+    """Begin a backstop contact at w = 0 with velocity `v`."""
+    unit = contact_unit(v, control)
+    slot[R.UNIT] = unit
+    pool[R.X * R.BLOCK + i] = 0.0
+    pool[R.V * R.BLOCK + i] = v
+    pool[R.A * R.BLOCK + i] = 0.0
+    pool[R.H * R.BLOCK + i] = slot[R.CONTACT_STEP] * unit
+    pool[R.FIRST * R.BLOCK + i] = 0.0
+    return R.CONTACT_POOL
+
+
+@compiled
+def enter(pool: Any, i: int, t: float, x: float, v: float, mode: int, h: float, memory: float) -> None:
+    """Begin a mode off the backstop."""
+    pool[R.X * R.BLOCK + i] = x
+    pool[R.V * R.BLOCK + i] = v
+    pool[R.A * R.BLOCK + i] = lane_acceleration(pool, i, t, x, v, mode, memory)
+    pool[R.H * R.BLOCK + i] = h
+    pool[R.FIRST * R.BLOCK + i] = 0.0
+    pool[R.MEMORY * R.BLOCK + i] = memory
+
+
+@compiled
+def remember_step(pool: Any, i: int, which: int, slot: Any) -> None:
+    """Keep the step length with which this mode began, for the next time."""
+    first = pool[R.FIRST * R.BLOCK + i]
+    if first > 0.0:
+        if which == R.FREE_POOL:
+            slot[R.FREE_STEP] = first
+        elif which == R.LOADING_POOL:
+            slot[R.PACK_STEP] = first
+        elif which == R.CONTACT_POOL and slot[R.UNIT] > 0.0:
+            slot[R.CONTACT_STEP] = first / slot[R.UNIT]
+
+
+@compiled
+def turn_in_pack(
+    pool: Any,
+    i: int,
+    t: float,
+    x: float,
+    which: int,
+    slot: Any,
+    dots: Any,
+    hammer: Hammer,
+    control: Any,
+) -> int:
+    """Go on after the velocity became zero inside the pack at displacement `x`.
+
+    As `printhammer.kernel.single.run.reversed_mode` tells; where the armature would rest, the member leaves.
+    """
+    # As in the plain kernel: swings too small to be told from rest would never end.
+    still = R.STILL * control[1] * control[1] / control[0]
+    inward = lane_acceleration(pool, i, t, x, 0.0, LOADING, 0.0) > 0.0
+    if (inward and which == R.LOADING_POOL) or (RELOAD_ALONG_UNLOADING and which == R.UNLOADING_POOL):
+        return LEAVES
+    dot = int(slot[R.DOT])
+    if dot >= 0 and not dots[dot, 4] >= x - hammer[FRONT]:
+        dots[dot, 4] = x - hammer[FRONT]
+        dots[dot, 5] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
+    if inward:
+        enter(pool, i, t, x, 0.0, LOADING, slot[R.PACK_STEP], 0.0)
+        return R.LOADING_POOL if pool[R.A * R.BLOCK + i] > still else LEAVES
+    enter(pool, i, t, x, 0.0, UNLOADING, slot[R.PACK_STEP], pack_memory(hammer[PACK:BACKSTOP_PART], x))
+    pool[R.PEAK * R.BLOCK + i] = x
+    return R.UNLOADING_POOL if pool[R.A * R.BLOCK + i] < -still else LEAVES
+
+
+@compiled
+def after_switch(
+    switch: int,
+    pool: Any,
+    i: int,
+    t: float,
+    x: float,
+    v: float,
+    which: int,
+    slot: Any,
+    dots: Any,
+    want_dots: bool,
+    firings: Any,
+    hammer: Hammer,
+    control: Any,
+) -> int:
+    """Go on after a switch; return the pool in which, or that the member leaves the lanes."""
+    remember_step(pool, i, which, slot)
+    pool[R.T * R.BLOCK + i] = t
+    if switch == REACHED_BACKSTOP:
+        if not v < 0.0:
+            return LEAVES
+        return enter_contact(pool, i, v, slot, control)
+    if switch == REACHED_FRONT:
+        if not v > 0.0:
+            return LEAVES
+        slot[R.DOT] = -1.0
+        fired = firing_before(t, firings)
+        if want_dots and fired >= 0:
+            dots[fired, 0] += 1.0
+            if dots[fired, 0] == 1.0:
+                slot[R.DOT] = fired
+                dots[fired, 1] = t
+                dots[fired, 2] = v
+        enter(pool, i, t, x, v, LOADING, slot[R.PACK_STEP], 0.0)
+        return R.LOADING_POOL
+    if switch == REVERSAL:
+        if x <= hammer[FRONT]:
+            return LEAVES
+        return turn_in_pack(pool, i, t, x, which, slot, dots, hammer, control)
+    if switch == LEFT_FRONT:
+        if int(slot[R.DOT]) >= 0:
+            dots[int(slot[R.DOT]), 3] = t
+        slot[R.DOT] = -1.0
+        if not v < 0.0:
+            return LEAVES
+        enter(pool, i, t, hammer[FRONT], v, FREE, slot[R.FREE_STEP], 0.0)
+        return R.FREE_POOL
+    if switch == LEFT_BACKSTOP:
+        if not v > 0.0:
+            return LEAVES
+        enter(pool, i, t, hammer[POSITION], v, FREE, slot[R.FREE_STEP], 0.0)
+        return R.FREE_POOL
+    return LEAVES
+
+
+@compiled
+def new_edge(
+    pool: Any,
+    i: int,
+    which: int,
+    end: float,
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Drive,
+    rates: Any,
+) -> None:
+    """Take over the pieces of the drive that begin at the time of a lane."""
+    t = pool[R.T * R.BLOCK + i]
+    _first, _last, edge = edges_at(t, firings, begins, pieces, replace, under_way, live)
+    add_up(t, live, rates, pool, i)
+    pool[R.NEXT * R.BLOCK + i] = min(edge, end)
+    x, v = pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i]
+    if which == R.CONTACT_POOL:
+        pool[R.A * R.BLOCK + i] = lane_contact_rate(pool, i, t, x, v)
+    else:
+        memory = pool[R.MEMORY * R.BLOCK + i]
+        pool[R.A * R.BLOCK + i] = lane_acceleration(pool, i, t, x, v, MODE_OF[which], memory)
+
+
+@compiled
+def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Hammer) -> None:
+    """Enter the deepest point so far of a pack contact that is open at the end."""
+    dot = int(slot[R.DOT])
+    if which == R.LOADING_POOL and dot >= 0:
+        x = pool[R.X * R.BLOCK + i]
+        if not dots[dot, 4] >= x - hammer[FRONT]:
+            dots[dot, 4] = x - hammer[FRONT]
+            dots[dot, 5] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
+
+
+@compiled
+def look_off_backstop(pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Any) -> Any:
+    """Find and locate the switch in a step off the backstop.
+
+    Returns the switch (NO_SWITCH, UNRESOLVED, or its name) and time, displacement and velocity there.
+    """
+    start = (pool[i], pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i], pool[R.A * R.BLOCK + i])
+    h = pool[R.LENGTH * R.BLOCK + i]
+    end = (
+        pool[R.NEW_T * R.BLOCK + i],
+        pool[R.NEW_X * R.BLOCK + i],
+        pool[R.NEW_V * R.BLOCK + i],
+        pool[R.NEW_A * R.BLOCK + i],
+    )
+    mode = MODE_OF[which]
+    memory = pool[R.MEMORY * R.BLOCK + i]
+    switch, fraction, upper, level, sign = first_switch(
+        start, end, h, mode, memory, pool[R.PEAK * R.BLOCK + i], hammer, live, control
+    )
+    if switch in (NO_SWITCH, UNRESOLVED):
+        return switch, end[0], end[1], end[2]
+    if switch == REVERSAL:
+        turn = land_on_reversal(start, h, fraction, sign, mode, memory, hammer, live, control)
+        return switch, turn[0], turn[1], 0.0
+    found = land_on_level(start, h, fraction, upper, level, sign, mode, memory, hammer, live, control)
+    return switch, found[0], found[1], found[2]
+
+
+@compiled
+def look_in_contact(pool: Any, i: int, hammer: Hammer, live: Drive, control: Any) -> Any:
+    """Find and locate the switch in a step in the backstop; as `look_off_backstop`, with w, v and dv/ds."""
+    t, w, v, kv = pool[i], pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i], pool[R.A * R.BLOCK + i]
+    h = pool[R.LENGTH * R.BLOCK + i]
+    t1, w1 = pool[R.NEW_T * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
+    v1, kv1 = pool[R.NEW_V * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
+    t_next = pool[R.NEXT * R.BLOCK + i]
+    code = rises_through(-w, v, kv, -w1, v1, kv1, h, 0.0)
+    if code in (UNRESOLVED, NEAR_TOUCH):
+        return UNRESOLVED, t1, w1, v1, kv1
+    switch = NO_SWITCH
+    upper = 1.0
+    if code == REACHED_FRONT:
+        guess = position_root(-w, v, kv, -w1, v1, kv1, h, 0.0, 1.0)
+        t1, w1, v1, kv1, upper = leave((t, w, v, kv), h, guess, 1.0, hammer, live, control)
+        switch = LEFT_BACKSTOP
+    if t1 >= t_next:
+        if t1 > t_next:
+            t1, w1, v1, kv1 = reach_time((t, w, v, kv), h, upper, t1, t_next, hammer, live)
+            switch = EDGE
+        elif switch == NO_SWITCH:
+            switch = EDGE
+    return switch, t1, w1, v1, kv1
+
+
+@compiled
+def locate(
+    pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Any
+) -> tuple[int, float, float, float]:
+    """Find the switch in the latest step with the plain kernel: its name, time, displacement, velocity."""
+    if which == R.CONTACT_POOL:
+        switch, t, w, v, _kv = look_in_contact(pool, i, hammer, live, control)
+        return switch, t, w, v
+    switch, t, x, v = look_off_backstop(pool, i, which, hammer, live, control)
+    return switch, t, x, v

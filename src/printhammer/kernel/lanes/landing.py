@@ -1,0 +1,209 @@
+"""How a lane comes to end its step on a switch: guess where, step there, close the small rest.
+
+The guess comes from the quintic of the step that held the switch; the step that follows it is an ordinary one
+of the lane. The rest is closed with the derivatives at its end; where that is not good enough, the plain
+kernel locates the switch.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.lanes import layout as R
+from printhammer.kernel.methods.hermite import position_root, rises_through, turns_down, velocity_root
+from printhammer.kernel.model.layout import FRONT, POSITION
+from printhammer.kernel.model.modes import (
+    EDGE,
+    LEFT_BACKSTOP,
+    LEFT_FRONT,
+    NEAR_TOUCH,
+    NO_SWITCH,
+    REACHED_BACKSTOP,
+    REACHED_FRONT,
+    REVERSAL,
+    UNRESOLVED,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.lanes.events import (
+        part_at,
+        quintic,
+    )
+    from printhammer.kernel.model.forces import Hammer
+
+CLOSE = 1e-3
+"""Largest rest, in lengths of the step, that is closed with the derivatives."""
+
+GOES_ON = -1
+"""In place of a switch: the lane has to take another step before one can tell."""
+
+
+@inlined
+def rises_in_step(pool: Any, i: int, level: float, sign: float) -> int:
+    """Tell whether sign * x rises through sign * `level` in the latest step, see `rises_through`."""
+    return rises_through(
+        sign * pool[R.X * R.BLOCK + i],
+        sign * pool[R.V * R.BLOCK + i],
+        sign * pool[R.A * R.BLOCK + i],
+        sign * pool[R.NEW_X * R.BLOCK + i],
+        sign * pool[R.NEW_V * R.BLOCK + i],
+        sign * pool[R.NEW_A * R.BLOCK + i],
+        pool[R.LENGTH * R.BLOCK + i],
+        sign * level,
+    )
+
+
+@inlined
+def level_part(pool: Any, i: int, level: float, sign: float) -> float:
+    """Return the part of the latest step where sign * x rises through sign * `level`."""
+    return position_root(
+        sign * pool[R.X * R.BLOCK + i],
+        sign * pool[R.V * R.BLOCK + i],
+        sign * pool[R.A * R.BLOCK + i],
+        sign * pool[R.NEW_X * R.BLOCK + i],
+        sign * pool[R.NEW_V * R.BLOCK + i],
+        sign * pool[R.NEW_A * R.BLOCK + i],
+        pool[R.LENGTH * R.BLOCK + i],
+        sign * level,
+        1.0,
+    )
+
+
+@compiled
+def guess_free(pool: Any, i: int, hammer: Hammer) -> tuple[int, float]:
+    """Return the switch inside the latest step in free flight, and the part of the step where it may be."""
+    down = rises_in_step(pool, i, hammer[POSITION], -1.0)
+    up = rises_in_step(pool, i, hammer[FRONT], 1.0)
+    if UNRESOLVED in (down, up):
+        return UNRESOLVED, 1.0
+    if NEAR_TOUCH in (down, up):
+        return NEAR_TOUCH, 1.0
+    switch, part = NO_SWITCH, 2.0
+    if down == REACHED_FRONT:
+        switch, part = REACHED_BACKSTOP, level_part(pool, i, hammer[POSITION], -1.0)
+    if up == REACHED_FRONT:
+        other = level_part(pool, i, hammer[FRONT], 1.0)
+        if other < part:
+            switch, part = REACHED_FRONT, other
+    return switch, part
+
+
+@compiled
+def guess_in_pack(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
+    """Return the switch inside the latest step in the pack, and the part of the step where it may be."""
+    h = pool[R.LENGTH * R.BLOCK + i]
+    turn = -1.0 if which == R.UNLOADING_POOL else 1.0
+    v0, a0 = turn * pool[R.V * R.BLOCK + i], turn * pool[R.A * R.BLOCK + i]
+    v1, a1 = turn * pool[R.NEW_V * R.BLOCK + i], turn * pool[R.NEW_A * R.BLOCK + i]
+    switch, part = NO_SWITCH, 2.0
+    if which == R.UNLOADING_POOL:
+        code = rises_in_step(pool, i, hammer[FRONT], -1.0)
+        if code in (UNRESOLVED, NEAR_TOUCH):
+            return code, 1.0
+        if code == REACHED_FRONT:
+            switch, part = LEFT_FRONT, level_part(pool, i, hammer[FRONT], -1.0)
+    code = turns_down(turn * pool[R.X * R.BLOCK + i], v0, a0, turn * pool[R.NEW_X * R.BLOCK + i], v1, a1, h)
+    if code == UNRESOLVED:
+        return UNRESOLVED, 1.0
+    if code == REACHED_FRONT:
+        other = velocity_root(v0, a0, v1, a1, h)
+        if other < part:
+            switch, part = REVERSAL, other
+    return switch, part
+
+
+@compiled
+def guess_in_contact(pool: Any, i: int) -> tuple[int, float]:
+    """Return the switch inside the latest step in the backstop, and the part of the step where it may be."""
+    t0, t1 = pool[i], pool[R.NEW_T * R.BLOCK + i]
+    w0, w1 = pool[R.X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
+    v0, v1 = pool[R.V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
+    kv0, kv1 = pool[R.A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
+    h = pool[R.LENGTH * R.BLOCK + i]
+    t_next = pool[R.NEXT * R.BLOCK + i]
+    code = rises_through(-w0, v0, kv0, -w1, v1, kv1, h, 0.0)
+    if code in (UNRESOLVED, NEAR_TOUCH):
+        return UNRESOLVED, 1.0
+    if code == REACHED_FRONT:
+        part = position_root(-w0, v0, kv0, -w1, v1, kv1, h, 0.0, 1.0)
+        if quintic(part, h, t0, 2.0 * w0, -2.0 * v0, t1, 2.0 * w1, -2.0 * v1) < t_next:
+            return LEFT_BACKSTOP, part
+        return EDGE, part_at(pool, i, t_next)
+    if t1 == t_next:
+        return EDGE, 1.0
+    if t1 > t_next:
+        return EDGE, part_at(pool, i, t_next)
+    return NO_SWITCH, 1.0
+
+
+@compiled
+def guess(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
+    """Return the switch inside the latest step of a lane, and the part of the step where it may be."""
+    if which == R.CONTACT_POOL:
+        return guess_in_contact(pool, i)
+    if which == R.FREE_POOL:
+        return guess_free(pool, i, hammer)
+    return guess_in_pack(pool, i, which, hammer)
+
+
+@compiled
+def aim(pool: Any, i: int, slot: Any, switch: int, part: float) -> None:
+    """Have the next step of a lane end where the switch is thought to be."""
+    slot[R.SAVED_STEP] = pool[R.FOLLOWING * R.BLOCK + i]
+    slot[R.ATTEMPTS] = 0.0
+    pool[R.H * R.BLOCK + i] = part * pool[R.LENGTH * R.BLOCK + i]
+    pool[R.LANDING * R.BLOCK + i] = switch
+
+
+@compiled
+def land(
+    pool: Any, i: int, which: int, slot: Any, hammer: Hammer, control: Any
+) -> tuple[int, float, float, float]:
+    """Close the rest between the end of a lane's step and the switch it aims at.
+
+    Returns
+    -------
+    tuple
+        The switch, or GOES_ON, and time, displacement (w in the contact pool) and velocity there.
+    """
+    switch = int(pool[R.LANDING * R.BLOCK + i])
+    h = pool[R.LENGTH * R.BLOCK + i]
+    t, x = pool[R.NEW_T * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
+    v, a = pool[R.NEW_V * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
+    # A tenth of the smaller allowance is the tolerance; the next order is far below what is closed.
+    allowed = 10.0 * control[3] * control[0]
+    if which == R.CONTACT_POOL:
+        if switch == EDGE:
+            target = pool[R.NEXT * R.BLOCK + i]
+            rest = (target - t) / (2.0 * x)
+            good = x > 0.0 and abs(rest) * (abs(v) + abs(a * rest)) <= 1e-4 * x
+            rest += 0.5 * v * rest * rest / x
+            t, x, v = target, x - v * rest - 0.5 * a * rest * rest, v + a * rest
+        else:
+            rest = x / v
+            good = abs(a * rest) <= 1e-4 * abs(v)
+            t, x, v = t + x * rest, 0.0, v + 0.5 * a * rest
+    elif switch == REVERSAL:
+        rest = -v / a
+        good = abs(0.5 * v * rest) <= allowed
+        t, x, v = t + rest, x + 0.5 * v * rest, 0.0
+    else:
+        level = hammer[POSITION] if switch == REACHED_BACKSTOP else hammer[FRONT]
+        rest = (level - x) / v
+        good = abs(0.5 * a * rest * rest) <= allowed and abs(a * rest) <= 1e-3 * abs(v)
+        rest -= 0.5 * a * rest * rest / v
+        t, x, v = t + rest, level, v + a * rest
+    if good and abs(rest) <= CLOSE * h and t >= pool[i]:
+        pool[R.LANDING * R.BLOCK + i] = 0.0
+        pool[R.H * R.BLOCK + i] = slot[R.SAVED_STEP]
+        return switch, t, x, v
+    slot[R.ATTEMPTS] += 1.0
+    length = h + rest
+    if slot[R.ATTEMPTS] < 4.0 and 0.0 < length < 2.0 * h:
+        pool[R.H * R.BLOCK + i] = length
+    else:
+        pool[R.LANDING * R.BLOCK + i] = 0.0
+        pool[R.H * R.BLOCK + i] = slot[R.SAVED_STEP]
+        slot[R.CAREFUL] = 1.0
+    return GOES_ON, t, x, v

@@ -1,0 +1,451 @@
+"""Many runs side by side: members in the same mode take their steps together, each with its own length.
+
+A thread has up to `LANES` members under way. They lie in pools, one for each mode; a sweep takes one step in
+every lane of every pool, then looks after the lanes in which something happened. A member that is done makes
+room for the next. No member's numbers depend on any other's: blocks are always computed in full, idle lanes
+included, by the same machine code.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, entry, inlined
+from printhammer.kernel.lanes import layout as R
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING
+from printhammer.kernel.model.modes import BACKSTOP, EDGE, FREE, NEAR_TOUCH, NO_SWITCH, OK, UNRESOLVED
+
+if TYPE_CHECKING:
+    from printhammer.kernel.lanes.drive import add_up
+    from printhammer.kernel.lanes.events import (
+        DONE,
+        LEAVES,
+        STAYS,
+        after_switch,
+        close_member,
+        copy_lane,
+        locate,
+        new_edge,
+        note_samples,
+        note_strobes,
+        place,
+    )
+    from printhammer.kernel.lanes.landing import GOES_ON, aim, guess, land
+    from printhammer.kernel.lanes.steps import (
+        contact_block,
+        free_block,
+        loading_block,
+        unloading_block,
+    )
+    from printhammer.kernel.methods.contact import contact_rate
+    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.laws import CUBIC, SINE
+    from printhammer.kernel.model.pulses import edges_at
+    from printhammer.kernel.single.run import first_mode
+    from printhammer.kernel.single.stretch import blank_states, clear_dots
+
+
+FINE = 1e-6
+"""Allowance of the order 7 estimate below which samples are taken with care."""
+
+
+@compiled
+def place_constants(
+    pool: Any, i: int, hammer: Hammer, control: Any, low: float, high: float, rates: Any
+) -> None:
+    """Write what belongs to a member's hammer and waveform into a lane."""
+    for row in range(R.RATES_WIDTH):
+        pool[(R.RATES + row) * R.BLOCK + i] = rates[row]
+    at = R.HAMMER * R.BLOCK + i
+    for row in range(R.CONSTANTS):
+        pool[at + row * R.BLOCK] = 0.0
+    for row in range(3):
+        pool[at + row * R.BLOCK] = hammer[row]
+    for row in range(R.PACK - R.SPRING):
+        pool[at + (R.SPRING + row) * R.BLOCK] = hammer[SPRING + row]
+    for row in range(R.BACKSTOP_PART - R.PACK):
+        pool[at + (R.PACK + row) * R.BLOCK] = hammer[PACK + row]
+    for row in range(R.MAGNET - R.BACKSTOP_PART):
+        pool[at + (R.BACKSTOP_PART + row) * R.BLOCK] = hammer[BACKSTOP_PART + row]
+    for row in range(min(R.CONSTANTS - R.MAGNET, hammer.size - MAGNET)):
+        pool[at + (R.MAGNET + row) * R.BLOCK] = hammer[MAGNET + row]
+    for row in range(4):
+        pool[(R.CONTROL + row) * R.BLOCK + i] = control[row]
+    pool[R.LOWEST * R.BLOCK + i] = low
+    pool[R.HIGHEST * R.BLOCK + i] = high
+
+
+@compiled
+def begin_member(
+    pool: Any,
+    i: int,
+    state: Any,
+    end: float,
+    rates: Any,
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Any,
+    hammer: Hammer,
+    control: Any,
+    slot: Any,
+) -> int:
+    """Put a member at its start into a lane; return its pool, or that the lanes are not for it."""
+    t, x, v = state[0], state[1], state[2]
+    scale = control[0] / control[1]
+    slot[R.FREE_STEP] = 0.02 * scale
+    slot[R.PACK_STEP] = 0.005 * scale
+    slot[R.CONTACT_STEP] = 0.05
+    slot[R.UNIT] = 0.0
+    slot[R.DOT] = -1.0
+    slot[R.END] = end
+    slot[R.CAREFUL] = 0.0
+    _first, _last, edge = edges_at(t, firings, begins, pieces, replace, under_way, live)
+    a = acceleration(t, x, v, FREE, 0.0, hammer, live)
+    mode = first_mode(x, v, a, hammer)
+    if state[3] >= 0.0 or not end > t:
+        return LEAVES
+    for row in range(R.RATES):
+        pool[row * R.BLOCK + i] = 0.0
+    add_up(t, live, rates, pool, i)
+    pool[i] = t
+    pool[R.NEXT * R.BLOCK + i] = min(edge, end)
+    pool[R.V * R.BLOCK + i] = v
+    if mode == FREE:
+        if x == hammer[POSITION] or x == hammer[FRONT]:
+            return LEAVES
+        pool[R.X * R.BLOCK + i] = x
+        pool[R.A * R.BLOCK + i] = a
+        pool[R.H * R.BLOCK + i] = slot[R.FREE_STEP]
+        return R.FREE_POOL
+    if mode == BACKSTOP and x < hammer[POSITION]:
+        w = math.sqrt(hammer[POSITION] - x)
+        pool[R.X * R.BLOCK + i] = w
+        pool[R.A * R.BLOCK + i] = contact_rate(w, v, t, hammer, live)
+        pool[R.H * R.BLOCK + i] = slot[R.FREE_STEP] / (2.0 * w)
+        return R.CONTACT_POOL
+    return LEAVES
+
+
+@inlined
+def step_block(which: int, pool: Any, begin: int) -> None:
+    """Take a step in every lane of a block, idle ones included."""
+    if which == R.FREE_POOL:
+        free_block(pool, begin)
+    elif which == R.LOADING_POOL:
+        loading_block(pool, begin)
+    elif which == R.UNLOADING_POOL:
+        unloading_block(pool, begin)
+    else:
+        contact_block(pool, begin)
+
+
+@inlined
+def look_after(
+    pool: Any,
+    i: int,
+    which: int,
+    slot: Any,
+    rates: Any,
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Any,
+    hammer: Hammer,
+    control: Any,
+    grid: Any,
+    times: Any,
+    strobes: Any,
+    x_of: Any,
+    dots: Any,
+    want_dots: bool,
+) -> int:
+    """Do what the event of a lane asks for; return the pool where the member goes on."""
+    event = int(pool[R.EVENT * R.BLOCK + i])
+    switch = NO_SWITCH
+    t, x, v = pool[i], 0.0, 0.0
+    if event & int(R.STUCK):
+        return LEAVES
+    if event & int(R.SWITCH):
+        if slot[R.CAREFUL] != 0.0:
+            switch = NEAR_TOUCH
+        elif pool[R.LANDING * R.BLOCK + i] != 0.0:
+            switch, t, x, v = land(pool, i, which, slot, hammer, control)
+            if switch == GOES_ON:
+                return STAYS
+        else:
+            switch, part = guess(pool, i, which, hammer)
+            t, x = pool[R.NEW_T * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
+            v = pool[R.NEW_V * R.BLOCK + i]
+            if switch not in (NO_SWITCH, UNRESOLVED, NEAR_TOUCH) and part < 1.0:
+                aim(pool, i, slot, switch, part)
+                return STAYS
+        if switch == NEAR_TOUCH:
+            slot[R.CAREFUL] = 0.0
+            edges_at(pool[i], firings, begins, pieces, replace, under_way, live)
+            switch, t, x, v = locate(pool, i, which, hammer, live, control)
+        if switch == UNRESOLVED:
+            pool[R.H * R.BLOCK + i] = 0.5 * pool[R.LENGTH * R.BLOCK + i]
+            return STAYS if pool[R.H * R.BLOCK + i] > 1e-12 * control[0] / control[1] else LEAVES
+        if switch in (NO_SWITCH, EDGE):
+            pool[i] = t
+            pool[R.X * R.BLOCK + i] = x
+            pool[R.V * R.BLOCK + i] = v
+            pool[R.A * R.BLOCK + i] = pool[R.NEW_A * R.BLOCK + i]
+    done = t >= slot[R.END] and switch in (NO_SWITCH, EDGE)
+    if pool[R.SAMPLE * R.BLOCK + i] <= t:
+        if slot[R.NEXT_TIME] <= t:
+            note_strobes(
+                pool,
+                i,
+                which,
+                t,
+                done,
+                slot,
+                times,
+                strobes,
+                firings,
+                begins,
+                pieces,
+                replace,
+                under_way,
+                live,
+                hammer,
+            )
+        note_samples(pool, i, which, t, done, control[3] < FINE, slot, grid, x_of, hammer[POSITION])
+    if done:
+        close_member(pool, i, which, slot, dots, hammer)
+        return DONE
+    target = STAYS
+    if switch not in (NO_SWITCH, EDGE):
+        target = after_switch(
+            switch, pool, i, t, x, v, which, slot, dots, want_dots, firings, hammer, control
+        )
+        if target == LEAVES:
+            return LEAVES
+        which = target
+    if t >= pool[R.NEXT * R.BLOCK + i]:
+        new_edge(pool, i, which, slot[R.END], firings, begins, pieces, replace, under_way, live, rates)
+    return target
+
+
+@entry
+def lanes(
+    which: Any,
+    hammer_of: Any,
+    hammers: Any,
+    controls: Any,
+    bounds: Any,
+    waveform_of: Any,
+    piece_starts: Any,
+    pieces: Any,
+    rates: Any,
+    firing_starts: Any,
+    firings: Any,
+    begins: Any,
+    replace: bool,
+    states: Any,
+    ends: Any,
+    strobe_starts: Any,
+    strobe_times: Any,
+    grid: Any,
+    want_dots: bool,
+    under_way: Any,
+    live: Any,
+    uniform: bool,
+    pools: Any,
+    counts: Any,
+    members_in: Any,
+    slots: Any,
+    spare: Any,
+    left_over: Any,
+    status: Any,
+    reached: Any,
+    steps: Any,
+    dots: Any,
+    strobes: Any,
+    x: Any,
+) -> int:
+    """Integrate the members `which` and fill their rows of the results.
+
+    Parameters as in :func:`printhammer.kernel.lanes.members.members`, and
+
+    rates : float64 array, shape (W, 3)
+        Rates of the two exponentials and angular frequency of the sine in the waveforms of each set.
+    under_way, live : array
+        Working space as in :func:`printhammer.kernel.single.run.run`.
+    uniform : bool
+        Whether all members have the same hammer and waveforms.
+    pools : float64 array, shape (POOLS + 1, POOL_SIZE)
+    counts : int64 array, shape (POOLS,)
+    members_in : int64 array, shape (POOLS, LANES)
+    slots : float64 array, shape (LANES, SLOT_WIDTH)
+    spare : int64 array, shape (LANES,)
+        Working space.
+    left_over : int64 array, shape of `which`
+        Filled with the numbers of the members that the lanes are not for.
+
+    Returns
+    -------
+    int
+        How many these are.
+    """
+    left = 0
+    waiting = 0
+    stage = pools[R.POOLS]
+    spares = R.LANES
+    carried = R.OWN
+    if uniform:
+        carried = R.ANY_DRIVE if CUBIC or SINE else R.EXPONENTIAL_DRIVE
+    for p in range(R.POOLS):
+        counts[p] = 0
+    for lane in range(R.LANES):
+        spare[lane] = lane
+    if uniform and which.size > 0:
+        row = hammer_of[which[0]]
+        control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
+        for p in range(R.POOLS):
+            for lane in range(R.LANES):
+                place_constants(
+                    pools[p],
+                    place(lane),
+                    hammers[row],
+                    control,
+                    lowest(bounds[row]),
+                    highest(bounds[row]),
+                    rates[waveform_of[which[0]]],
+                )
+    while True:
+        while spares > 0 and waiting < which.size:
+            m = which[waiting]
+            waiting += 1
+            number = spare[spares - 1]
+            slot = slots[number]
+            row = hammer_of[m]
+            control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
+            wave = waveform_of[m]
+            if want_dots:
+                clear_dots(dots[firing_starts[m] : firing_starts[m + 1]])
+            slot[R.MEMBER] = m
+            slot[R.NEXT_SAMPLE] = 0
+            slot[R.NEXT_STROBE] = 0
+            first = strobe_starts[m]
+            slot[R.NEXT_TIME] = strobe_times[first] if first < strobe_starts[m + 1] else math.inf
+            target = begin_member(
+                stage,
+                0,
+                states[m],
+                ends[m],
+                rates[wave],
+                firings[firing_starts[m] : firing_starts[m + 1]],
+                begins[firing_starts[m] : firing_starts[m + 1]],
+                pieces[piece_starts[wave] : piece_starts[wave + 1]],
+                replace,
+                under_way,
+                live,
+                hammers[row],
+                control,
+                slot,
+            )
+            if target == LEAVES:
+                left_over[left] = m
+                left += 1
+                continue
+            if not uniform:
+                place_constants(
+                    stage, 0, hammers[row], control, lowest(bounds[row]), highest(bounds[row]), rates[wave]
+                )
+            spares -= 1
+            copy_lane(stage, 0, pools[target], place(counts[target]), carried)
+            members_in[target, counts[target]] = number
+            counts[target] += 1
+        if spares == R.LANES:
+            return left
+        for p in range(R.POOLS):
+            pool = pools[p]
+            # From the last lane to the first: what fills a gap has had its step.
+            top = counts[p] - 1
+            for lane in range(top, -1, -1):
+                if lane == top or lane % R.BLOCK == R.BLOCK - 1:
+                    # The rows of a block are at hand right after its step.
+                    step_block(p, pool, (lane // R.BLOCK) * R.BLOCK_SIZE)
+                i = place(lane)
+                if pool[R.EVENT * R.BLOCK + i] == 0.0:
+                    continue
+                number = members_in[p, lane]
+                slot = slots[number]
+                m = int(slot[R.MEMBER])
+                row = hammer_of[m]
+                if pool[R.EVENT * R.BLOCK + i] == R.SAMPLED and slot[R.NEXT_TIME] > pool[i]:
+                    fine = controls[row, 3] < FINE
+                    note_samples(pool, i, p, pool[i], False, fine, slot, grid, x, hammers[row, POSITION])
+                    continue
+                control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
+                wave = waveform_of[m]
+                own_times = strobe_times[strobe_starts[m] : strobe_starts[m + 1]]
+                own_strobes = strobes[strobe_starts[m] : strobe_starts[m + 1]]
+                target = look_after(
+                    pool,
+                    i,
+                    p,
+                    slot,
+                    rates[wave],
+                    firings[firing_starts[m] : firing_starts[m + 1]],
+                    begins[firing_starts[m] : firing_starts[m + 1]],
+                    pieces[piece_starts[wave] : piece_starts[wave + 1]],
+                    replace,
+                    under_way,
+                    live,
+                    hammers[row],
+                    control,
+                    grid,
+                    own_times,
+                    own_strobes,
+                    x,
+                    dots[firing_starts[m] : firing_starts[m + 1]],
+                    want_dots,
+                )
+                if target in (STAYS, p):
+                    continue
+                if target >= 0:
+                    copy_lane(pool, i, pools[target], place(counts[target]), carried)
+                    members_in[target, counts[target]] = number
+                    counts[target] += 1
+                else:
+                    if target == DONE:
+                        status[m] = OK
+                        reached[m] = pool[i]
+                        steps[m] = int(pool[R.STEPS * R.BLOCK + i])
+                        blank_states(
+                            own_strobes,
+                            int(slot[R.NEXT_STROBE]),
+                            own_times.size,
+                            x[m],
+                            int(slot[R.NEXT_SAMPLE]),
+                            grid.size,
+                        )
+                    else:
+                        left_over[left] = m
+                        left += 1
+                    spare[spares] = number
+                    spares += 1
+                counts[p] -= 1
+                copy_lane(pool, place(counts[p]), pool, i, carried)
+                members_in[p, lane] = members_in[p, counts[p]]
+
+
+@compiled
+def lowest(bounds: Any) -> float:
+    """Return the least displacement of `bounds`, see :func:`printhammer.kernel.single.run.run`."""
+    return float(max(bounds[0], bounds[2] - bounds[3]))
+
+
+@compiled
+def highest(bounds: Any) -> float:
+    """Return the largest displacement of `bounds`."""
+    return float(min(bounds[1], bounds[2] + bounds[3]))

@@ -1,0 +1,279 @@
+"""One step of every lane of a block, in each pool: loops without branches that the compiler vectorises.
+
+A step that cannot hold a switch and keeps the tolerance is made valid at once; the rest is left to
+:mod:`printhammer.kernel.lanes.events`. Whether a step may hold a switch is told by the control points of its
+quintic (position) and cubic (velocity) in the basis of Bernstein: they enclose the curve.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.lanes import layout as R
+from printhammer.kernel.lanes.layout import BLOCK
+from printhammer.kernel.model.modes import FREE, LOADING, UNLOADING
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.methods.nystrom8 import nystrom_step
+    from printhammer.kernel.model.forces import acceleration, backstop_acceleration
+    from printhammer.kernel.model.laws import backstop_elastic
+
+PHASE_LIMIT = 2.0
+
+
+@inlined
+def drive_at(pool: Any, i: int) -> Any:
+    """Return the drive of a lane."""
+    at = R.DRIVE * BLOCK + i
+    return (
+        pool[at],
+        pool[at + BLOCK],
+        pool[at + 2 * BLOCK],
+        pool[at + 3 * BLOCK],
+        pool[at + 4 * BLOCK],
+        pool[at + 5 * BLOCK],
+        pool[at + 6 * BLOCK],
+        pool[at + 7 * BLOCK],
+        pool[at + 8 * BLOCK],
+        pool[at + 9 * BLOCK],
+        pool[at + 10 * BLOCK],
+        pool[at + 11 * BLOCK],
+    )
+
+
+@inlined
+def hammer_at(pool: Any, i: int) -> Any:
+    """Return the constants of a lane's hammer."""
+    at = R.HAMMER * BLOCK + i
+    return (
+        pool[at],
+        pool[at + BLOCK],
+        pool[at + 2 * BLOCK],
+        pool[at + 3 * BLOCK],
+        pool[at + 4 * BLOCK],
+        pool[at + 5 * BLOCK],
+        pool[at + 6 * BLOCK],
+        pool[at + 7 * BLOCK],
+        pool[at + 8 * BLOCK],
+        pool[at + 9 * BLOCK],
+        pool[at + 10 * BLOCK],
+        pool[at + 11 * BLOCK],
+        pool[at + 12 * BLOCK],
+        pool[at + 13 * BLOCK],
+        pool[at + 14 * BLOCK],
+        pool[at + 15 * BLOCK],
+        pool[at + 16 * BLOCK],
+        pool[at + 17 * BLOCK],
+        pool[at + 18 * BLOCK],
+        pool[at + 19 * BLOCK],
+        pool[at + 20 * BLOCK],
+        pool[at + 21 * BLOCK],
+        pool[at + 22 * BLOCK],
+        pool[at + 23 * BLOCK],
+        pool[at + 24 * BLOCK],
+    )
+
+
+@inlined
+def factor(ratio: float) -> float:
+    """Return the factor for the next step length after an error `ratio`; the least one if not finite."""
+    f = 0.85 / math.sqrt(math.sqrt(math.sqrt(max(ratio, 1e-7))))
+    f = min(5.0, max(0.2, f))
+    return f if ratio < 1e6 else 0.2
+
+
+@inlined
+def settle(
+    pool: Any,
+    i: int,
+    t: float,
+    x: float,
+    v: float,
+    a: float,
+    h: float,
+    t1: float,
+    x1: float,
+    v1: float,
+    a1: float,
+    ratio: float,
+    sure: bool,
+    edge: bool,
+    outside: bool,
+) -> None:
+    """Make a step valid or not, and write down what it brought."""
+    small = ratio <= 1.0
+    sure = sure and pool[R.LANDING * BLOCK + i] == 0.0
+    valid = small and sure
+    following = h * factor(ratio)
+    pool[R.OLD_T * BLOCK + i] = t
+    pool[R.OLD_X * BLOCK + i] = x
+    pool[R.OLD_V * BLOCK + i] = v
+    pool[R.OLD_A * BLOCK + i] = a
+    pool[R.NEW_T * BLOCK + i] = t1
+    pool[R.NEW_X * BLOCK + i] = x1
+    pool[R.NEW_V * BLOCK + i] = v1
+    pool[R.NEW_A * BLOCK + i] = a1
+    pool[R.LENGTH * BLOCK + i] = h
+    pool[R.FOLLOWING * BLOCK + i] = following
+    pool[R.T * BLOCK + i] = t1 if valid else t
+    pool[R.X * BLOCK + i] = x1 if valid else x
+    pool[R.V * BLOCK + i] = v1 if valid else v
+    pool[R.A * BLOCK + i] = a1 if valid else a
+    pool[R.H * BLOCK + i] = following
+    first = pool[R.FIRST * BLOCK + i]
+    pool[R.FIRST * BLOCK + i] = following if (small and first == 0.0) else first
+    steps = pool[R.STEPS * BLOCK + i] + 1.0
+    pool[R.STEPS * BLOCK + i] = steps
+    scale = pool[R.CONTROL * BLOCK + i] / pool[(R.CONTROL + 1) * BLOCK + i]
+    event = R.SWITCH if (small and not sure) else 0.0
+    event += R.SAMPLED if (valid and t1 >= pool[R.SAMPLE * BLOCK + i]) else 0.0
+    event += R.AT_EDGE if (valid and edge) else 0.0
+    most = R.MANY_STEPS if following < R.SHORT * abs(t1) else R.MOST_STEPS
+    stuck = not (small or following > 1e-14 * scale) or steps > most
+    event = R.STUCK if (stuck or (small and outside)) else event
+    pool[R.EVENT * BLOCK + i] = event
+
+
+@inlined
+def nystrom_ratio(pool: Any, i: int, error_x: float, error_v: float) -> float:
+    """Return the error estimate of a Nystrom step over what is allowed; not finite stays so."""
+    ratio_x = abs(error_x) / pool[R.CONTROL * BLOCK + i]
+    ratio_v = abs(error_v) / pool[(R.CONTROL + 1) * BLOCK + i]
+    # A sum instead of the larger one keeps a NaN of either.
+    worst = max(ratio_x, ratio_v) + 0.0 * (ratio_x + ratio_v)
+    return float(worst / pool[(R.CONTROL + 2) * BLOCK + i])
+
+
+@inlined
+def time_to_level(distance: float, v: float, a: float) -> float:
+    """Return the time [s] in which a constant acceleration covers `distance` >= 0, or infinity."""
+    under_root = v * v + 2.0 * a * distance
+    root = math.sqrt(max(under_root, 0.0))
+    fast = v > 0.0
+    time = (2.0 * distance if fast else root - v) / (v + root if fast else a)
+    return time if (under_root >= 0.0 and (fast or a > 0.0)) else math.inf
+
+
+@compiled
+def free_block(pool: Any, begin: int) -> None:
+    """Take a step in each lane of a block of members in free flight."""
+    pool = pool[begin:]
+    for i in range(BLOCK):
+        t, x, v, a = pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
+        hammer = hammer_at(pool, i)
+        drive = drive_at(pool, i)
+        h = pool[R.H * BLOCK + i]
+        h = min(h, 1.02 * time_to_level(x - hammer[R.POSITION], -v, -a))
+        h = min(h, 1.02 * time_to_level(hammer[R.FRONT] - x, v, a))
+        left = pool[R.NEXT * BLOCK + i] - t
+        edge = h >= left
+        h = left if edge else h
+        x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, FREE, 0.0, hammer, drive)
+        ratio = nystrom_ratio(pool, i, error_x, error_v)
+        c1 = x + 0.2 * h * v
+        c2 = c1 + 0.2 * h * (v + 0.25 * h * a)
+        c4 = x1 - 0.2 * h * v1
+        c3 = c4 - 0.2 * h * (v1 - 0.25 * h * a1)
+        low = min(c1, c2, c3, c4, x1)
+        high = max(c1, c2, c3, c4, x1)
+        sure = low > hammer[R.POSITION] and high < hammer[R.FRONT]
+        outside = max(min(low, x1), min(x, hammer[R.POSITION])) <= pool[R.LOWEST * BLOCK + i]
+        outside = outside or min(high, hammer[R.FRONT]) >= pool[R.HIGHEST * BLOCK + i]
+        t1 = pool[R.NEXT * BLOCK + i] if edge else t + h
+        settle(pool, i, t, x, v, a, h, t1, x1, v1, a1, ratio, sure, edge, outside)
+
+
+@compiled
+def loading_block(pool: Any, begin: int) -> None:
+    """Take a step in each lane of a block of members on the loading branch of the pack."""
+    pool = pool[begin:]
+    for i in range(BLOCK):
+        t, x, v, a = pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
+        h = pool[R.H * BLOCK + i]
+        left = pool[R.NEXT * BLOCK + i] - t
+        edge = h >= left
+        h = left if edge else h
+        hammer = hammer_at(pool, i)
+        drive = drive_at(pool, i)
+        x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, LOADING, 0.0, hammer, drive)
+        ratio = nystrom_ratio(pool, i, error_x, error_v)
+        low = min(v + h * a / 3.0, v1 - h * a1 / 3.0, v1)
+        sure = low > 0.0
+        outside = max(x1, x + h * v) >= pool[R.HIGHEST * BLOCK + i]
+        t1 = pool[R.NEXT * BLOCK + i] if edge else t + h
+        settle(pool, i, t, x, v, a, h, t1, x1, v1, a1, ratio, sure, edge, outside)
+
+
+@compiled
+def unloading_block(pool: Any, begin: int) -> None:
+    """Take a step in each lane of a block of members on the unloading branch of the pack."""
+    pool = pool[begin:]
+    for i in range(BLOCK):
+        t, x, v, a = pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
+        h = pool[R.H * BLOCK + i]
+        left = pool[R.NEXT * BLOCK + i] - t
+        edge = h >= left
+        h = left if edge else h
+        hammer = hammer_at(pool, i)
+        drive = drive_at(pool, i)
+        memory = pool[R.MEMORY * BLOCK + i]
+        x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, UNLOADING, memory, hammer, drive)
+        # On the steep branch the estimate of order 6 is too small by about this factor.
+        ratio = 5.0 * nystrom_ratio(pool, i, error_x, error_v)
+        high = max(v + h * a / 3.0, v1 - h * a1 / 3.0, v1)
+        sure = high < 0.0 and x1 > hammer[R.FRONT]
+        t1 = pool[R.NEXT * BLOCK + i] if edge else t + h
+        settle(pool, i, t, x, v, a, h, t1, x1, v1, a1, ratio, sure, edge, False)
+
+
+@inlined
+def stiffness(w: float, hammer: Any) -> float:
+    """Return the slope of the elastic force over the compression ``w**2`` [N/m]."""
+    stretch = 1.01 * w
+    rise = backstop_elastic(hammer[R.BACKSTOP_PART : R.MAGNET], stretch) - backstop_elastic(
+        hammer[R.BACKSTOP_PART : R.MAGNET], w
+    )
+    return float(rise / (stretch * stretch - w * w))
+
+
+@compiled
+def contact_block(pool: Any, begin: int) -> None:
+    """Take a step in s in each lane of a block of members in the backstop."""
+    pool = pool[begin:]
+    for i in range(BLOCK):
+        t, w, v, kv = pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
+        h = pool[R.H * BLOCK + i]
+        hammer = hammer_at(pool, i)
+        drive = drive_at(pool, i)
+        scale_x, scale_v = pool[R.CONTROL * BLOCK + i], pool[(R.CONTROL + 1) * BLOCK + i]
+        reach = (pool[R.NEXT * BLOCK + i] - t) / (2.0 * w)
+        h = min(h, reach * (4.0 if v >= 0.0 else 1.01))
+        limit = PHASE_LIMIT / math.sqrt(stiffness(w, hammer) * hammer[R.INVERSE_MASS]) / (2.0 * w)
+        h = min(h, limit if w > 0.0 else math.inf)
+        scales = (scale_x / scale_v, scale_x / (2.0 * max(w, abs(v) * h)), scale_v)
+        t1, w1, v1, kv1, error = contact_step(t, w, v, kv, h, hammer, drive, scales)
+        ratio = error / pool[(R.CONTROL + 3) * BLOCK + i]
+        c1 = w - 0.2 * h * v
+        c2 = c1 - 0.2 * h * (v + 0.25 * h * kv)
+        c4 = w1 + 0.2 * h * v1
+        c3 = c4 + 0.2 * h * (v1 - 0.25 * h * kv1)
+        low = min(c1, c2, c3, c4, w1)
+        high = max(c1, c2, c3, c4, w1)
+        outside = hammer[R.POSITION] - high * high <= pool[R.LOWEST * BLOCK + i]
+        sure = low > 0.0 and t1 < pool[R.NEXT * BLOCK + i]
+        settle(pool, i, t, w, v, kv, h, t1, w1, v1, kv1, ratio, sure, False, outside)
+
+
+@compiled
+def lane_acceleration(pool: Any, i: int, t: float, x: float, v: float, mode: int, memory: float) -> float:
+    """Return the acceleration [m/s^2] of the member in a lane, off the backstop."""
+    return acceleration(t, x, v, mode, memory, hammer_at(pool, i), drive_at(pool, i))
+
+
+@compiled
+def lane_contact_rate(pool: Any, i: int, t: float, w: float, v: float) -> float:
+    """Return dv/ds of the member in a lane, in the backstop."""
+    return 2.0 * w * backstop_acceleration(t, w, v, hammer_at(pool, i), drive_at(pool, i))

@@ -1,0 +1,1 @@
+"""Integration methods, and finding where a step meets a switch."""

@@ -1,0 +1,195 @@
+"""One controlled step in the backstop, in the regularised variables, ending on the first switch inside."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.methods.hermite import position_root, rises_through
+from printhammer.kernel.methods.landing import FAILED, step_factor
+from printhammer.kernel.model.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET, Control
+from printhammer.kernel.model.modes import (
+    ANY_SCALES,
+    EDGE,
+    LEFT_BACKSTOP,
+    NEAR_TOUCH,
+    NO_SWITCH,
+    PUSH_ENDED,
+    REACHED_FRONT,
+    UNRESOLVED,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.model.forces import Hammer, backstop_acceleration
+    from printhammer.kernel.model.laws import BACKSTOP_PULLS, backstop_elastic, backstop_switch
+    from printhammer.kernel.model.pulses import Drive
+
+ContactState = Any
+"""Time, w, velocity, dv/ds."""
+
+PHASE_LIMIT = 2.0
+"""Largest phase of the contact's own oscillation in one step; from about 5 on the method is unstable."""
+
+
+@compiled
+def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> float:
+    """Return dv/ds in the backstop."""
+    return 2.0 * w * backstop_acceleration(t, w, v, hammer, drive)
+
+
+@inlined
+def longest_contact_step(w: float, hammer: Hammer) -> float:
+    """Return the step length in s that the stiffness of the contact at compression ``w**2`` allows."""
+    if w <= 0.0:
+        return math.inf
+    stretch = 1.01 * w
+    softness = (stretch * stretch - w * w) / (
+        backstop_elastic(hammer[BACKSTOP_PART:MAGNET], stretch)
+        - backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w)
+    )
+    if not softness > 0.0:
+        return math.inf
+    return PHASE_LIMIT * math.sqrt(softness / hammer[INVERSE_MASS]) / (2.0 * w)
+
+
+@compiled
+def contact_scales(w: float, v: float, h: float, control: Control) -> tuple[float, float, float]:
+    """Return the scales of errors in time, w and velocity that follow from those of `control`."""
+    return control[0] / control[1], control[0] / (2.0 * max(w, abs(v) * h)), control[1]
+
+
+@compiled
+def leave(
+    start: ContactState,
+    h: float,
+    fraction: float,
+    upper: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+) -> tuple[float, float, float, float, float]:
+    """Return the state at which w falls to zero inside `upper` of a step of `h`, and its fraction."""
+    t, w, v, kv = start
+    low, high = 0.0, upper
+    negligible = 1e-12 * math.sqrt(control[0])
+    for _ in range(80):
+        t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, fraction * h, hammer, drive, ANY_SCALES)
+        if w1 < 0.0:
+            high = fraction
+        else:
+            low = fraction
+        rest = w1 / v1 if v1 != 0.0 else math.inf
+        if abs(0.5 * kv1 * rest * rest) <= negligible and abs(rest) <= 0.01 * h:
+            return t1 + w1 * rest, 0.0, v1 + 0.5 * kv1 * rest, 0.0, fraction
+        if (high - low) < 1e-15:
+            break
+        fraction += rest / h
+        if not (low < fraction < high):
+            fraction = 0.5 * (low + high)
+    return t1, 0.0, v1, 0.0, fraction
+
+
+@compiled
+def reach_time(
+    start: ContactState, h: float, upper: float, t_upper: float, target: float, hammer: Hammer, drive: Drive
+) -> ContactState:
+    """Return the state at time `target` [s] inside `upper` of a step of `h` in s that ends at `t_upper`."""
+    t, w, v, kv = start
+    low, high = 0.0, upper
+    fraction = upper * (target - t) / (t_upper - t)
+    for _ in range(80):
+        if not (low < fraction < high):
+            fraction = 0.5 * (low + high)
+        t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, fraction * h, hammer, drive, ANY_SCALES)
+        if t1 > target:
+            high = fraction
+        else:
+            low = fraction
+        if w1 > 0.0:
+            rest = (target - t1) / (2.0 * w1)
+            if abs(rest) * (abs(v1) + abs(kv1) * abs(rest)) <= 1e-9 * w1:
+                # Second order in the small rest: w and t are then exact to rounding.
+                rest += 0.5 * v1 * rest * rest / w1
+                w_end = w1 - v1 * rest - 0.5 * kv1 * rest * rest
+                return target, w_end, v1 + kv1 * rest, kv1
+            fraction += rest / h
+        if high - low < 1e-15:
+            break
+    return target, max(w1, 0.0), v1, kv1
+
+
+@compiled
+def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive: Drive) -> ContactState:
+    """Return the state at which the backstop lets go, inside `upper` of a step of `h`, found by bisection."""
+    t, w, v, kv = start
+    low, high = 0.0, upper
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        _t1, w1, v1, _kv1, _error = contact_step(t, w, v, kv, middle * h, hammer, drive, ANY_SCALES)
+        if backstop_switch(hammer[BACKSTOP_PART:MAGNET], w1, v1) > 0.0:
+            low = middle
+        else:
+            high = middle
+    t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, high * h, hammer, drive, ANY_SCALES)
+    return t1, w1, v1, kv1
+
+
+@inlined
+def advance_contact(
+    start: ContactState, h: float, t_next: float, hammer: Hammer, drive: Drive, control: Control
+) -> tuple[int, ContactState, float]:
+    """Take one accepted step in the backstop, at most to `t_next`, ending on the first switch.
+
+    Returns
+    -------
+    tuple
+        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP or PUSH_ENDED), the state there, the
+        next step length in s.
+    """
+    t, w, v, kv = start
+    shortest = 1e-14 * math.sqrt(control[0]) / control[1]
+    limit = longest_contact_step(w, hammer)
+    while True:
+        h = min(h, limit)
+        # A step far beyond the next edge would be wasted.
+        reach = (t_next - t) / (2.0 * w) if w > 0.0 else math.inf
+        if v >= 0.0 and h > 4.0 * reach:
+            h = 4.0 * reach
+        elif v < 0.0 and h > 1.01 * reach:
+            h = 1.01 * reach
+        scales = contact_scales(w, v, h, control)
+        t1, w1, v1, kv1, error = contact_step(t, w, v, kv, h, hammer, drive, scales)
+        ratio = error / control[3]
+        if not ratio <= 1.0:
+            h *= step_factor(ratio)
+            if h < shortest:
+                return FAILED, start, h
+            continue
+        code = rises_through(-w, v, kv, -w1, v1, kv1, h, 0.0)
+        if code in (UNRESOLVED, NEAR_TOUCH):
+            if h > shortest:
+                h *= 0.5
+                continue
+            code = NO_SWITCH
+        following = h * step_factor(ratio)
+        switch = NO_SWITCH
+        end = (t1, w1, v1, kv1)
+        upper = 1.0
+        if code == REACHED_FRONT:
+            guess = position_root(-w, v, kv, -w1, v1, kv1, h, 0.0, 1.0)
+            left = leave(start, h, guess, 1.0, hammer, drive, control)
+            switch = LEFT_BACKSTOP
+            end = (left[0], left[1], left[2], left[3])
+            upper = left[4]
+        if not BACKSTOP_PULLS and backstop_switch(hammer[BACKSTOP_PART:MAGNET], end[1], end[2]) <= 0.0:
+            end = end_push(start, h, upper, hammer, drive)
+            switch = PUSH_ENDED
+        if end[0] >= t_next:
+            if end[0] > t_next:
+                end = reach_time(start, h, upper, end[0], t_next, hammer, drive)
+                switch = EDGE
+            elif switch == NO_SWITCH:
+                switch = EDGE
+        return switch, end, following

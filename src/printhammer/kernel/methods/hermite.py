@@ -1,0 +1,149 @@
+"""Whether and where a quintic crosses a level: the search for switches inside one step.
+
+The quintic takes position, velocity and acceleration at both ends of a step from the integrator. Its
+Bernstein coefficients bound it (convex hull) and those of its derivative bound the number of its extrema
+(variation diminishing, G. Farin, *Curves and Surfaces for CAGD*, ch. 5), so that a step on which two
+crossings could hide is recognised from six numbers. The quintic only says where to look; the switch itself is
+located with the integrator.
+"""
+
+from __future__ import annotations
+
+from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model.modes import NEAR_TOUCH, NO_SWITCH, REACHED_FRONT, UNRESOLVED
+
+MARGIN = 1e-3
+"""Distance to a level, in lengths of the control polygon, within which an extremum is located first."""
+
+
+@compiled
+def sign_changes(d0: float, d1: float, d2: float, d3: float, d4: float) -> int:
+    """Count the sign changes in a sequence of five numbers, zeros left out."""
+    changes = 0
+    last = 0.0
+    for d in (d0, d1, d2, d3, d4):
+        if d != 0.0:
+            if last * d < 0.0:
+                changes += 1
+            last = 1.0 if d > 0.0 else -1.0
+    return changes
+
+
+@compiled
+def control_points(
+    x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float
+) -> tuple[float, float, float, float]:
+    """Return the four inner Bernstein coefficients of the quintic through both ends of a step of `h`."""
+    p1 = x0 + 0.2 * h * v0
+    p2 = p1 + 0.2 * h * v0 + 0.05 * h * h * a0
+    p4 = x1 - 0.2 * h * v1
+    p3 = p4 - 0.2 * h * v1 + 0.05 * h * h * a1
+    return p1, p2, p3, p4
+
+
+@compiled
+def rises_through(
+    x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float, level: float
+) -> int:
+    """Tell whether the quintic, at or below `level` at its start, rises through it.
+
+    Returns
+    -------
+    int
+        REACHED_FRONT if it ends above and has one crossing, NO_SWITCH if it has none, NEAR_TOUCH if it ends
+        below but its only maximum may reach the level, UNRESOLVED if it may have several extrema and the step
+        must be halved.
+    """
+    p1, p2, p3, p4 = control_points(x0, v0, a0, x1, v1, a1, h)
+    d0, d1, d2, d3, d4 = p1 - x0, p2 - p1, p3 - p2, p4 - p3, x1 - p4
+    if x1 > level or (x1 == level and v1 > 0.0):
+        return REACHED_FRONT if sign_changes(d0, d1, d2, d3, d4) <= 1 else UNRESOLVED
+    margin = MARGIN * (abs(d0) + abs(d1) + abs(d2) + abs(d3) + abs(d4))
+    if max(p1, p2, p3, p4) < level - margin:
+        return NO_SWITCH
+    changes = sign_changes(d0, d1, d2, d3, d4)
+    if changes == 0:
+        return NO_SWITCH
+    if changes == 1:
+        rises_first = d0 > 0.0 or (d0 == 0.0 and d1 > 0.0)
+        return NEAR_TOUCH if rises_first else NO_SWITCH
+    return UNRESOLVED
+
+
+@compiled
+def turns_down(x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float) -> int:
+    """Tell whether the velocity, not negative at the start, becomes negative.
+
+    Returns
+    -------
+    int
+        REACHED_FRONT (read: there is one crossing) if it ends at or below zero after one change of sign,
+        NO_SWITCH if it stays positive, UNRESOLVED if it may change its sign more often.
+    """
+    p1, p2, p3, p4 = control_points(x0, v0, a0, x1, v1, a1, h)
+    changes = sign_changes(p1 - x0, p2 - p1, p3 - p2, p4 - p3, x1 - p4)
+    if v1 <= 0.0:
+        return REACHED_FRONT if changes <= 1 else UNRESOLVED
+    return NO_SWITCH if changes == 0 else UNRESOLVED
+
+
+@compiled
+def position_root(
+    x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float, level: float, upper: float
+) -> float:
+    """Return the fraction of the step, in (0, `upper`], at which the quintic rises through `level`."""
+    p1, p2, p3, p4 = control_points(x0, v0, a0, x1, v1, a1, h)
+    low, high = 0.0, upper
+    s = upper * (level - x0) / (x1 - x0) if x1 != x0 else 0.5 * upper
+    for _ in range(60):
+        if not (low < s < high):
+            s = 0.5 * (low + high)
+        r = 1.0 - s
+        # De Casteljau, the last two levels written out: value and slope together.
+        r4, s4 = r * r * r * r, s * s * s * s
+        left = (
+            r4 * x0 + 4.0 * r * r * r * s * p1 + 6.0 * r * r * s * s * p2 + 4.0 * r * s * s * s * p3 + s4 * p4
+        )
+        right = (
+            r4 * p1 + 4.0 * r * r * r * s * p2 + 6.0 * r * r * s * s * p3 + 4.0 * r * s * s * s * p4 + s4 * x1
+        )
+        gap = r * left + s * right - level
+        if gap > 0.0:
+            high = s
+        else:
+            low = s
+        slope = 5.0 * (right - left)
+        change = gap / slope if slope != 0.0 else 2.0
+        if abs(change) < 1e-12:
+            break
+        s -= change
+    return min(max(s, low), high)
+
+
+@compiled
+def velocity_root(v0: float, a0: float, v1: float, a1: float, h: float) -> float:
+    """Return the fraction of the step in (0, 1] at which the cubic of the velocity falls to zero."""
+    c2 = 3.0 * (v1 - v0) - h * (2.0 * a0 + a1)
+    c3 = 2.0 * (v0 - v1) + h * (a0 + a1)
+    # From rest, the root at the start is divided out.
+    at_rest = v0 == 0.0
+    low, high = 0.0, 1.0
+    s = v0 / (v0 - v1) if v0 != v1 else 0.5
+    for _ in range(60):
+        if not (low < s < high):
+            s = 0.5 * (low + high)
+        if at_rest:
+            value = h * a0 + s * (c2 + s * c3)
+            slope = c2 + 2.0 * s * c3
+        else:
+            value = v0 + s * (h * a0 + s * (c2 + s * c3))
+            slope = h * a0 + s * (2.0 * c2 + 3.0 * s * c3)
+        if value > 0.0:
+            low = s
+        else:
+            high = s
+        change = value / slope if slope != 0.0 else 2.0
+        if abs(change) < 1e-12:
+            break
+        s -= change
+    return min(max(s, low), high)

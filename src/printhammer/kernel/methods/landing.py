@@ -1,0 +1,375 @@
+"""One controlled step off the backstop that ends exactly on the first switch, if there is one inside it.
+
+After a step is accepted, its quintic tells whether a switch lies inside (see the module `hermite`).
+If so, the step is repeated from its start with the length that the quintic suggests, and the small rest is
+closed with the exact derivatives at that point: the displacement of the switch is exact, its time as good as
+the integrator.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.methods.hermite import position_root, rises_through, turns_down, velocity_root
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control
+from printhammer.kernel.model.modes import (
+    BACKSTOP_RELEASED,
+    EDGE,
+    FREE,
+    LEFT_BACKSTOP,
+    LEFT_FRONT,
+    LOADING,
+    NEAR_TOUCH,
+    NO_SWITCH,
+    PACK_RELEASED,
+    PUSH_BEGAN,
+    PUSH_ENDED,
+    REACHED_BACKSTOP,
+    REACHED_FRONT,
+    REACHED_PEAK,
+    RELOADING,
+    REVERSAL,
+    UNLOADING,
+    UNRESOLVED,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.dop853 import time_step
+    from printhammer.kernel.methods.nystrom8 import nystrom_step
+    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.laws import (
+        BACKSTOP_PULLS,
+        HAS_BACKSTOP,
+        HAS_PACK,
+        MEMORY,
+        PACK_PULLS,
+        backstop_switch,
+        pack_switch,
+    )
+    from printhammer.kernel.model.pulses import Drive
+
+State = Any
+"""Time, position, velocity, acceleration."""
+
+FAILED = -1
+"""In place of a switch: no step, however short, has a finite error below the tolerance."""
+
+
+@inlined
+def plain_step(
+    t: float, x: float, v: float, a: float, h: float, mode: int, memory: float, hammer: Hammer, drive: Drive
+) -> tuple[float, float, float, float, float]:
+    """Take one step of `h` [s] with the method that suits the mode."""
+    if HAS_PACK and not MEMORY and mode == LOADING:
+        return time_step(t, x, v, a, h, mode, memory, hammer, drive)
+    return nystrom_step(t, x, v, a, h, mode, memory, hammer, drive)
+
+
+@compiled
+def error_ratio(error_x: float, error_v: float, mode: int, control: Control) -> float:
+    """Return the error estimate of a step over what is allowed; NaN stays NaN.
+
+    `control` is (scale of x, scale of v, allowance of the order 6 estimate, allowance of the order 7
+    estimate).
+    """
+    ratio_x = abs(error_x) / control[0]
+    ratio_v = abs(error_v) / control[1]
+    worst = ratio_x if ratio_x > ratio_v else ratio_v
+    if math.isnan(ratio_x):
+        worst = ratio_x
+    if HAS_PACK and not MEMORY and mode == LOADING:
+        return worst / control[3]
+    if mode in (UNLOADING, RELOADING):
+        # On the steep branch r^11 the estimate of order 6 is too small by about this factor.
+        worst *= 5.0
+    return worst / control[2]
+
+
+@compiled
+def step_factor(ratio: float) -> float:
+    """Return the factor for the next step length after an error `ratio`: a NaN or infinity shortens most."""
+    if not ratio < 1e6:
+        return 0.2
+    # The eighth root by three square roots, a power would cost as much as half a step.
+    return min(5.0, max(0.2, 0.85 / math.sqrt(math.sqrt(math.sqrt(max(ratio, 1e-7))))))
+
+
+@compiled
+def land_on_level(
+    start: State,
+    h: float,
+    fraction: float,
+    upper: float,
+    level: float,
+    sign: float,
+    mode: int,
+    memory: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+) -> State:
+    """Return the state at which sign * x rises through sign * `level`, inside `upper` of a step of `h`."""
+    t, x, v, a = start
+    low, high = 0.0, upper
+    negligible = 1e-15 * control[0]
+    for _ in range(80):
+        step = fraction * h
+        x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, step, mode, memory, hammer, drive)
+        gap = level - x1
+        if sign * gap < 0.0:
+            high = fraction
+        else:
+            low = fraction
+        rest = gap / v1 if v1 != 0.0 else math.inf
+        if abs(0.5 * a1 * rest * rest) <= negligible and abs(rest) <= 0.01 * h:
+            return t + max(step + rest, 0.0), level, v1 + a1 * rest, a1
+        if (high - low) * h <= 1e-15 * control[0] / control[1]:
+            return t + step, level, v1, a1
+        fraction += rest / h
+        if not (low < fraction < high):
+            fraction = 0.5 * (low + high)
+    return t + step, level, v1, a1
+
+
+@compiled
+def land_on_reversal(
+    start: State,
+    h: float,
+    fraction: float,
+    sign: float,
+    mode: int,
+    memory: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+) -> tuple[float, float, float, float, float]:
+    """Return the state at which sign * v falls to zero inside a step of `h`, and its fraction of the step."""
+    t, x, v, a = start
+    low, high = 0.0, 1.0
+    negligible = 1e-8 * control[1]
+    for _ in range(80):
+        step = fraction * h
+        x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, step, mode, memory, hammer, drive)
+        if sign * v1 > 0.0:
+            low = fraction
+        else:
+            high = fraction
+        rest = -v1 / a1 if a1 != 0.0 else math.inf
+        if abs(v1) <= negligible and abs(rest) <= 0.01 * h:
+            return t + max(step + rest, 0.0), x1 + 0.5 * v1 * rest, 0.0, a1, fraction
+        if (high - low) * h <= 1e-15 * control[0] / control[1]:
+            return t + step, x1, 0.0, a1, fraction
+        fraction += rest / h
+        if not (low < fraction < high):
+            fraction = 0.5 * (low + high)
+    return t + step, x1, 0.0, a1, fraction
+
+
+@compiled
+def longest_still_step(
+    start: State, mode: int, memory: float, hammer: Hammer, drive: Drive, control: Control
+) -> float:
+    """Return the longest step [s] that is stable for small oscillations about the present place.
+
+    Near rest all errors are below the tolerance, those of an unstable step too, until they have grown to it.
+    """
+    t, x, v, _a = start
+    small = 1e-5 * control[0]
+    if HAS_PACK and mode in (LOADING, UNLOADING, RELOADING):
+        small = min(small, 1e-3 * (x - hammer[FRONT]))
+    if small <= 1e-14 * abs(x):
+        return math.inf
+    rise = acceleration(t, x + small, v, mode, memory, hammer, drive)
+    slope = abs(rise - acceleration(t, x - small, v, mode, memory, hammer, drive)) / (2.0 * small)
+    return 2.0 / math.sqrt(slope) if slope > 0.0 else math.inf
+
+
+@compiled
+def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
+    """Return the sign function of a contact that may let go: positive while it pushes."""
+    if mode == BACKSTOP_RELEASED:
+        return backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(max(hammer[POSITION] - x, 0.0)), v)
+    return pack_switch(hammer[PACK:BACKSTOP_PART], x, v)
+
+
+@compiled
+def lets_go_or_takes_hold(x: float, v: float, mode: int, hammer: Hammer) -> bool:
+    """Tell whether a contact that may let go no longer does what its mode says."""
+    number = pushes(x, v, mode, hammer)
+    return number > 0.0 if mode in (PACK_RELEASED, BACKSTOP_RELEASED) else number < 0.0
+
+
+@compiled
+def land_on_push(
+    start: State,
+    h: float,
+    upper: float,
+    mode: int,
+    memory: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+) -> State:
+    """Return the state at which the contact begins or ends to push, inside `upper` of a step of `h`."""
+    t, x, v, a = start
+    low, high = 0.0, upper
+    while (high - low) * h > 1e-15 * control[0] / control[1]:
+        middle = 0.5 * (low + high)
+        if not (low < middle < high):
+            break
+        x1, v1, _a1, _ex, _ev = plain_step(t, x, v, a, middle * h, mode, memory, hammer, drive)
+        if lets_go_or_takes_hold(x1, v1, mode, hammer):
+            high = middle
+        else:
+            low = middle
+    x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, high * h, mode, memory, hammer, drive)
+    return t + high * h, x1, v1, a1
+
+
+@compiled
+def level_switch(
+    start: State,
+    end: State,
+    h: float,
+    level: float,
+    sign: float,
+    mode: int,
+    memory: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+) -> tuple[int, float, float]:
+    """Look for sign * x rising through sign * `level` in a step: a code, the fraction, a bound of it."""
+    _t, x0, v0, a0 = start
+    _t1, x1, v1, a1 = end
+    code = rises_through(sign * x0, sign * v0, sign * a0, sign * x1, sign * v1, sign * a1, h, sign * level)
+    upper = 1.0
+    if code == NEAR_TOUCH:
+        guess = velocity_root(sign * v0, sign * a0, sign * v1, sign * a1, h)
+        turn = land_on_reversal(start, h, guess, sign, mode, memory, hammer, drive, control)
+        if not sign * turn[1] > sign * level:
+            return NO_SWITCH, 1.0, 1.0
+        upper = turn[4]
+        guess = position_root(
+            sign * x0, sign * v0, sign * a0, sign * turn[1], 0.0, sign * turn[3], upper * h, sign * level, 1.0
+        )
+        return REACHED_FRONT, guess * upper, upper
+    if code == REACHED_FRONT:
+        fraction = position_root(
+            sign * x0, sign * v0, sign * a0, sign * x1, sign * v1, sign * a1, h, sign * level, 1.0
+        )
+        return REACHED_FRONT, fraction, 1.0
+    return code, 1.0, upper
+
+
+@inlined
+def first_switch(
+    start: State,
+    end: State,
+    h: float,
+    mode: int,
+    memory: float,
+    peak: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+) -> tuple[int, float, float, float, float]:
+    """Find the first switch inside a step: its name, fraction, upper bound, level and direction."""
+    switch, fraction, upper, level, sign = NO_SWITCH, 2.0, 1.0, 0.0, 1.0
+    if (
+        (HAS_BACKSTOP and mode == FREE)
+        or (HAS_PACK and mode in (UNLOADING, PACK_RELEASED))
+        or (HAS_PACK and not MEMORY and mode == LOADING)
+    ):
+        bound = hammer[POSITION] if mode == FREE else hammer[FRONT]
+        code, f, u = level_switch(start, end, h, bound, -1.0, mode, memory, hammer, drive, control)
+        if code == UNRESOLVED:
+            return UNRESOLVED, f, u, bound, -1.0
+        if code == REACHED_FRONT:
+            switch = REACHED_BACKSTOP if mode == FREE else LEFT_FRONT
+            fraction, upper, level, sign = f, u, bound, -1.0
+    if (HAS_PACK and mode in (FREE, RELOADING)) or mode == BACKSTOP_RELEASED:
+        bound = (
+            hammer[POSITION] if mode == BACKSTOP_RELEASED else (peak if mode == RELOADING else hammer[FRONT])
+        )
+        code, f, u = level_switch(start, end, h, bound, 1.0, mode, memory, hammer, drive, control)
+        if code == UNRESOLVED:
+            return UNRESOLVED, f, u, bound, 1.0
+        if code == REACHED_FRONT and f < fraction:
+            if mode == BACKSTOP_RELEASED:
+                switch = LEFT_BACKSTOP
+            else:
+                switch = REACHED_PEAK if mode == RELOADING else REACHED_FRONT
+            fraction, upper, level, sign = f, u, bound, 1.0
+    if HAS_PACK and MEMORY and mode in (LOADING, UNLOADING, RELOADING):
+        turn = -1.0 if mode == UNLOADING else 1.0
+        code = turns_down(
+            turn * start[1], turn * start[2], turn * start[3], turn * end[1], turn * end[2], turn * end[3], h
+        )
+        if code == UNRESOLVED:
+            return UNRESOLVED, 1.0, 1.0, 0.0, turn
+        if code == REACHED_FRONT:
+            f = velocity_root(turn * start[2], turn * start[3], turn * end[2], turn * end[3], h)
+            if f < fraction:
+                switch, fraction, upper, level, sign = REVERSAL, f, 1.0, 0.0, turn
+    return switch, fraction, upper, level, sign
+
+
+@inlined
+def advance(
+    start: State,
+    h: float,
+    t_next: float,
+    mode: int,
+    memory: float,
+    peak: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+) -> tuple[int, State, float]:
+    """Take one accepted step from `start`, at most to `t_next`, ending on the first switch.
+
+    Returns
+    -------
+    tuple
+        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, or its name), the state there, the next step length
+        [s].
+    """
+    t, x, v, a = start
+    shortest = 1e-14 * control[0] / control[1]
+    if abs(v) * h + abs(a) * h * h < 1e-6 * control[0]:
+        h = min(h, longest_still_step(start, mode, memory, hammer, drive, control))
+    while True:
+        at_edge = h >= t_next - t
+        if at_edge:
+            h = t_next - t
+        x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, mode, memory, hammer, drive)
+        ratio = error_ratio(error_x, error_v, mode, control)
+        if not ratio <= 1.0:
+            h *= step_factor(ratio)
+            if h < shortest:
+                return FAILED, start, h
+            continue
+        end = (t_next if at_edge else t + h, x1, v1, a1)
+        switch, fraction, upper, level, sign = first_switch(
+            start, end, h, mode, memory, peak, hammer, drive, control
+        )
+        if switch == UNRESOLVED and h > shortest:
+            h *= 0.5
+            continue
+        following = h * step_factor(ratio)
+        if switch in (NO_SWITCH, UNRESOLVED):
+            switch = EDGE if at_edge else NO_SWITCH
+        elif switch == REVERSAL:
+            turn = land_on_reversal(start, h, fraction, sign, mode, memory, hammer, drive, control)
+            end = (turn[0], turn[1], turn[2], turn[3])
+        else:
+            end = land_on_level(start, h, fraction, upper, level, sign, mode, memory, hammer, drive, control)
+        may_let_go = HAS_PACK and not PACK_PULLS and mode in (LOADING, PACK_RELEASED)
+        may_let_go = may_let_go or (not BACKSTOP_PULLS and mode == BACKSTOP_RELEASED)
+        if may_let_go and end[0] > t and lets_go_or_takes_hold(end[1], end[2], mode, hammer):
+            end = land_on_push(start, h, min(1.0, (end[0] - t) / h), mode, memory, hammer, drive, control)
+            switch = PUSH_BEGAN if mode in (PACK_RELEASED, BACKSTOP_RELEASED) else PUSH_ENDED
+        return switch, end, following

@@ -1,0 +1,142 @@
+"""Integrals of power along a recorded run: the terms of the energy ledger, each by its own quadrature.
+
+Gauss-Legendre quadrature with eight points in each step, the state at each point by a shortened step of the
+integrator. In the backstop the variable is s, in which the power is smooth at touch and leave.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, entry
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, POSITION
+from printhammer.kernel.model.modes import (
+    ANY_SCALES,
+    BACKSTOP,
+    BACKSTOP_RELEASED,
+    HELD,
+    HELD_LOADING,
+    HELD_UNLOADING,
+    RESTING,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.contact import contact_rate
+    from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.model.forces import Hammer, pack_force
+    from printhammer.kernel.model.laws import FORCE_DRIVE, backstop_energy, backstop_viscous, magnet_force
+    from printhammer.kernel.model.pulses import Drive, drive_value, edges_at, pass_edges
+    from printhammer.kernel.single.resample import memory_of, s_at, state_in_step
+
+POINTS = (
+    0.9602898564975363,
+    0.7966664774136267,
+    0.525532409916329,
+    0.1834346424956498,
+)
+WEIGHTS = (
+    0.10122853629037626,
+    0.22238103445337448,
+    0.31370664587788727,
+    0.362683783378362,
+)
+
+
+@compiled
+def powers(
+    t: float, x: float, v: float, w: float, mode: int, memory: float, hammer: Hammer, drive: Drive
+) -> tuple[float, float, float, float]:
+    """Return the powers [W] of coil and drive force, and those that pack and backstop take away for good."""
+    value = drive_value(t, drive)
+    coil = 0.0
+    force = 0.0
+    if FORCE_DRIVE:
+        force = value * v
+    else:
+        c = hammer[MAGNET:]
+        coil = (magnet_force(c, x, value) - magnet_force(c, x, 0.0)) * v
+    pack = -pack_force(x, v, mode, memory, hammer) * v
+    backstop = 0.0
+    if mode == BACKSTOP:
+        backstop = -backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) * v
+    return coil, force, pack, backstop
+
+
+@compiled
+def energy_behind(x: float, hammer: Hammer) -> float:
+    """Return the energy [J] stored in the backstop at displacement `x`."""
+    return backstop_energy(hammer[BACKSTOP_PART:MAGNET], math.sqrt(max(hammer[POSITION] - x, 0.0)))
+
+
+@entry
+def quadratures(
+    steps: Any,
+    starts: Any,
+    ends: Any,
+    nodes: Any,
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Any,
+    hammer: Hammer,
+    out: Any,
+) -> None:
+    """Fill `out`, shape (n, 4), with work of coil and drive force, pack loss and backstop loss [J].
+
+    Parameters
+    ----------
+    steps : int64 array, shape (n,)
+        Number of the node at which the step begins; ascending.
+    starts, ends : float64 array, shape (n,)
+        Times [s] between which to integrate, inside that step.
+    nodes, firings, begins, pieces, replace, under_way, live, hammer
+        As in :func:`printhammer.kernel.single.resample.resample`.
+    """
+    first, last = 0, 0
+    for row in range(steps.size):
+        i = steps[row]
+        if row == 0:
+            first, last, _edge = edges_at(nodes[i, 0], firings, begins, pieces, replace, under_way, live)
+        t0, x0, v0, mode, kept = nodes[i, 0], nodes[i, 1], nodes[i, 2], int(nodes[i, 3]), nodes[i, 4]
+        first, last, _edge = pass_edges(t0, firings, begins, pieces, replace, under_way, first, last, live)
+        for j in range(4):
+            out[row, j] = 0.0
+        if i + 1 < nodes.shape[0] and nodes[i + 1, 0] == t0 and nodes[i + 1, 1] == x0:
+            # An impact on a rigid backstop.
+            lost = 0.5 * (v0 * v0 - nodes[i + 1, 2] * nodes[i + 1, 2]) / hammer[INVERSE_MASS]
+            out[row, 3] = lost if mode != BACKSTOP and x0 != hammer[FRONT] else 0.0
+            continue
+        if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING) or ends[row] <= starts[row]:
+            continue
+        memory = memory_of(mode, kept, hammer)
+        kv0 = contact_rate(kept, v0, t0, hammer, live) if mode == BACKSTOP else 0.0
+        regular = mode == BACKSTOP and not (kept == 0.0 and v0 == 0.0)
+        low, high = starts[row], ends[row]
+        if regular:
+            low = s_at(starts[row], t0, kept, v0, kv0, hammer, live)
+            high = s_at(ends[row], t0, kept, v0, kv0, hammer, live)
+        for j in range(8):
+            point = POINTS[j] if j < 4 else -POINTS[j - 4]
+            weight = WEIGHTS[j] if j < 4 else WEIGHTS[j - 4]
+            place = 0.5 * (low + high) + 0.5 * (high - low) * point
+            share = 0.5 * (high - low) * weight
+            if regular:
+                t, w, v, _kv, _error = contact_step(t0, kept, v0, kv0, place, hammer, live, ANY_SCALES)
+                x = hammer[POSITION] - w * w
+                share *= 2.0 * w
+            else:
+                t = place
+                x, v, w = state_in_step(t, t0, x0, v0, mode, kept, hammer, live)
+            coil, force, pack, backstop = powers(t, x, v, w, mode, memory, hammer, live)
+            out[row, 0] += share * coil
+            out[row, 1] += share * force
+            out[row, 2] += share * pack
+            out[row, 3] += share * backstop
+        if mode == BACKSTOP_RELEASED:
+            # The backstop has let go: what it still stores is lost as it creeps back.
+            first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, live)
+            last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, live)
+            out[row, 3] = energy_behind(first_x, hammer) - energy_behind(last_x, hammer)

@@ -1,0 +1,23 @@
+"""Where the constants of a hammer lie in the one array that the kernel works with.
+
+Inverse mass, position of the backstop and front of the pack come first, then the packed constants of spring,
+pack, backstop and magnet, each from a fixed place on: sixteen places each, the magnet's last and of any
+length.
+"""
+
+INVERSE_MASS = 0
+POSITION = 1
+FRONT = 2
+SPRING = 16
+PACK = 32
+BACKSTOP_PART = 48
+MAGNET = 64
+PLACES = {"spring": SPRING, "pack": PACK, "backstop": BACKSTOP_PART, "magnet": MAGNET}
+SLOT = 16
+"""Number of constants that a spring, pack or backstop may have."""
+
+END = 3.0
+"""Kind of the row of a table of pieces at which a waveform ends, see `printhammer.kernel.model.pulses`."""
+
+Control = tuple[float, float, float, float]
+"""Scales of displacement and velocity, allowances of the error estimates of order 6 and 7."""

@@ -1,0 +1,124 @@
+"""The drive at an instant, and the instants at which one of its pieces begins or ends.
+
+A drive is n firing times and the waveform of each: a table of pieces ``[start, kind, p0, p1, p2, p3]``, of
+which the last, of kind `END`, holds the end of support. With s the time since the start of the piece: kind 0
+is a cubic p0 + s (p1 + s (p2 + s p3)), kind 1 an exponential p0 + p1 exp(-p2 s), kind 2 a sine p0 + p1
+sin(p2 s + p3). The tables of different waveforms lie one after the other, the one with the longest support
+last; a firing is told by the row at which its table begins. The pieces under way are known by their rows, not
+by comparing times, so that an instant exactly on an edge belongs to the piece that begins there.
+
+While a run goes on, the pieces under way are kept side by side in one array ``live``: their number, then
+seven values each, ``[firing, start, kind, p0, p1, p2, p3]``. It is rewritten at every edge; all the force sum
+needs is in it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.model.layout import END
+
+Drive = Any
+"""The array ``live``."""
+
+LIVE_WIDTH = 7
+
+
+@compiled
+def sum_of_pulses(t: float, drive: Drive) -> float:
+    """Return the sum of at least one pulse under way."""
+    total = 0.0
+    i = 1
+    for _ in range(int(drive[0])):
+        s = (t - drive[i]) - drive[i + 1]
+        kind = drive[i + 2]
+        if kind == 1.0:
+            total += drive[i + 3] + drive[i + 4] * math.exp(-drive[i + 5] * s)
+        elif kind == 0.0:
+            total += drive[i + 3] + s * (drive[i + 4] + s * (drive[i + 5] + s * drive[i + 6]))
+        else:
+            total += drive[i + 3] + drive[i + 4] * math.sin(drive[i + 5] * s + drive[i + 6])
+        i += LIVE_WIDTH
+    return total
+
+
+@inlined
+def drive_value(t: float, drive: Drive) -> float:
+    """Return the sum of all pulses under way at time `t` [s]: amperes or newtons."""
+    if drive[0] == 0.0:
+        return 0.0
+    return sum_of_pulses(t, drive)
+
+
+@compiled
+def pass_edges(
+    t: float,
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    first: int,
+    last: int,
+    live: Drive,
+) -> tuple[int, int, float]:
+    """Begin and end all pieces whose edge is not after time `t` [s] and rewrite `live`.
+
+    Pulses before `first` have ended, those from `last` on have not been fired; pulse p between them is in the
+    piece ``under_way[p]``, which is the end of its table where it ended before an older one. With `replace`,
+    a firing cuts off the pulses before it.
+
+    Returns
+    -------
+    tuple
+        The new `first` and `last`, equal if no pulse is under way, and the time of the next edge [s],
+        infinity if there is none.
+    """
+    while last < firings.size and firings[last] <= t:
+        under_way[last] = begins[last]
+        last += 1
+        if replace:
+            first = last - 1
+    edge = firings[last] if last < firings.size else np.inf
+    count = 0
+    i = 1
+    for p in range(first, last):
+        row = under_way[p]
+        while pieces[row, 1] != END and firings[p] + pieces[row + 1, 0] <= t:
+            row += 1
+        under_way[p] = row
+        if pieces[row, 1] == END:
+            if p == first:
+                first += 1
+            continue
+        edge = min(edge, firings[p] + pieces[row + 1, 0])
+        live[i] = firings[p]
+        for j in range(6):
+            live[i + 1 + j] = pieces[row, j]
+        i += LIVE_WIDTH
+        count += 1
+    live[0] = count
+    return first, last, edge
+
+
+@compiled
+def edges_at(
+    t: float, firings: Any, begins: Any, pieces: Any, replace: bool, under_way: Any, live: Drive
+) -> tuple[int, int, float]:
+    """Do as `pass_edges` does from the start, but leave out the pulses that ended before time `t` [s]."""
+    # The last table has the longest support.
+    oldest = t - pieces[pieces.shape[0] - 1, 0]
+    low, high = 0, firings.size
+    while low < high:
+        middle = (low + high) // 2
+        if firings[middle] < oldest:
+            low = middle + 1
+        else:
+            high = middle
+    # One more than needed: a pulse may end at `t` by rounding.
+    low = max(low - 1, 0)
+    return pass_edges(t, firings, begins, pieces, replace, under_way, low, low, live)

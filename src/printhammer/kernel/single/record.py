@@ -1,0 +1,76 @@
+"""The record of a run: nodes at the ends of all steps, and contacts.
+
+A node is ``[time, position, velocity, mode, memory]``: the mode and memory hold from this node to the next;
+memory is the displacement of the latest local maximum in the pack, w = sqrt(b - x) in the backstop, else
+zero. A contact is ``[surface, time in, velocity in, time out, velocity out, last node before it, open at the
+start]``; the time out of a contact that is open at the end is NaN.
+
+The arrays are the caller's. Rows beyond their length are counted but not kept, all but the last: a caller
+that wants them all repeats the run with longer arrays, one that wants only the final state gives an array of
+one row.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model.modes import FREE
+
+NODE_WIDTH = 5
+CONTACT_WIDTH = 7
+
+Rows = Any
+
+
+@compiled
+def add_node(nodes: Rows, used: int, t: float, x: float, v: float, mode: int, memory: float) -> int:
+    """Write a node at row `used`, or at the last row if all are in use; return the number of nodes so far."""
+    i = min(used, nodes.shape[0] - 1)
+    nodes[i, 0] = t
+    nodes[i, 1] = x
+    nodes[i, 2] = v
+    nodes[i, 3] = mode
+    nodes[i, 4] = memory
+    return used + 1
+
+
+@compiled
+def relabel_node(nodes: Rows, used: int, mode: int) -> None:
+    """Give the latest node another mode, which holds until the next."""
+    nodes[min(used, nodes.shape[0]) - 1, 3] = mode
+
+
+@compiled
+def open_contact(
+    contacts: Rows, used: int, surface: int, t: float, v: float, node: int, initial: bool
+) -> int:
+    """Write a contact that begins at time `t` with velocity `v`; return the number of contacts so far."""
+    i = min(used, contacts.shape[0] - 1)
+    contacts[i, 0] = surface
+    contacts[i, 1] = t
+    contacts[i, 2] = v
+    contacts[i, 3] = np.nan
+    contacts[i, 4] = np.nan
+    contacts[i, 5] = node
+    contacts[i, 6] = 1.0 if initial else 0.0
+    return used + 1
+
+
+@compiled
+def close_contact(contacts: Rows, used: int, t: float, v: float) -> None:
+    """End the latest contact at time `t` with velocity `v`."""
+    i = min(used, contacts.shape[0]) - 1
+    contacts[i, 3] = t
+    contacts[i, 4] = v
+
+
+@compiled
+def carry_contact(contacts: Rows, mode: int) -> int:
+    """Keep the contact in row 0 that goes on after a pause in `mode`; return the number of contacts."""
+    if mode == FREE:
+        return 0
+    contacts[0, 5] = -1.0
+    return 1

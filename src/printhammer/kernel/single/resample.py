@@ -1,0 +1,309 @@
+"""States and forces at any times of a recorded run.
+
+The state inside a step is one shortened step of the same method from the node before it: no interpolation
+formula, and no dependence on the output grid.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, entry
+from printhammer.kernel.model.layout import BACKSTOP_PART, MAGNET, PACK, POSITION, SPRING
+from printhammer.kernel.model.modes import (
+    ANY_SCALES,
+    BACKSTOP,
+    BACKSTOP_SURFACE,
+    HELD,
+    HELD_LOADING,
+    HELD_UNLOADING,
+    LOADING,
+    RELOADING,
+    RESTING,
+    UNLOADING,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.contact import contact_rate
+    from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.methods.landing import plain_step
+    from printhammer.kernel.model.forces import Hammer, acceleration, pack_force
+    from printhammer.kernel.model.laws import (
+        FORCE_DRIVE,
+        HAS_PACK,
+        MEMORY,
+        backstop_elastic,
+        backstop_viscous,
+        magnet_force,
+        pack_memory,
+        spring_force,
+    )
+    from printhammer.kernel.model.pulses import Drive, drive_value, edges_at, pass_edges
+
+GOLDEN = 0.3819660112501051
+SAMPLES = 4
+"""Samples in each step of a contact among which its largest depth and force are looked for."""
+
+
+@compiled
+def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
+    """Return what the unloading branch needs of the local maximum `kept` at a node."""
+    if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING, HELD_UNLOADING):
+        return pack_memory(hammer[PACK:BACKSTOP_PART], kept)
+    return 0.0
+
+
+@compiled
+def branch_of(mode: int) -> int:
+    """Return the mode whose force acts in `mode`, which may be one of rest."""
+    if mode == HELD_LOADING:
+        return LOADING
+    return UNLOADING if mode == HELD_UNLOADING else mode
+
+
+@compiled
+def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
+    """Return the ds after which a time `left` [s] has passed where a force holds the armature there.
+
+    The root of 2 w ds - v ds^2 - kv ds^3 / 3 = left, whose left side rises throughout.
+    """
+    ds = 0.0
+    for _ in range(60):
+        rest = left - ds * (2.0 * w - ds * (v + ds * kv / 3.0))
+        change = rest / (2.0 * (w - ds * (v + 0.5 * ds * kv)))
+        ds += change
+        if abs(change) <= 1e-12 * ds:
+            break
+    return ds
+
+
+@compiled
+def length_of(left: float, w: float, v: float, kv: float) -> float:
+    """Return about the ds after which a time `left` [s] has passed in the backstop, for a correction of s.
+
+    It solves dt = 2 w ds - v ds^2, whose root stays regular where the armature leaves, w = 0; the next term
+    is added where it counts and the armature does not leave.
+    """
+    under_root = max(w * w - v * left, 0.0)
+    if w > 0.0 and under_root > 0.0:
+        change = left / (w + math.sqrt(under_root))
+    else:
+        change = (w - math.sqrt(under_root)) / v if v != 0.0 else 0.0
+    stays = w > 0.0 and kv < 0.0 and (v <= 0.0 or v * v + kv * w < 0.0)
+    if stays and -kv * change * change * change > left > 0.0:
+        return length_while_pushed_in(left, w, v, kv)
+    return change
+
+
+@compiled
+def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
+    """Return the s at which a step in the backstop from time `t0` reaches time `t` [s].
+
+    A time after that of leaving gives the s of leaving.
+    """
+    left = t - t0
+    if left <= 0.0:
+        return 0.0
+    s = 0.0
+    t1, w1, v1, kv1 = t0, w0, v0, kv0
+    for _ in range(12):
+        change = length_of(t - t1, w1, v1, kv1)
+        s += change
+        if abs(change) <= 1e-15 * s:
+            break
+        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
+    return s
+
+
+@compiled
+def state_in_step(
+    t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
+) -> tuple[float, float, float]:
+    """Return displacement, velocity and w at time `t` [s] in the step that begins at a node."""
+    if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING) or t <= t0:
+        return x0, v0, kept if mode in (BACKSTOP, HELD) else 0.0
+    if mode == BACKSTOP:
+        kv0 = contact_rate(kept, v0, t0, hammer, drive)
+        if kept == 0.0 and v0 == 0.0:
+            a0 = acceleration(t0, x0, v0, mode, 0.0, hammer, drive)
+            return x0 + 0.5 * a0 * (t - t0) ** 2, a0 * (t - t0), math.sqrt(max(-0.5 * a0, 0.0)) * (t - t0)
+        s = s_at(t, t0, kept, v0, kv0, hammer, drive)
+        _t1, w1, v1, _kv1, _error = contact_step(t0, kept, v0, kv0, s, hammer, drive, ANY_SCALES)
+        return hammer[POSITION] - w1 * w1, v1, w1
+    memory = memory_of(mode, kept, hammer)
+    a0 = acceleration(t0, x0, v0, mode, memory, hammer, drive)
+    x1, v1, _a1, _ex, _ev = plain_step(t0, x0, v0, a0, t - t0, mode, memory, hammer, drive)
+    return x1, v1, 0.0
+
+
+@entry
+def resample(
+    times: Any,
+    nodes: Any,
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Any,
+    hammer: Hammer,
+    out: Any,
+) -> None:
+    """Fill `out` with states and forces at `times`.
+
+    Parameters
+    ----------
+    times : float64 array, shape (n,)
+        Ascending, inside the run [s].
+    nodes, firings, begins, pieces, replace, under_way, live, hammer
+        As recorded and given in :func:`printhammer.kernel.single.run.run`.
+    out : float64 array, shape (n, 9)
+        Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
+        the backstop, mode. At the time of an impact or a switch: the state after it.
+    """
+    first, last, _edge = edges_at(nodes[0, 0], firings, begins, pieces, replace, under_way, live)
+    i = 0
+    for row in range(times.size):
+        t = times[row]
+        moved = False
+        while i + 1 < nodes.shape[0] and nodes[i + 1, 0] <= t:
+            i += 1
+            moved = True
+        if moved:
+            first, last, _edge = pass_edges(
+                nodes[i, 0], firings, begins, pieces, replace, under_way, first, last, live
+            )
+        mode = int(nodes[i, 3])
+        kept = nodes[i, 4]
+        x, v, w = state_in_step(t, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, live)
+        value = drive_value(t, live)
+        out[row, 0] = x
+        out[row, 1] = v
+        out[row, 2] = value
+        out[row, 3] = magnet_force(hammer[MAGNET:], x, 0.0 if FORCE_DRIVE else value)
+        out[row, 4] = spring_force(hammer[SPRING:PACK], x)
+        out[row, 5] = pack_force(x, v, branch_of(mode), memory_of(mode, kept, hammer), hammer)
+        out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if mode in (BACKSTOP, HELD) else 0.0
+        out[row, 7] = (
+            backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if mode in (BACKSTOP, HELD) else 0.0
+        )
+        out[row, 8] = mode
+
+
+@compiled
+def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, drive: Drive) -> tuple[float, float]:
+    """Return depth [m] and contact force [N] at time `t` in the step that begins at `node`."""
+    mode = int(node[3])
+    x, v, w = state_in_step(t, node[0], node[1], node[2], mode, node[4], hammer, drive)
+    if surface == BACKSTOP_SURFACE:
+        force = 0.0
+        if mode in (BACKSTOP, HELD):
+            c = hammer[BACKSTOP_PART:MAGNET]
+            force = backstop_elastic(c, w) + backstop_viscous(c, w, v)
+        return hammer[POSITION] - x, force
+    return x - hammer[2], -pack_force(x, v, branch_of(mode), memory_of(mode, node[4], hammer), hammer)
+
+
+@compiled
+def refined(
+    which: int, low: float, high: float, node: Any, surface: int, hammer: Hammer, drive: Drive
+) -> tuple[float, float]:
+    """Return time and value of the largest depth (`which` 0) or force (1) between two times."""
+    t1 = low + GOLDEN * (high - low)
+    t2 = high - GOLDEN * (high - low)
+    f1 = depth_and_force(t1, node, surface, hammer, drive)[which]
+    f2 = depth_and_force(t2, node, surface, hammer, drive)[which]
+    for _ in range(36):
+        if f1 > f2:
+            high, t2, f2 = t2, t1, f1
+            t1 = low + GOLDEN * (high - low)
+            f1 = depth_and_force(t1, node, surface, hammer, drive)[which]
+        else:
+            low, t1, f1 = t1, t2, f2
+            t2 = high - GOLDEN * (high - low)
+            f2 = depth_and_force(t2, node, surface, hammer, drive)[which]
+    return (t1, f1) if f1 > f2 else (t2, f2)
+
+
+@compiled
+def peaks_of(
+    contact: Any,
+    nodes: Any,
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Any,
+    hammer: Hammer,
+) -> tuple[float, float, float]:
+    """Return time [s] of the largest depth, that depth [m] and the peak force [N] of a contact.
+
+    Its steps begin at its node and end at the first node not before its end.
+    """
+    surface = int(contact[0])
+    begin = int(contact[5])
+    end = begin
+    best = (begin, 0)
+    strongest = (begin, 0)
+    deepest_value = 0.0
+    strongest_value = 0.0
+    first, last, _edge = edges_at(nodes[begin, 0], firings, begins, pieces, replace, under_way, live)
+    while end + 1 < nodes.shape[0] and not (nodes[end, 0] >= contact[3]):
+        node = nodes[end]
+        first, last, _edge = pass_edges(
+            node[0], firings, begins, pieces, replace, under_way, first, last, live
+        )
+        for j in range(SAMPLES + 1):
+            t = node[0] + (nodes[end + 1, 0] - node[0]) * j / SAMPLES
+            depth, force = depth_and_force(t, node, surface, hammer, live)
+            if depth > deepest_value:
+                best, deepest_value = (end, j), depth
+            if force > strongest_value:
+                strongest, strongest_value = (end, j), force
+        end += 1
+    peak_time = nodes[best[0], 0]
+    if end > best[0]:
+        peak_time += (nodes[best[0] + 1, 0] - nodes[best[0], 0]) * best[1] / SAMPLES
+    for which in range(2):
+        i, j = best if which == 0 else strongest
+        # The extremum lies beside the best sample, perhaps in the step before or after it.
+        for beside in range(-1, 2):
+            k = i + beside
+            if k < begin or k >= end or (beside < 0 and j > 0) or (beside > 0 and j < SAMPLES):
+                continue
+            part = (nodes[k + 1, 0] - nodes[k, 0]) / SAMPLES
+            lowest = j - 1 if beside == 0 else (SAMPLES - 1 if beside < 0 else 0)
+            highest = j + 1 if beside == 0 else (SAMPLES if beside < 0 else 1)
+            low = nodes[k, 0] + part * max(lowest, 0)
+            high = nodes[k, 0] + part * min(highest, SAMPLES)
+            if not high > low:
+                continue
+            edges_at(nodes[k, 0], firings, begins, pieces, replace, under_way, live)
+            t, value = refined(which, low, high, nodes[k], surface, hammer, live)
+            if which == 0 and value > deepest_value:
+                peak_time, deepest_value = t, value
+            elif which == 1 and value > strongest_value:
+                strongest_value = value
+    return peak_time, deepest_value, strongest_value
+
+
+@entry
+def peaks(
+    contacts: Any,
+    nodes: Any,
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    under_way: Any,
+    live: Any,
+    hammer: Hammer,
+    out: Any,
+) -> None:
+    """Fill `out`, shape (m, 3), with what `peaks_of` tells of all recorded contacts."""
+    for row in range(contacts.shape[0]):
+        out[row, 0], out[row, 1], out[row, 2] = peaks_of(
+            contacts[row], nodes, firings, begins, pieces, replace, under_way, live, hammer
+        )

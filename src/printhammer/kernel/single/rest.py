@@ -1,0 +1,56 @@
+"""An armature at rest, on a rigid backstop or inside the pack: until when the forces leave it there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model.modes import RELOADING, UNLOADING
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.pulses import Drive
+
+
+@compiled
+def rest_ends(
+    t: float,
+    x: float,
+    pause: float,
+    mode: int,
+    memory: float,
+    lowest: float,
+    highest: float,
+    hammer: Hammer,
+    drive: Drive,
+) -> tuple[bool, float]:
+    """Tell whether the acceleration at rest leaves the range from `lowest` to `highest` within `pause` [s].
+
+    Returns
+    -------
+    tuple
+        Whether it does, and the time [s] from `t` to then, or `pause`.
+    """
+    low = 0.0
+    high = 0.5 * pause
+    a = acceleration(t + high, x, 0.0, mode, memory, hammer, drive)
+    if lowest <= a <= highest:
+        low, high = high, pause
+        a = acceleration(t + high, x, 0.0, mode, memory, hammer, drive)
+        if lowest <= a <= highest:
+            return False, pause
+    while True:
+        middle = 0.5 * (low + high)
+        if not (t + low < t + middle < t + high):
+            return True, high
+        a = acceleration(t + middle, x, 0.0, mode, memory, hammer, drive)
+        if lowest <= a <= highest:
+            low = middle
+        else:
+            high = middle
+
+
+@compiled
+def goes_on_in(a: float, mode: int) -> bool:
+    """Tell whether an armature at rest inside the pack goes on along the branch of its mode."""
+    return (mode == UNLOADING and a < 0.0) or (mode == RELOADING and a > 0.0)

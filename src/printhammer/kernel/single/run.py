@@ -1,0 +1,487 @@
+"""One run of one hammer: the loop over steps, switches and edges of the drive."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, entry
+from printhammer.kernel.methods.landing import FAILED
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control
+from printhammer.kernel.model.modes import (
+    BACKSTOP,
+    BACKSTOP_RELEASED,
+    BACKSTOP_SURFACE,
+    EDGE,
+    FREE,
+    HELD,
+    HELD_LOADING,
+    HELD_UNLOADING,
+    LEFT_BACKSTOP,
+    LEFT_FRONT,
+    LOADING,
+    NO_SWITCH,
+    OK,
+    PACK_RELEASED,
+    PACK_SURFACE,
+    PAUSED,
+    PUSH_BEGAN,
+    PUSH_ENDED,
+    RANGE_LEFT,
+    REACHED_BACKSTOP,
+    REACHED_FRONT,
+    REACHED_PEAK,
+    RELOADING,
+    RESTING,
+    REVERSAL,
+    RUNAWAY,
+    STEP_LIMIT,
+    STEP_UNDERFLOW,
+    UNLOADING,
+)
+from printhammer.kernel.single import carry as C
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.contact import advance_contact, contact_rate
+    from printhammer.kernel.methods.landing import State, advance, land_on_level, level_switch
+    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.laws import (
+        BACKSTOP_PULLS,
+        HAS_BACKSTOP,
+        HAS_PACK,
+        MEMORY,
+        RELOAD_ALONG_UNLOADING,
+        RIGID,
+        backstop_rebound,
+        backstop_switch,
+        pack_memory,
+    )
+    from printhammer.kernel.model.pulses import Drive, pass_edges
+    from printhammer.kernel.single.record import (
+        add_node,
+        carry_contact,
+        close_contact,
+        open_contact,
+        relabel_node,
+    )
+    from printhammer.kernel.single.rest import goes_on_in, rest_ends
+
+STILL = 1e-12
+"""Share of the scales below which the motion in one characteristic time counts as none."""
+
+
+STUCK = 1000
+"""Steps in a row that do not move time after which a run is given up."""
+
+WAIT = 0.005
+"""Shortest wait, in characteristic times, before a resting armature is looked at again."""
+
+
+@compiled
+def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
+    """Return the mode of an initial state; a state in the pack meets fresh paper at its own depth."""
+    if HAS_BACKSTOP:
+        b = hammer[POSITION]
+        if x < b and not RIGID:
+            if (
+                not BACKSTOP_PULLS
+                and backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(b - x), v) <= 0.0
+            ):
+                return BACKSTOP_RELEASED
+            return BACKSTOP
+        if x <= b and RIGID and v <= 0.0:
+            return RESTING if v == 0.0 and a < 0.0 else FREE
+        if x == b and (v < 0.0 or (v == 0.0 and a < 0.0)):
+            return BACKSTOP
+    if HAS_PACK and x >= hammer[FRONT]:
+        if x > hammer[FRONT] and v < 0.0 and MEMORY:
+            return UNLOADING
+        if x > hammer[FRONT] or v > 0.0:
+            return LOADING
+    return FREE
+
+
+@compiled
+def time_to_level(distance: float, v: float, a: float) -> float:
+    """Return the time [s] in which a constant acceleration covers `distance` >= 0, or infinity."""
+    if v <= 0.0 and a <= 0.0:
+        return math.inf
+    under_root = v * v + 2.0 * a * distance
+    if under_root < 0.0:
+        return math.inf
+    root = math.sqrt(under_root)
+    if v > 0.0:
+        return 2.0 * distance / (v + root)
+    return (root - v) / a
+
+
+@compiled
+def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Hammer) -> float:
+    """Shorten a step that would overshoot the backstop or the pack front by far."""
+    if HAS_BACKSTOP and mode == FREE:
+        height = x - hammer[POSITION]
+        if height > 0.0:
+            h = min(h, 1.02 * time_to_level(height, -v, -a))
+        elif height == 0.0 and v > 0.0 and a < 0.0:
+            h = min(h, -2.04 * v / a)
+    if HAS_PACK and mode == FREE and x < hammer[FRONT]:
+        h = min(h, 1.02 * time_to_level(hammer[FRONT] - x, v, a))
+    return h
+
+
+@compiled
+def out_of_bounds(x: float, bounds: Any) -> int:
+    """Return the status of a displacement: `bounds` is (lowest, highest, origin, far)."""
+    if not (bounds[0] <= x <= bounds[1]):
+        return RANGE_LEFT
+    if abs(x - bounds[2]) > bounds[3]:
+        return RUNAWAY
+    return OK
+
+
+@compiled
+def left_range(
+    start: State,
+    end: State,
+    mode: int,
+    memory: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+    bounds: Any,
+) -> tuple[bool, State]:
+    """Tell whether a step from `start` to `end` leaves the range, even briefly, and the state there."""
+    h = end[0] - start[0]
+    for side in range(2):
+        bound = bounds[side]
+        sign = 1.0 if side == 1 else -1.0
+        # A backstop that does not lie outside the range keeps the armature off its lower end.
+        if math.isinf(bound) or h <= 0.0 or (HAS_BACKSTOP and side == 0 and mode == FREE):
+            continue
+        if start[1] == bound and sign * end[1] > sign * bound:
+            return True, start
+        code, fraction, upper = level_switch(start, end, h, bound, sign, mode, memory, hammer, drive, control)
+        if code == REACHED_FRONT:
+            return True, land_on_level(
+                start, h, fraction, upper, bound, sign, mode, memory, hammer, drive, control
+            )
+    return out_of_bounds(end[1], bounds) == RANGE_LEFT, end
+
+
+@compiled
+def failure(x: float, v: float, bounds: Any, control: Control) -> int:
+    """Return the status of a run whose step became too short."""
+    near = 0.05 * control[0]
+    if (x - bounds[0] < near and v <= 0.0) or (bounds[1] - x < near and v >= 0.0):
+        return RANGE_LEFT
+    return STEP_UNDERFLOW
+
+
+@compiled
+def reversed_mode(
+    t: float, x: float, mode: int, peak: float, memory: float, hammer: Hammer, drive: Drive
+) -> tuple[int, float, float]:
+    """Return mode, peak and memory after the velocity became zero inside the pack."""
+    if mode == LOADING:
+        if acceleration(t, x, 0.0, LOADING, memory, hammer, drive) > 0.0:
+            return LOADING, peak, memory
+        return UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
+    if mode == RELOADING:
+        return UNLOADING, peak, memory
+    if RELOAD_ALONG_UNLOADING:
+        again = acceleration(t, x, 0.0, UNLOADING, memory, hammer, drive) > 0.0
+        return (RELOADING if again else UNLOADING), peak, memory
+    # As printed, the loading branch is the stronger one below the peak: the wire goes in again only if the
+    # other forces overcome it, else this point is at once a new local maximum.
+    if acceleration(t, x, 0.0, LOADING, memory, hammer, drive) > 0.0:
+        return LOADING, peak, memory
+    return UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
+
+
+@compiled
+def kick_into_backstop(t: float, a: float, t_next: float, control: Control) -> tuple[float, float, float]:
+    """Return time, w and velocity shortly after a touch without velocity, the contact force still negligible.
+
+    The regularised equations stand still at w = v = 0.
+    """
+    depth = 1e-15 * control[0]
+    pause = min(math.sqrt(2.0 * depth / -a), t_next - t)
+    return t + pause, math.sqrt(-0.5 * a) * pause, a * pause
+
+
+@compiled
+def contact_unit(v: float, control: Control) -> float:
+    """Return the scale of s for a touch with velocity `v`; a Hertz contact lasts |v|^-0.6 in s."""
+    speed = max(abs(v), 1e-6 * control[1])
+    return float(math.sqrt(control[0]) / (control[1] ** 0.4 * speed**0.6))
+
+
+@entry
+def run(
+    firings: Any,
+    begins: Any,
+    pieces: Any,
+    replace: bool,
+    hammer: Hammer,
+    t: float,
+    x: float,
+    v: float,
+    t_end: float,
+    control: Control,
+    bounds: Any,
+    max_steps: int,
+    under_way: Any,
+    live: Any,
+    nodes: Any,
+    contacts: Any,
+    carry: Any,
+) -> tuple[int, int, int, int]:
+    """Integrate from state (`t`, `x`, `v`) to time `t_end`, or go on from where a run paused.
+
+    Parameters
+    ----------
+    firings : float64 array, shape (n,)
+        Firing times [s], ascending.
+    begins : int64 array, shape (n,)
+        Row of `pieces` at which the table of each firing's waveform begins.
+    pieces : float64 array, shape (m, 6)
+        The tables of all waveforms, see :mod:`printhammer.kernel.model.pulses`.
+    replace : bool
+        Whether a firing cuts off the pulses before it.
+    hammer : float64 array
+        See :mod:`printhammer.kernel.model.layout`.
+    t, x, v, t_end : float
+        Initial time [s], displacement [m], velocity [m/s], and the end of the run [s].
+    control : tuple of float
+        Scales of displacement and velocity, allowances of the two error estimates.
+    bounds : tuple of float
+        Lowest and highest displacement, origin and farthest distance from it [m].
+    max_steps : int
+        Largest number of steps.
+    under_way : int64 array, shape (n,)
+    live : float64 array, shape (1 + 7 n,)
+        Working space, see :mod:`printhammer.kernel.model.pulses`.
+    nodes : float64 array, shape (any, 5)
+    contacts : float64 array, shape (any, 7)
+        Filled with the record, see `printhammer.kernel.single.record`. The first node of a run that goes on
+        is the last one before the pause; a contact that was open then is the first contact and keeps its row,
+        its number of the node before it is negative.
+    carry : float64 array, shape (24,)
+        See :mod:`printhammer.kernel.single.carry`; `t`, `x` and `v` are not looked at where a run goes on.
+
+    Returns
+    -------
+    tuple
+        Status, and the numbers of nodes, contacts and steps; the first two may exceed the arrays' lengths.
+    """
+    drive = live
+    used = 0
+    touched = 0
+    steps = 0
+    status = OK
+    time_scale = control[0] / control[1]
+    still = STILL * control[1] / time_scale
+    memory = 0.0
+    peak = x
+    w = 0.0
+    kv = 0.0
+    pause_after = carry[C.PAUSE_AFTER]
+    if carry[C.STATE] == C.GOES_ON:
+        mode, peak, memory = int(carry[C.MODE]), carry[C.PEAK], carry[C.MEMORY_NOW]
+        t, x, v, a = carry[C.TIME], carry[C.POSITION_NOW], carry[C.VELOCITY], carry[C.ACCELERATION]
+        w, kv = carry[C.ROOT], carry[C.ROOT_RATE]
+        h, h_free, h_pack = carry[C.STEP], carry[C.FREE_STEP], carry[C.PACK_STEP]
+        h_contact = carry[C.CONTACT_STEP]
+        started, entered = int(carry[C.STARTED]), carry[C.ENTERED] != 0.0
+        wait, stuck, t_before = carry[C.WAIT], int(carry[C.STUCK]), carry[C.TIME_BEFORE]
+        first, last, edge = int(carry[C.FIRST]), int(carry[C.LAST]), carry[C.EDGE]
+        steps = int(carry[C.STEPS])
+        touched = carry_contact(contacts, mode)
+    else:
+        first, last, edge = pass_edges(t, firings, begins, pieces, replace, under_way, 0, 0, live)
+        a = acceleration(t, x, v, FREE, memory, hammer, drive)
+        mode = first_mode(x, v, a, hammer)
+        if carry[C.STATE] == C.ON_BRANCH:
+            mode, peak = int(carry[C.MODE]), carry[C.PEAK]
+        if mode in (UNLOADING, RELOADING):
+            memory = pack_memory(hammer[PACK:BACKSTOP_PART], peak)
+        h_free = 0.02 * time_scale
+        h_pack = 0.005 * time_scale
+        h_contact = 0.05
+        h = h_pack if mode in (LOADING, UNLOADING) else h_free
+        if mode in (LOADING, UNLOADING, RELOADING):
+            touched = open_contact(contacts, touched, PACK_SURFACE, t, v, 0, True)
+        elif mode in (BACKSTOP, BACKSTOP_RELEASED, RESTING):
+            touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, 0, True)
+        if mode in (BACKSTOP, BACKSTOP_RELEASED):
+            w = math.sqrt(hammer[POSITION] - x)
+        a = acceleration(t, x, v, mode, memory, hammer, drive)
+        started = mode
+        entered = True
+        wait = WAIT * time_scale
+        stuck = 0
+        t_before = t - time_scale
+    used = add_node(
+        nodes,
+        used,
+        t,
+        x,
+        v,
+        mode,
+        w if mode == BACKSTOP else (peak if mode in (UNLOADING, RELOADING) else 0.0),
+    )
+    while t < t_end and status == OK:
+        if used >= pause_after and mode in (FREE, BACKSTOP):
+            status = PAUSED
+            break
+        t_next = min(edge, t_end)
+        if t_next <= t:
+            first, last, edge = pass_edges(t, firings, begins, pieces, replace, under_way, first, last, live)
+            a = acceleration(t, x, v, mode, memory, hammer, drive)
+            entered = True
+            continue
+        if mode == RESTING and a > 0.0:
+            close_contact(contacts, touched, t, 0.0)
+            mode = FREE
+            relabel_node(nodes, used, FREE)
+        steps += 1
+        if steps > max_steps:
+            status = STEP_LIMIT
+            break
+        stuck = stuck + 1 if t == t_before else 0
+        t_before = t
+        if stuck > STUCK:
+            status = STEP_UNDERFLOW
+            break
+        switch, left = NO_SWITCH, OK
+        if mode == BACKSTOP:
+            if entered:
+                kv = contact_rate(w, v, t, hammer, drive)
+                entered = False
+            idle = first == last
+            if w > 0.0 and idle and abs(v) <= 1e-14 * control[1] and abs(kv) <= 0.1 * still * 2.0 * w:
+                relabel_node(nodes, used, HELD)
+                t = t_next
+                switch = EDGE
+            elif w == 0.0 and v == 0.0:
+                t, w, v = kick_into_backstop(t, a, t_next, control)
+                kv = contact_rate(w, v, t, hammer, drive)
+                switch = EDGE if t == t_next else NO_SWITCH
+            else:
+                touching = w == 0.0 and started != BACKSTOP
+                unit = 1.0
+                if started != BACKSTOP:
+                    started = BACKSTOP
+                    unit = contact_unit(v, control)
+                    h = h_contact * unit
+                switch, end, h = advance_contact((t, w, v, kv), h, t_next, hammer, drive, control)
+                if touching:
+                    h_contact = h / unit
+                t, w, v, kv = end
+            x = hammer[POSITION] - w * w
+        elif mode == RESTING or (v == 0.0 and abs(a) <= still and mode in (UNLOADING, LOADING, RELOADING)):
+            pause = t_next - t
+            if first < last:
+                pause = min(pause, wait)
+            least, most = (-math.inf, 0.0) if mode == RESTING else (-still, still)
+            if mode != RESTING:
+                relabel_node(nodes, used, HELD_LOADING if mode == LOADING else HELD_UNLOADING)
+            ended, pause = rest_ends(t, x, pause, mode, memory, least, most, hammer, drive)
+            wait = WAIT * time_scale if ended or mode == RESTING else min(2.0 * wait, time_scale)
+            switch = EDGE if pause == t_next - t else NO_SWITCH
+            t = t_next if switch == EDGE else t + pause
+            a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
+            if not ended and switch == NO_SWITCH:
+                # The node at which the rest began holds on.
+                continue
+            if ended and mode != RESTING and not goes_on_in(a, mode):
+                mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
+                a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
+        else:
+            if started != mode:
+                h = h_pack if mode in (LOADING, UNLOADING) else h_free
+            fresh = started != mode
+            started = mode
+            h = sensible_step(h, x, v, a, mode, hammer)
+            start = (t, x, v, a)
+            switch, end, h = advance(start, h, t_next, mode, memory, peak, hammer, drive, control)
+            outside, bound_state = left_range(start, end, mode, memory, hammer, drive, control, bounds)
+            if switch != FAILED and outside:
+                end, switch, left = bound_state, NO_SWITCH, RANGE_LEFT
+            t, x, v, a = end
+            if fresh and mode == FREE:
+                h_free = h
+            elif fresh and mode == LOADING:
+                h_pack = h
+        if switch == FAILED:
+            status = failure(x, v, bounds, control)
+            break
+        status = left if left != OK else out_of_bounds(x, bounds)
+        entered = entered or switch != NO_SWITCH
+        if switch == EDGE:
+            first, last, edge = pass_edges(t, firings, begins, pieces, replace, under_way, first, last, live)
+            a = acceleration(t, x, v, mode, memory, hammer, drive)
+            if mode == BACKSTOP:
+                kv = contact_rate(w, v, t, hammer, drive)
+        elif switch != NO_SWITCH:
+            if switch == REACHED_BACKSTOP:
+                touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, used, False)
+                if RIGID:
+                    used = add_node(nodes, used, t, x, v, FREE, 0.0)
+                    v = backstop_rebound(hammer[BACKSTOP_PART:MAGNET], v)
+                    a = acceleration(t, x, v, FREE, memory, hammer, drive)
+                    if a < 0.0 and v * v <= -2.0 * a * 1e-12 * control[0]:
+                        v = 0.0
+                        mode = RESTING
+                    else:
+                        close_contact(contacts, touched, t, v)
+                else:
+                    mode = BACKSTOP
+                    w = 0.0
+            elif switch == REACHED_FRONT:
+                v = max(v, 0.0)
+                # A touch without velocity opens a contact only if the armature is pushed on.
+                if v > 0.0 or acceleration(t, x, v, FREE, memory, hammer, drive) > 0.0:
+                    touched = open_contact(contacts, touched, PACK_SURFACE, t, v, used, False)
+                    mode = LOADING
+            elif switch == REVERSAL:
+                if x <= hammer[FRONT]:
+                    close_contact(contacts, touched, t, v)
+                    mode = FREE
+                else:
+                    mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
+            elif switch in (LEFT_FRONT, LEFT_BACKSTOP):
+                close_contact(contacts, touched, t, v)
+                x = hammer[POSITION] if switch == LEFT_BACKSTOP else hammer[FRONT]
+                mode = FREE
+                if switch == LEFT_BACKSTOP and v <= 0.0:
+                    v = 0.0
+                    if acceleration(t, x, v, FREE, memory, hammer, drive) < 0.0:
+                        touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, used, False)
+                        mode = BACKSTOP
+                        w = 0.0
+            elif switch == REACHED_PEAK:
+                mode = LOADING
+            elif switch == PUSH_ENDED:
+                mode = BACKSTOP_RELEASED if mode == BACKSTOP else PACK_RELEASED
+            elif switch == PUSH_BEGAN:
+                mode = BACKSTOP if mode == BACKSTOP_RELEASED else LOADING
+                if mode == BACKSTOP:
+                    w = math.sqrt(max(hammer[POSITION] - x, 0.0))
+            a = acceleration(t, x, v, mode, memory, hammer, drive)
+        kept = w if mode == BACKSTOP else (peak if mode in (UNLOADING, RELOADING) else 0.0)
+        used = add_node(nodes, used, t, x, v, mode, kept)
+    carry[C.STATE] = C.GOES_ON
+    carry[C.MODE], carry[C.PEAK], carry[C.MEMORY_NOW] = mode, peak, memory
+    carry[C.TIME], carry[C.POSITION_NOW], carry[C.VELOCITY], carry[C.ACCELERATION] = t, x, v, a
+    carry[C.ROOT], carry[C.ROOT_RATE] = w, kv
+    carry[C.STEP], carry[C.FREE_STEP], carry[C.PACK_STEP], carry[C.CONTACT_STEP] = (
+        h,
+        h_free,
+        h_pack,
+        h_contact,
+    )
+    carry[C.STARTED], carry[C.ENTERED] = started, entered
+    carry[C.WAIT], carry[C.STUCK], carry[C.TIME_BEFORE] = wait, stuck, t_before
+    carry[C.FIRST], carry[C.LAST], carry[C.EDGE], carry[C.STEPS] = first, last, edge, steps
+    return status, used, touched, steps

@@ -1,0 +1,3 @@
+"""A kernel that hangs must fail a test here too."""
+
+from tests.kernel.conftest import _few_steps  # noqa: F401
