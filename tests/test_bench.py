@@ -2,42 +2,26 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import math
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 
-import printhammer as ph
-from printhammer.bench import (
-    cpp_peers,
-    diffrax_peer,
-    ensembles,
-    exact,
-    heyoka_peer,
-    numbalsoda_peer,
-    own,
-    scipy_peer,
-    sundae_peer,
-    table,
-)
+from printhammer.bench import ensembles, exact, own, table
 from printhammer.bench.ensembles import Figures, Frame, Mass
-from printhammer.bench.entry import Absent, Entry
+from printhammer.bench.entry import Entry, Peers, load_peers
 from printhammer.bench.problem import ENDS, FIRST, GRID, PERIOD, Task, checked, ensemble_tasks, frozen
 from printhammer.bench.report import Report
 from printhammer.bench.table import Line, with_ratios
 from printhammer.cli.main import main
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+PEERS = Path(__file__).parents[1] / "benchmarks" / "peers"
 
 
 @pytest.fixture(scope="module")
@@ -49,29 +33,8 @@ def line(solver: str, error: float, speed: float, *, ours: bool, members: int = 
     return Line(solver, ours, members, error, speed, 0.1, 0.01)
 
 
-def test_the_frozen_hammer_is_a_hammer() -> None:
-    assert ph.load(BENCHMARKS / "frozen-hammer.toml").warnings() == []
-
-
-def test_the_package_has_the_frozen_hammer() -> None:
-    packaged = Path(importlib.import_module("printhammer.bench").__file__ or "").parent
-    assert (packaged / "frozen-hammer.toml").read_bytes() == (BENCHMARKS / "frozen-hammer.toml").read_bytes()
-
-
-def test_the_pieces_are_the_current_of_the_drive(task: Task) -> None:
-    pieces = task.pieces(5e-3)
-    np.testing.assert_array_equal(pieces[1:, 0], pieces[:-1, 1])
-    assert (pieces[0, 0], pieces[-1, 1]) == (0.0, 5e-3)
-    times = np.random.default_rng(1).uniform(0.0, 5e-3, 1000)
-    row = pieces[np.searchsorted(pieces[:, 0], times, side="right") - 1]
-    current = row[:, 2] + row[:, 3] * np.exp(-row[:, 4] * (times - row[:, 0]))
-    motion = ph.simulate(task.hammer, task.drive(4), duration=5e-3, times=np.sort(times))
-    np.testing.assert_allclose(current[np.argsort(times)], motion.current, atol=1e-11)
-
-
-def test_scipy_with_its_events_agrees_with_the_reference(task: Task) -> None:
-    entry = scipy_peer.entries(task, True)[-1]
-    assert np.abs(entry.positions() - exact.single(task)).max() < 1e-11
+def test_the_frozen_hammer_is_a_hammer(task: Task) -> None:
+    assert task.hammer.warnings() == []
 
 
 def test_single_runs_agree_with_the_reference_the_better_the_tighter(task: Task) -> None:
@@ -113,40 +76,6 @@ def test_the_ratio_is_to_the_fastest_of_ours_at_least_as_exact() -> None:
     assert math.isnan(found["lost"].ratio)
 
 
-@pytest.mark.parametrize(
-    ("module", "make"),
-    [
-        ("numbalsoda", lambda task: numbalsoda_peer.entries(task, True)),
-        ("heyoka", lambda task: heyoka_peer.entries(task, True)),
-        ("heyoka", lambda task: heyoka_peer.ensembles(task, True, 8)),
-        ("diffrax", lambda task: diffrax_peer.entries(task, True, 8)),
-        ("sksundae", lambda task: sundae_peer.entries(task, True)),
-    ],
-)
-def test_what_is_not_installed_is_absent(
-    task: Task, monkeypatch: pytest.MonkeyPatch, module: str, make: Callable[[Task], list[Entry]]
-) -> None:
-    # An entry of None makes the import fail as if the module were not there.
-    monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(Absent, match="not installed"):
-        make(task)
-
-
-def test_without_a_compiler_or_headers_the_cpp_peers_are_absent(
-    task: Task, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("CXX", raising=False)
-    monkeypatch.setattr(cpp_peers.shutil, "which", lambda _name: None)
-    cpp_peers._library.cache_clear()
-    for make in (cpp_peers.odeint, cpp_peers.sundials):
-        with pytest.raises(Absent, match=r"no C\+\+ compiler"):
-            make(task, True)
-    monkeypatch.setattr(cpp_peers.shutil, "which", lambda _name: "false")
-    with pytest.raises(Absent, match=r"boost/version.hpp"):
-        cpp_peers.odeint(task, True)
-    cpp_peers._library.cache_clear()
-
-
 def test_a_peer_that_breaks_is_named_and_the_others_go_on(
     task: Task, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -159,17 +88,14 @@ def test_a_peer_that_breaks_is_named_and_the_others_go_on(
     )
     monkeypatch.setattr(own, "schemes", lambda *_: [])
     monkeypatch.setattr(own, "ensembles", lambda *_: [])
-    monkeypatch.setattr(table, "ENSEMBLE_PEERS", {})
-    monkeypatch.setattr(
-        table,
-        "SINGLE_PEERS",
+    peers = Peers(
         {
             "bad": lambda *_: [Entry("bad 1.0", broken, lambda: None, FIRST)],
             "lost": lambda *_: [Entry("lost 1.0", lambda: good * np.nan, lambda: None, FIRST)],
-        },
+        }
     )
     said: list[str] = []
-    lines, absent = table.measure(task, True, 8, said.append)
+    lines, absent = table.measure(task, True, 8, peers, said.append)
     assert absent == {"bad 1.0": "failed: RuntimeError: no memory"}
     assert [one.solver for one in lines] == ["ours", "lost 1.0"]
     # From rest at zero the deviation is the largest displacement itself.
@@ -245,6 +171,7 @@ def test_markdown_has_all_rows(report: Report) -> None:
     ("arguments", "word"),
     [
         (["--threads", "0"], "threads = 0"),
+        (["--peers", "nowhere"], "peers = nowhere, expected a folder"),
         (["--threads", "many"], "whole number"),
         (["--json", "nowhere/at/all.json"], "folder that exists"),
         (["--json", "x.json", "--markdown", "x.json"], "written twice"),
@@ -266,7 +193,7 @@ def test_bad_input_is_refused_before_any_work(
 def test_the_benchmark_runs(tmp_path: Path) -> None:
     done = subprocess.run(
         [
-            *(sys.executable, str(BENCHMARKS / "peers.py"), "--quick"),
+            *(sys.executable, "-m", "printhammer", "bench", "--quick", "--peers", str(PEERS)),
             *("--json", str(tmp_path / "figures.json"), "--markdown", str(tmp_path / "page.md")),
         ],
         check=True,
@@ -280,7 +207,8 @@ def test_the_benchmark_runs(tmp_path: Path) -> None:
     assert ours == sorted(ours, reverse=True)
     assert single["1983: Runge-Kutta 4, 10/1/20 us"]["error"] > 1e-8
     named = " ".join([*single, *data["absent"], *(row["solver"] for row in data["solvers"])])
-    for peer in [*table.SINGLE_PEERS, *table.ENSEMBLE_PEERS]:
+    peers = load_peers(PEERS)
+    for peer in [*peers.single, *peers.ensembles]:
         assert peer in named
     # Whatever is stopped at switches and started anew is exact, and so are ensembles.
     for row in data["solvers"]:

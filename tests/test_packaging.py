@@ -41,9 +41,17 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         _ = ph.no_such_name
 
 
-def test_simulate_stays_a_function_when_its_module_is_imported(tmp_path: Path) -> None:
-    code = "import printhammer.simulate, printhammer as ph; print(type(ph.simulate).__name__)"
-    assert output_of(sys.executable, "-c", code, cwd=tmp_path).strip() == "function"
+@pytest.mark.parametrize("name", ["simulate", "sweep"])
+def test_a_function_stays_one_when_a_module_of_its_name_is_imported(tmp_path: Path, name: str) -> None:
+    code = f"import printhammer.simulate, printhammer.sweep.api, printhammer as ph; print(ph.{name}.__name__)"
+    assert output_of(sys.executable, "-c", code, cwd=tmp_path).strip() == name
+
+
+def test_the_stub_holds_the_public_names_and_no_other() -> None:
+    names = re.findall(
+        r"^from \.\S+ import (\w+) as \1$", (SOURCE / "printhammer/__init__.pyi").read_text(), re.M
+    )
+    assert sorted([*names, "__version__"]) == sorted(ph.__all__)
 
 
 def test_bad_input_is_a_value_error_of_ours() -> None:

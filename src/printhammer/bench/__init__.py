@@ -1,4 +1,4 @@
-"""The benchmark: printhammer against general-purpose solvers, and its ensembles by the clock."""
+"""The benchmark: printhammer against its reference and other solvers, and its ensembles by the clock."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import tempfile
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
+    from printhammer.bench.entry import Peers, Say
     from printhammer.bench.report import Report
-    from printhammer.bench.table import Say
 
 _COMPILING: Final = """
 import sys, time
@@ -24,7 +24,9 @@ print(time.perf_counter() - began)
 """
 
 
-def run(*, quick: bool = False, threads: int | None = None, say: Say | None = None) -> Report:
+def run(
+    *, quick: bool = False, threads: int | None = None, peers: Peers | None = None, say: Say | None = None
+) -> Report:
     """Measure everything.
 
     Parameters
@@ -33,13 +35,10 @@ def run(*, quick: bool = False, threads: int | None = None, say: Say | None = No
         Short runs, few members, one round: to see that it works.
     threads : int, optional
         Largest number of threads of ensembles; by default 2, or 1 where there is one core only.
+    peers : Peers, optional
+        Solvers of others, see `printhammer.bench.entry.load_peers`.
     say : callable, optional
         Called with a line before each step.
-
-    Returns
-    -------
-    Report
-        The figures.
 
     Raises
     ------
@@ -47,22 +46,23 @@ def run(*, quick: bool = False, threads: int | None = None, say: Say | None = No
         Fewer than one thread.
     """
     from printhammer.bench import ensembles, machine, own, table
+    from printhammer.bench.entry import Peers
     from printhammer.bench.problem import MEMBERS, frozen
     from printhammer.bench.report import Report
     from printhammer.errors import InputError
 
     if threads is not None and threads < 1:
         raise InputError(f"threads = {threads}, expected at least 1")
-    told: Say = say if say is not None else lambda _line: None
-    task = frozen()
+    report_step: Say = say if say is not None else lambda _line: None
+    task, others = frozen(), peers if peers is not None else Peers()
     here = machine.machine()
-    lines, absent = table.measure(task, quick, 16 if quick else MEMBERS, told)
-    figures = ensembles.measure(task, quick, threads or min(2, machine.cores()), told)
+    lines, absent = table.measure(task, quick, 16 if quick else MEMBERS, others, report_step)
+    figures = ensembles.measure(task, quick, threads or min(2, machine.cores()), report_step)
     compiling = {}
     for engine in [] if quick else own.engines():
-        told(f"compiling, {engine} engine")
+        report_step(f"compiling, {engine} engine")
         compiling[engine] = _compiling(engine)
-    return Report(here, quick, lines, absent, figures, compiling)
+    return Report(here, quick, lines, absent, figures, compiling, others.used)
 
 
 def _compiling(engine: str) -> float:

@@ -17,8 +17,8 @@ from printhammer.run.problem import TOLERANCE
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from printhammer.bench.entry import Say
     from printhammer.bench.problem import Task
-    from printhammer.bench.table import Say
     from printhammer.drive.trains import PulseTrain
     from printhammer.run.ensemble import Ensemble
     from printhammer.support.arrays import FloatArray
@@ -42,18 +42,8 @@ _STROBES: Final = 200
 class Frame:
     """Figure 9 at one tolerance, with one engine, on so many threads.
 
-    Attributes
-    ----------
-    engine : str
-        Engine of the ensemble.
-    tolerance : float
-        Tolerance of the runs.
-    threads : int
-        Number of threads.
-    seconds, best : float
-        Median and least time of many, s, by the wall clock, sampling included.
-    error_median, error_95 : float
-        Median and 95th percentile over members of their largest error before their horizon, in strokes.
+    Median and least time of many, s, by the wall clock, sampling included; median and 95th percentile over
+    members of their largest error before their horizon, in strokes.
     """
 
     engine: str
@@ -67,23 +57,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Mass:
-    """Many members at once.
-
-    Attributes
-    ----------
-    engine : str
-        Engine of the ensemble.
-    tolerance : float
-        Tolerance of the runs.
-    threads : int
-        Number of threads.
-    members, pulses : int
-        Number of members, and of firings of each.
-    hammer_seconds : float
-        Length of all runs together, s.
-    seconds : float
-        Time by the wall clock, s.
-    """
+    """Many members at once: length of all runs together, hammer-seconds, and time by the wall clock, s."""
 
     engine: str
     tolerance: float
@@ -103,22 +77,9 @@ class Mass:
 class Figures:
     """All figures about ensembles.
 
-    Attributes
-    ----------
-    rates, pulses, times : int
-        Size of Figure 9.
-    hammer_seconds : float
-        Length of its runs together, s.
-    first : float
-        Time of the first run of all, s, in which the kernel is compiled or loaded.
-    checked : int
-        Number of members that are compared with the reference.
-    frames : list of Frame
-        Figure 9.
-    masses : list of Mass
-        Long trains.
-    growth : list of Mass
-        The runs of Figure 9 with more and more members, on one thread.
+    The size of Figure 9, `rates` x `pulses`, sampled at `times`; the length of its runs together, s; the time
+    of the first run of all, s, in which the kernel is compiled or loaded; the number of members compared with
+    the reference; Figure 9, long trains, and Figure 9 with more and more members, on one thread.
     """
 
     rates: int
@@ -148,32 +109,19 @@ def trains(task: Task, members: int, pulses: int) -> tuple[list[PulseTrain], Flo
 
 
 def measure(task: Task, quick: bool, threads: int, say: Say) -> Figures:
-    """Measure ensembles.
-
-    Parameters
-    ----------
-    task : Task
-        The hammer.
-    quick : bool
-        Few members and few repeats, to see that it works.
-    threads : int
-        Largest number of threads.
-    say : callable
-        Called with a line before each step.
-    """
+    """Measure ensembles of the hammer, on up to so many threads; few members and repeats if `quick`."""
     from printhammer.run.ensemble import Ensemble
 
     rates, pulses, times = (32, 3, 64) if quick else (512, 9, 512)
     drives, ends = trains(task, rates, pulses)
     grid = np.linspace(0.0, float(ends.max()), times)
     x = np.empty((rates, times), np.float32)
-    began = time.perf_counter()
-    Ensemble(task.hammer, drives[:1], ends[:1]).run(times=grid, threads=1)
-    first = time.perf_counter() - began
+    first = _seconds(partial(Ensemble(task.hammer, drives[:1], ends[:1]).run, times=grid, threads=1))
     counts = sorted({1, threads})
     say("reference of Figure 9")
     some = np.unique(np.linspace(0, rates - 1, 4 if quick else 64).round().astype(int)).tolist()
-    stroke = float(task.constants[7] - task.constants[9])
+    hammer: Any = task.hammer
+    stroke = float(hammer.pack.front - hammer.backstop.position)
     moments = [np.linspace(0.0, ends[i], _STROBES) for i in some]
     true = [
         exact.trusted(task.hammer, drives[i], float(ends[i]), moment, stroke)
@@ -216,7 +164,8 @@ def _mass(
 
     drives, ends = trains(task, members, pulses)
     runs = Ensemble(task.hammer, drives, ends, tolerance=tolerance)
-    seconds = min(_seconds(lambda: runs.run(threads=threads, engine=engine), repeats))  # type: ignore[arg-type]
+    work = partial(runs.run, threads=threads, engine=engine)  # type: ignore[arg-type]
+    seconds = min(_seconds(work) for _ in range(repeats))
     return Mass(engine, tolerance, threads, members, pulses, float(ends.sum()), seconds)
 
 
@@ -236,22 +185,17 @@ def _errors(
 
 def _rounds(works: list[Callable[[], object]], rounds: int, say: Say) -> list[list[float]]:
     """Return the times of each, s; all have their turn in each round."""
-    samples: list[list[float]] = [[] for _ in works]
     for work in works:
         work()
+    samples: list[list[float]] = [[] for _ in works]
     for turn in range(rounds):
         say(f"Figure 9, round {turn + 1} of {rounds}")
         for work, times in zip(works, samples, strict=True):
-            began = time.perf_counter()
-            work()
-            times.append(time.perf_counter() - began)
+            times.append(_seconds(work))
     return samples
 
 
-def _seconds(work: Callable[[], object], repeats: int) -> list[float]:
-    samples = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        work()
-        samples.append(time.perf_counter() - began)
-    return samples
+def _seconds(work: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began

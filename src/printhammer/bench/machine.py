@@ -5,30 +5,21 @@ from __future__ import annotations
 import os
 import platform
 from contextlib import suppress
-from importlib import metadata
+from importlib.metadata import version
 from pathlib import Path
+
+from printhammer import __version__
 
 
 def machine() -> dict[str, str]:
     """Return processor, cores, how busy they are now, system and versions, in words."""
-    import numba
-    import numpy
-
-    import printhammer
-
-    processor = platform.processor() or platform.machine()
+    processor, wide, busy = platform.processor() or platform.machine(), "", "unknown"
     with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
-            if line.startswith("model name"):
-                processor = line.partition(":")[2].strip()
-                break
-    wide = ""
-    with suppress(OSError):
-        flags = Path("/proc/cpuinfo").read_text("utf-8")
-        wide = next(
-            (f", {name}" for flag, name in (("avx512f", "AVX-512"), ("avx2", "AVX2")) if flag in flags), ""
-        )
-    busy = "unknown"
+        info = Path("/proc/cpuinfo").read_text("utf-8")
+        names = [line for line in info.splitlines() if line.startswith("model name")]
+        processor = names[0].partition(":")[2].strip() if names else processor
+        vectors = (("avx512f", "AVX-512"), ("avx2", "AVX2"))
+        wide = next((f", {name}" for flag, name in vectors if flag in info), "")
     with suppress(OSError, AttributeError):
         busy = f"{os.getloadavg()[0]:.1f}"
     return {
@@ -37,10 +28,10 @@ def machine() -> dict[str, str]:
         "other load before the run": busy,
         "system": platform.system(),
         "Python": platform.python_version(),
-        "printhammer": printhammer.__version__,
-        "NumPy": numpy.__version__,
-        "Numba": numba.__version__,
-        "llvmlite": metadata.version("llvmlite"),
+        "printhammer": __version__,
+        "NumPy": version("numpy"),
+        "Numba": version("numba"),
+        "llvmlite": version("llvmlite"),
     }
 
 

@@ -16,37 +16,15 @@ if TYPE_CHECKING:
 Rows = list[tuple[str, ...]]
 
 SOLVER_HEADS: Final = (
-    "solver",
-    "error [m]",
-    "hammer-s/s",
-    "first call [s]",
-    "ours as exact",
-    "ours / theirs",
+    *("solver", "error [m]", "hammer-s/s", "first call [s]", "ours as exact", "ours / theirs"),
 )
 FRAME_HEADS: Final = (
-    *(
-        "engine",
-        "tolerance",
-        "error, median",
-        "95 %",
-        "threads",
-        "median [ms]",
-        "best [ms]",
-        "hammer-s/s/thread",
-    ),
+    *("engine", "tolerance", "error, median", "95 %", "threads", "median [ms]", "best [ms]"),
+    "hammer-s/s/thread",
 )
 MASS_HEADS: Final = (
-    *(
-        "engine",
-        "tolerance",
-        "members",
-        "pulses",
-        "threads",
-        "hammer-s",
-        "seconds",
-        "us a member",
-        "hammer-s/s/thread",
-    ),
+    *("engine", "tolerance", "members", "pulses", "threads", "hammer-s", "seconds", "us a member"),
+    "hammer-s/s/thread",
 )
 
 
@@ -68,6 +46,8 @@ class Report:
         Figures about ensembles.
     compiling : dict
         Time to compile everything that an ensemble needs, by engine, s; empty in a quick benchmark.
+    peers : str
+        How the peers are used, in words.
     """
 
     machine: dict[str, str]
@@ -76,6 +56,7 @@ class Report:
     absent: dict[str, str]
     figures: Figures
     compiling: dict[str, float]
+    peers: str = ""
 
     def to_json(self) -> str:
         """Return the figures as JSON; null where there is no number."""
@@ -100,19 +81,10 @@ class Report:
             if (line.members > 1) != ensembles:
                 continue
             error = "lost" if math.isnan(line.error) else f"{line.error:.1e}"
-            ratio = "" if math.isnan(line.ratio) else f"{line.ratio:.3g}"
-            if not line.ours and not ratio:
-                ratio = "-"
-            rows.append(
-                (
-                    line.solver,
-                    error,
-                    f"{line.speed:.3g}",
-                    f"{line.first:.1f}",
-                    line.match.removeprefix("printhammer, "),
-                    ratio,
-                )
-            )
+            none = "" if line.ours else "-"
+            ratio = none if math.isnan(line.ratio) else f"{line.ratio:.3g}"
+            match = line.match.removeprefix("printhammer, ")
+            rows.append((line.solver, error, f"{line.speed:.3g}", f"{line.first:.1f}", match, ratio))
         return rows
 
     def least_lead(self, *, ensembles: bool) -> str:
@@ -183,7 +155,8 @@ class Report:
             _ENSEMBLE,
             _table(SOLVER_HEADS, self.solvers(ensembles=True)),
             self.least_lead(ensembles=True),
-            _HOW,
+            self.peers,
+            _MEMBERS,
         ]
         if self.absent:
             parts.append("Not measured here:")
@@ -207,7 +180,7 @@ class Report:
             _GROWTH,
             _table(MASS_HEADS, self.growth()),
         ]
-        return "\n\n".join(parts) + "\n"
+        return "\n\n".join(filter(None, parts)) + "\n"
 
     def _frame_words(self) -> str:
         f = self.figures
@@ -252,11 +225,11 @@ def _finite(data: Any) -> Any:
 
 
 _INTRODUCTION = """\
-Made by `make bench`, which is `printhammer bench --markdown docs/benchmarks.md`; `printhammer bench`
-prints the same for the machine that it runs on, with the peers that it finds installed.
-`benchmarks/requirements-peers.txt` names them, and `benchmarks/peers.py` tells how to give them an
-environment of their own. The hammer is `benchmarks/frozen-hammer.toml`, which is never changed, so that
-figures can be compared over time. Read the ratios: speeds are those of one machine on one day."""
+Made by `make bench`, which is `printhammer bench --peers benchmarks/peers --markdown docs/benchmarks.md`. The
+wheel measures itself; `--peers` adds other solvers from a folder, those of them that are installed.
+`benchmarks/peers/requirements.txt` names them, and `benchmarks/peers/__init__.py` tells how to give them an
+environment of their own. The hammer is `src/printhammer/bench/frozen-hammer.toml`, which is never changed, so
+that figures can be compared over time. Read the ratios: speeds are those of one machine on one day."""
 
 _SINGLE = """\
 A train of 1.35 ms from rest. Error: the largest deviation of the displacement from the reference
@@ -270,15 +243,9 @@ _ENSEMBLE = """\
 Trains with periods from 0.9 to 1.1 times 1.35 ms, on one thread; processor time. Error: the largest
 deviation of eight members at ten times up to 3 ms."""
 
-_HOW = """\
-How the peers are used (`src/printhammer/bench`): everyone has a compiled right-hand side, one for each
-mode, is stopped at every switch and edge of the drive, and starts anew there; "one right-hand side" is
-the same problem as one would first write it. heyoka gets the equations in variables in which they are
-analytic, since a Taylor method needs that; all its switches happen in event callbacks, which are Python,
-and a lane that is done takes the next member. diffrax is one compiled loop under `jax.vmap`.
-Boost.Odeint and SUNDIALS are C++, compiled with `-O3 -march=native`; Odeint has no events, so a switch
-is located by repeating the step with a length found by Newton's method. The error of a single run of
-printhammer and of a member of an ensemble may differ, since other members are compared."""
+_MEMBERS = """\
+The error of a single run of printhammer and of a member of an ensemble may differ, since other members are
+compared."""
 
 _GROWTH = """\
 The runs of Figure 9 with more and more members, on one thread; cost is linear where the time of a member

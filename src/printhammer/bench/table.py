@@ -4,42 +4,20 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.bench import (
-    cpp_peers,
-    diffrax_peer,
-    exact,
-    heyoka_peer,
-    numbalsoda_peer,
-    own,
-    scipy_peer,
-    sundae_peer,
-)
+from printhammer.bench import exact, own
 from printhammer.bench.entry import Absent, Entry
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.bench.entry import Peers, Say
     from printhammer.bench.problem import Task
-
-Say = Callable[[str], None]
-
-SINGLE_PEERS: Final = {
-    "SciPy": scipy_peer.entries,
-    "numbalsoda": numbalsoda_peer.entries,
-    "heyoka": heyoka_peer.entries,
-    "Boost.Odeint": cpp_peers.odeint,
-    "SUNDIALS": cpp_peers.sundials,
-    "scikit-sundae": sundae_peer.entries,
-}
-"""Peers that integrate one run at a time, by name."""
-
-ENSEMBLE_PEERS: Final = {"heyoka": heyoka_peer.ensembles, "diffrax": diffrax_peer.entries}
-"""Peers with ensembles of their own, by name."""
 
 _SHORTEST: Final = 0.02
 """Processor time of a turn, s; shorter work is repeated within it."""
@@ -84,24 +62,13 @@ class Line:
     ratio: float = math.nan
 
 
-def measure(task: Task, quick: bool, members: int, say: Say) -> tuple[list[Line], dict[str, str]]:
+def measure(
+    task: Task, quick: bool, members: int, peers: Peers, say: Say
+) -> tuple[list[Line], dict[str, str]]:
     """Measure all solvers that are there.
 
-    Parameters
-    ----------
-    task : Task
-        The problem.
-    quick : bool
-        Short runs and one round, to see that it works.
-    members : int
-        Number of runs of an ensemble.
-    say : callable
-        Called with a line before each step.
-
-    Returns
-    -------
-    tuple
-        The lines of the table, and why each peer that is absent is.
+    Short runs and one round if `quick`; ensembles of so many members; `say` is called before each step.
+    Return the lines of the table, and why each peer that is absent is.
     """
     absent: dict[str, str] = {}
     solvers: list[Entry] = []
@@ -109,9 +76,9 @@ def measure(task: Task, quick: bool, members: int, say: Say) -> tuple[list[Line]
     makers: list[tuple[str, Callable[[], list[Entry]]]] = [
         ("printhammer", partial(own.singles, task, quick)),
         ("1983", partial(own.schemes, task, quick)),
-        *((name, partial(make, task, quick)) for name, make in SINGLE_PEERS.items()),
+        *((name, partial(make, task, quick)) for name, make in peers.single.items()),
         ("printhammer", partial(own.ensembles, task, quick, members)),
-        *((name, partial(many, task, quick, members)) for name, many in ENSEMBLE_PEERS.items()),
+        *((name, partial(make, task, quick, members)) for name, make in peers.ensembles.items()),
     ]
     for name, make_entries in makers:
         began = time.perf_counter()
@@ -123,8 +90,7 @@ def measure(task: Task, quick: bool, members: int, say: Say) -> tuple[list[Line]
         if made:
             building[len(solvers)] = time.perf_counter() - began
         solvers += made
-    lines = []
-    kept = []
+    lines, kept = [], []
     for i, solver in enumerate(solvers):
         say(solver.name)
         began = time.perf_counter()
@@ -176,18 +142,13 @@ def _rounds(solvers: list[Entry], rounds: int, say: Say) -> list[float]:
 
 def with_ratios(lines: list[Line]) -> list[Line]:
     """Return the lines with, for each peer, the fastest of ours of its kind that is at least as exact."""
-    found = []
-    for line in lines:
-        if line.ours or math.isnan(line.error):
-            found.append(line)
-            continue
-        rivals = [
-            own
-            for own in lines
-            if own.ours and (own.members == 1) == (line.members == 1) and own.error <= line.error
-        ]
-        if rivals:
-            rival = max(rivals, key=lambda own: own.speed)
-            line = replace(line, match=rival.solver, ratio=rival.speed / line.speed)  # noqa: PLW2901
-        found.append(line)
-    return found
+    return [line if line.ours or math.isnan(line.error) else _rated(line, lines) for line in lines]
+
+
+def _rated(line: Line, lines: list[Line]) -> Line:
+    single = line.members == 1
+    rivals = [o for o in lines if o.ours and (o.members == 1) == single and o.error <= line.error]
+    if not rivals:
+        return line
+    rival = max(rivals, key=lambda own: own.speed)
+    return replace(line, match=rival.solver, ratio=rival.speed / line.speed)

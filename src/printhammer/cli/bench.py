@@ -1,4 +1,4 @@
-"""The verb `bench`: this machine's figures, beside those of the solvers that are installed on it."""
+"""The verb `bench`: this machine's figures, beside those of other solvers where a folder of them is named."""
 
 from __future__ import annotations
 
@@ -24,13 +24,17 @@ def bench(
     threads: Annotated[
         str | None, typer.Option(metavar="N", help="Largest number of threads of ensembles (2).")
     ] = None,
+    peers: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Other solvers, such as benchmarks/peers.")
+    ] = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the figures as JSON.")] = None,
     markdown: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the tables as Markdown.")
     ] = None,
 ) -> None:
-    """Measure speed and error against other solvers, one run at a time and in ensembles."""
+    """Measure speed and error against a slow reference and other solvers, single runs and ensembles."""
     from printhammer import bench as benchmark
+    from printhammer.bench.entry import load_peers
     from printhammer.cli.progress import telling
     from printhammer.cli.saving import say_written
     from printhammer.cli.terminal import announce_compiling, console
@@ -39,10 +43,11 @@ def bench(
     count = whole(threads, "threads")
     wanted = [path for path in (json, markdown) if path is not None]
     check_outputs(wanted)
+    others = None if peers is None else load_peers(peers)
     announce_compiling()
     screen = console()
     with telling() as say:
-        report = benchmark.run(quick=quick, threads=count, say=say)
+        report = benchmark.run(quick=quick, threads=count, peers=others, say=say)
     _show(report, screen)
     if json is not None:
         write_file(json, report.to_json())

@@ -9,18 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.bench.entry import Absent, Entry
-from printhammer.bench.problem import (
-    BACKSTOP,
-    ENDS,
-    FIRST,
-    FREE,
-    LENGTH,
-    LOADING,
-    TIME,
-    UNLOADING,
-    checked,
-    ensemble_tasks,
-)
+from printhammer.bench.problem import ENDS, FIRST, checked, ensemble_tasks
+
+from .equations import BACKSTOP, FREE, LENGTH, LOADING, TIME, UNLOADING, hammer_constants, scaled_pieces
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
@@ -63,10 +54,10 @@ def entries(task: Task, quick: bool, members: int) -> list[Entry]:
 
 
 def _run(task: Task, tolerance: float, tasks: list[Task], end: float) -> FloatArray:
-    tables = [member.pieces(end) / np.array([TIME, TIME, 1.0, 1.0, 1.0 / TIME]) for member in tasks]
+    tables = [scaled_pieces(member, end) for member in tasks]
     longest = 3 * (int(FIRST / (0.9 * task.period)) + 1)
     padded = np.array([np.vstack([table, np.tile(table[-1], (longest - len(table), 1))]) for table in tables])
-    compiled = _compiled(tolerance, tuple(task.constants))
+    compiled = _compiled(tolerance, tuple(hammer_constants(task)))
     return np.asarray(compiled(padded, task.rest / LENGTH, end / TIME)) * LENGTH
 
 

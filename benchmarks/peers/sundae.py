@@ -10,7 +10,8 @@ import numpy as np
 
 from printhammer.bench.entry import Absent, Entry
 from printhammer.bench.problem import FIRST, GRID
-from printhammer.bench.python_events import Stretch, event_split
+
+from .events import Stretch, event_split
 
 if TYPE_CHECKING:
     from collections.abc import Callable

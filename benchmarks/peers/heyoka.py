@@ -20,20 +20,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.bench.entry import Absent, Entry
-from printhammer.bench.problem import (
-    BACKSTOP,
-    ENDS,
-    FIRST,
-    FREE,
-    GRID,
-    LENGTH,
-    LOADING,
-    PERIOD,
-    TIME,
-    UNLOADING,
-    checked,
-    ensemble_tasks,
-)
+from printhammer.bench.problem import ENDS, FIRST, GRID, PERIOD, checked, ensemble_tasks
+
+from .equations import BACKSTOP, FREE, LENGTH, LOADING, TIME, UNLOADING, hammer_constants, scaled_pieces
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
@@ -56,7 +45,7 @@ class Lane:
     """The switches of one run: what a callback does to the state and the parameters of the integrator."""
 
     def __init__(self, task: Task, end: float) -> None:
-        c = task.constants
+        c = hammer_constants(task)
         self.front, self.thickness, self.position = c[7] / LENGTH, c[8] / LENGTH, c[9] / LENGTH
         self.stiffness = float(c[6] / c[0] * TIME**2 / LENGTH)
         elastic = float(c[10] * LENGTH**1.5 / c[0] * TIME**2 / LENGTH)
@@ -80,7 +69,7 @@ class Lane:
             BACKSTOP: _modal(c0=self.position, c2=-1, k=-2, elastic=elastic, viscous=viscous, e1q=1, e20=1),
         }
         self.task = task
-        self.pieces = task.pieces(end) / np.array([TIME, TIME, 1.0, 1.0, 1.0 / TIME])
+        self.pieces = scaled_pieces(task, end)
         self.mode, self.piece = BACKSTOP, 0
 
     def begin(self) -> tuple[FloatArray, FloatArray]:
@@ -146,7 +135,7 @@ class _Switch:
 
 def _system(hy: Any, task: Task) -> tuple[list[Any], list[Any]]:
     q, v, t, current = hy.make_vars("q", "v", "t", "i")
-    c = task.constants
+    c = hammer_constants(task)
     unit = TIME**2 / LENGTH / c[0]
     p = {name: hy.par[i] for i, name in enumerate(_NAMES)}
     exponential = hy.exp(q)

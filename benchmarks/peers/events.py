@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from printhammer.bench.problem import BACKSTOP, FREE, LOADING, UNLOADING, compiled_acceleration
+from .equations import (
+    BACKSTOP,
+    FREE,
+    LOADING,
+    UNLOADING,
+    compiled_acceleration,
+    current_pieces,
+    hammer_constants,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,7 +64,7 @@ class Solver(Protocol):
 
 def event_split(task: Task, end: float, grid: FloatArray, solver: Solver) -> FloatArray:
     """Integrate mode by mode and piece by piece of the drive; return the displacement on the grid, m."""
-    c = task.constants
+    c = hammer_constants(task)
     acceleration = compiled_acceleration()
     front, position = c[7], c[9]
     guards: dict[int, list[Any]] = {
@@ -74,7 +82,7 @@ def event_split(task: Task, end: float, grid: FloatArray, solver: Solver) -> Flo
     mode, peak = BACKSTOP, 1.0
     state = np.array([task.rest, 0.0])
     out = np.full(grid.size, np.nan)
-    for piece in task.pieces(end):
+    for piece in current_pieces(task, end):
         t = float(piece[0])
         while t < piece[1]:
 

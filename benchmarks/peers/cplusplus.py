@@ -16,6 +16,8 @@ import numpy as np
 from printhammer.bench.entry import Absent, Entry
 from printhammer.bench.problem import FIRST, GRID, PERIOD
 
+from .equations import current_pieces, hammer_constants
+
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
     from printhammer.support.arrays import FloatArray
@@ -74,9 +76,9 @@ def _entry(task: Task, quick: bool, name: str, library: Any, stepper: int, toler
 def _solve(
     library: Any, stepper: int, tolerance: float, task: Task, end: float, grid: FloatArray
 ) -> FloatArray:
-    pieces = task.pieces(end)
+    pieces = current_pieces(task, end)
     out = np.full(grid.size, np.nan)
-    arrays = [array.ctypes.data_as(ctypes.c_void_p) for array in (task.constants, pieces, grid, out)]
+    arrays = [array.ctypes.data_as(ctypes.c_void_p) for array in (hammer_constants(task), pieces, grid, out)]
     evaluations = library.solve(
         stepper,
         arrays[0],

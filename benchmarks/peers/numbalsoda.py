@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.bench.entry import Absent, Entry
-from printhammer.bench.problem import (
+from printhammer.bench.problem import FIRST, GRID, PERIOD
+
+from .equations import (
     BACKSTOP,
-    FIRST,
     FREE,
-    GRID,
     LENGTH,
     LOADING,
-    PERIOD,
     TIME,
     UNLOADING,
     compiled_acceleration,
+    hammer_constants,
+    scaled_pieces,
 )
 
 if TYPE_CHECKING:
@@ -58,9 +59,9 @@ def entries(task: Task, quick: bool) -> list[Entry]:
         def run(end: float, grid: FloatArray) -> FloatArray:
             split_march, naive_march, _ = _functions()
             march = split_march if split else naive_march
-            pieces = task.pieces(end) / np.array([TIME, TIME, 1.0, 1.0, 1.0 / TIME])
+            pieces = scaled_pieces(task, end)
             return np.asarray(
-                march(pieces, task.constants, task.rest / LENGTH, tolerance, grid / TIME) * LENGTH
+                march(pieces, hammer_constants(task), task.rest / LENGTH, tolerance, grid / TIME) * LENGTH
             )
 
         return Entry(

@@ -12,8 +12,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.bench.entry import Entry
-from printhammer.bench.problem import BACKSTOP, FIRST, FREE, GRID, LOADING, UNLOADING, compiled_acceleration
-from printhammer.bench.python_events import Stretch, event_split
+from printhammer.bench.problem import FIRST, GRID
+
+from .equations import (
+    BACKSTOP,
+    FREE,
+    LOADING,
+    UNLOADING,
+    compiled_acceleration,
+    current_pieces,
+    hammer_constants,
+)
+from .events import Stretch, event_split
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,9 +52,9 @@ def naive(task: Task, end: float, grid: FloatArray, **options: Any) -> FloatArra
     """Integrate one right-hand side that tests for contacts and pulses itself; return x on the grid, m."""
     from scipy.integrate import solve_ivp
 
-    c = task.constants
+    c = hammer_constants(task)
     acceleration = compiled_acceleration()
-    pieces = task.pieces(end)
+    pieces = current_pieces(task, end)
     peak = 0.0
 
     def rates(t: float, y: FloatArray) -> tuple[float, float]:

@@ -1,0 +1,56 @@
+"""Public names: each stands here once, is imported on first use, and is what a type checker sees."""
+
+from .chaos.basins import basins as basins
+from .chaos.bifurcation import bifurcation as bifurcation
+from .chaos.continuation import continuation as continuation
+from .chaos.continuation_regimes import regimes as regimes
+from .chaos.impact_train import impact_train as impact_train
+from .chaos.lyapunov import lyapunov as lyapunov
+from .chaos.orbit_search import orbits as orbits
+from .chaos.quench import quench_map as quench_map
+from .chaos.recurrence import recurrence as recurrence
+from .chaos.sections import section as section
+from .chaos.sensitivity import sensitivities as sensitivities
+from .chaos.stability_chart import stability_chart as stability_chart
+from .chaos.strobe import strobe as strobe
+from .chaos.zero_one import zero_one as zero_one
+from .control.feedback import feedback as feedback
+from .control.least_work import least_work as least_work
+from .control.table import CompensationTable as CompensationTable
+from .control.table_files import load_table as load_table
+from .control.table_report import judge_table as judge_table
+from .control.table_tuning import tune as tune
+from .drive.sequence import PulseSequence as PulseSequence
+from .drive.trains import Burst as Burst
+from .drive.trains import PulseTrain as PulseTrain
+from .drive.trains import SineForce as SineForce
+from .drive.waveforms.base import Waveform as Waveform
+from .errors import InputError as InputError
+from .errors import PrinthammerError as PrinthammerError
+from .hammer.equilibrium import equilibria as equilibria
+from .hammer.equilibrium import holding_margin as holding_margin
+from .hammer.equilibrium import release_current as release_current
+from .hammer.equilibrium import rest_state as rest_state
+from .hammer.hammer import Hammer as Hammer
+from .hammer.hammer import load as load
+from .identify.bench.laboratory import measure as measure
+from .identify.fitting import fit as fit
+from .identify.shots.shooting import Chain as Chain
+from .maps.frequency import frequency_map as frequency_map
+from .printing.damping import damping_study as damping_study
+from .printing.limits import Limits as Limits
+from .printing.materials import Material as Material
+from .printing.page import print_page as print_page
+from .printing.pattern import Pattern as Pattern
+from .printing.perturbation import Perturbation as Perturbation
+from .printing.perturbation import perturbed as perturbed
+from .printing.quality import quality as quality
+from .printing.safe_rate import safe_rate as safe_rate
+from .printing.tolerance import tolerance_yield as tolerance_yield
+from .run.ensemble import Ensemble as Ensemble
+from .run.ensemble import EnsembleResult as EnsembleResult
+from .run.motion import Motion as Motion
+from .run.simulate import simulate as simulate
+from .sweep import sweep as sweep
+
+__version__: str
