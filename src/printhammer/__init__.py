@@ -41,15 +41,15 @@ if TYPE_CHECKING:
     from printhammer.identify.bench.laboratory import measure
     from printhammer.identify.fitting import fit
     from printhammer.maps.frequency import frequency_map
-    from printhammer.printing.damping import damping_study
-    from printhammer.printing.limits import Limits
-    from printhammer.printing.materials import Material
-    from printhammer.printing.page import print_page
-    from printhammer.printing.pattern import Pattern
-    from printhammer.printing.perturbation import Perturbation, perturbed
-    from printhammer.printing.quality import quality
-    from printhammer.printing.safe_rate import safe_rate
-    from printhammer.printing.tolerance import tolerance_yield
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.page.page import print_page
+    from printhammer.printing.page.pattern import Pattern
+    from printhammer.printing.rates.damping import damping_study
+    from printhammer.printing.rates.materials import Material
+    from printhammer.printing.rates.perturbation import Perturbation, perturbed
+    from printhammer.printing.rates.quality import quality
+    from printhammer.printing.rates.safe_rate import safe_rate
+    from printhammer.printing.rates.tolerance import tolerance_yield
     from printhammer.run.ensemble import Ensemble, EnsembleResult
     from printhammer.run.motion import Motion
     from printhammer.run.simulate import simulate
@@ -121,11 +121,11 @@ _HOME = {
     "EnsembleResult": "ensemble",
     "Hammer": "hammer",
     "InputError": "errors",
-    "Limits": "printing.limits",
-    "Material": "printing.materials",
+    "Limits": "printing.dots.limits",
+    "Material": "printing.rates.materials",
     "Motion": "motion",
-    "Pattern": "printing.pattern",
-    "Perturbation": "printing.perturbation",
+    "Pattern": "printing.page.pattern",
+    "Perturbation": "printing.rates.perturbation",
     "PrinthammerError": "errors",
     "PulseSequence": "drive_sequence",
     "PulseTrain": "drive",
@@ -134,7 +134,7 @@ _HOME = {
     "basins": "chaos.basins",
     "bifurcation": "chaos.bifurcation",
     "continuation": "chaos.continuation",
-    "damping_study": "printing.damping",
+    "damping_study": "printing.rates.damping",
     "equilibria": "equilibrium",
     "feedback": "control.feedback",
     "fit": "identify.fitting",
@@ -148,22 +148,22 @@ _HOME = {
     "lyapunov": "chaos.lyapunov",
     "measure": "identify.laboratory",
     "orbits": "chaos.orbit_search",
-    "perturbed": "printing.perturbation",
-    "print_page": "printing.page",
-    "quality": "printing.quality",
+    "perturbed": "printing.rates.perturbation",
+    "print_page": "printing.page.page",
+    "quality": "printing.rates.quality",
     "quench_map": "chaos.quench",
     "recurrence": "chaos.recurrence",
     "regimes": "chaos.continuation_regimes",
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
-    "safe_rate": "printing.safe_rate",
+    "safe_rate": "printing.rates.safe_rate",
     "section": "chaos.sections",
     "sensitivities": "chaos.sensitivity",
     "simulate": "simulate",
     "stability_chart": "chaos.stability_chart",
     "strobe": "chaos.strobe",
     "sweep": "sweep",
-    "tolerance_yield": "printing.tolerance",
+    "tolerance_yield": "printing.rates.tolerance",
     "tune": "control.table_tuning",
     "zero_one": "chaos.zero_one",
 }

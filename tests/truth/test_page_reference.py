@@ -6,9 +6,9 @@ from tests.hammers import CRUDE, TRUTH
 
 import printhammer as ph
 from printhammer.kernel.reference import reference
-from printhammer.printing.page import Page, print_page
-from printhammer.printing.pattern import Pattern
-from printhammer.printing.slots import FIRST_SLOT
+from printhammer.printing.dots.slots import FIRST_SLOT
+from printhammer.printing.page.page import Page, print_page
+from printhammer.printing.page.pattern import Pattern
 
 RATE = 1500.0
 ROWS = ("#.##.#", "######")

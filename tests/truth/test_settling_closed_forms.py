@@ -8,7 +8,7 @@ from tests.hammers import MASS, STOP, hertz, interpreted, made_of, preload, rigi
 
 import printhammer as ph
 from printhammer.drive.waveforms.shapes import Rectangle
-from printhammer.printing.settling import SETTLED, settle, wear_of
+from printhammer.printing.dots.settling import SETTLED, settle, wear_of
 
 PUSH = 12.0
 WIDTH = 150e-6

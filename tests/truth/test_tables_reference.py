@@ -6,7 +6,7 @@ from tests.hammers import crude
 
 import printhammer as ph
 from printhammer.kernel.reference import reference
-from printhammer.printing.slots import slot_times
+from printhammer.printing.dots.slots import slot_times
 
 
 @pytest.mark.slow

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.printing.quality_tables import limits_text, provenance
+from printhammer.printing.rates.quality_tables import limits_text, provenance
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from printhammer.printing.damping import DampingStudy
-    from printhammer.printing.tolerance import ToleranceYield
+    from printhammer.printing.rates.damping import DampingStudy
+    from printhammer.printing.rates.tolerance import ToleranceYield
 
 
 def yield_dataset(found: ToleranceYield) -> xr.Dataset:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.printing.judging import FAULTS, judge
-from printhammer.printing.limits import Limits
-from printhammer.printing.nominal import SinglePulse
+from printhammer.printing.dots.judging import FAULTS, judge
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.run.ensemble import DotTable
 
 SINGLE = SinglePulse(force=20.0, flight_time=300e-6)

@@ -11,7 +11,7 @@ import numpy as np
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.printing.nominal import pulse_of
+from printhammer.printing.dots.nominal import pulse_of
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
 

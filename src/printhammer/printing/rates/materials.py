@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
+    from printhammer.printing.dots.nominal import Nominal
 
 KINDS: Final = ("as it is", "hard", "elastomer", "pack")
 """What may be changed: nothing, the constants of the hard backstop, the backstop for an elastomer, the

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.printing.judging import FAULTS
-from printhammer.printing.limits import Limits
-from printhammer.printing.quality import Quality, pattern_of, quality
-from printhammer.printing.quality_tables import figures_of, save_result
-from printhammer.printing.slots import FIRST_SLOT
+from printhammer.printing.dots.judging import FAULTS
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.slots import FIRST_SLOT
+from printhammer.printing.rates.quality import Quality, pattern_of, quality
+from printhammer.printing.rates.quality_tables import figures_of, save_result
 
 PATTERN = "1101"
 RATE = 900.0

@@ -7,12 +7,12 @@ import xarray as xr
 from tests.hammers import made_of, preload
 
 import printhammer as ph
-from printhammer.printing.damping import DampingStudy, damping_study, tuned
-from printhammer.printing.limits import Limits
-from printhammer.printing.materials import Material, materials
-from printhammer.printing.nominal import nominal
-from printhammer.printing.quality_tables import save_result
-from printhammer.printing.settling import settle
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.dots.settling import settle
+from printhammer.printing.rates.damping import DampingStudy, damping_study, tuned
+from printhammer.printing.rates.materials import Material, materials
+from printhammer.printing.rates.quality_tables import save_result
 
 GRID = {"first": 400.0, "last": 1200.0, "step": 400.0, "limits": Limits(force=0.2, arrival=80e-6)}
 

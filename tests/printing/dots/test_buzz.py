@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.buzz import BuzzTrain, delayed_train, find_buzz_train, longest_run
+from printhammer.printing.dots.buzz import BuzzTrain, delayed_train, find_buzz_train, longest_run
 
 
 def single_force(hammer: "ph.Hammer") -> float:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing.nominal import SinglePulse
+from printhammer.printing.dots.nominal import SinglePulse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.printing.limits import Limits
+    from printhammer.printing.dots.limits import Limits
     from printhammer.run.ensemble import DotTable
     from printhammer.support.arrays import FloatArray
 

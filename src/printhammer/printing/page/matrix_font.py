@@ -31,7 +31,7 @@ _DOT: Final = "#"
 @cache
 def glyphs() -> Mapping[str, npt.NDArray[np.bool_]]:
     """Return the dots of every character of the font: arrays (9, 6), wires from the top by columns."""
-    text = (files("printhammer.printing") / "fonts" / "nine-wire.txt").read_text("utf-8")
+    text = (files("printhammer.printing.page") / "fonts" / "nine-wire.txt").read_text("utf-8")
     found = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}
     # Blank lines part the groups; the first one says what the file is.
     for group in text.split("\n\n")[1:]:

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing.judging import FAULTS
+from printhammer.printing.dots.judging import FAULTS
 from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.limits import Limits
-    from printhammer.printing.quality import Quality
-    from printhammer.printing.safe_rate import SafeRate
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.rates.quality import Quality
+    from printhammer.printing.rates.safe_rate import SafeRate
 
 SUFFIXES: Final = (".nc", ".csv", ".json")
 """Endings of the files that hold a result."""

@@ -18,12 +18,12 @@ import numpy as np
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.printing.limits import Limits
-from printhammer.printing.materials import Material, materials
-from printhammer.printing.nominal import nominal, pulse_of, single_pulses
-from printhammer.printing.safe_rate import FIRST, LAST, rate_grid
-from printhammer.printing.safe_rates import safe_rates
-from printhammer.printing.settling import settle
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
+from printhammer.printing.dots.settling import settle
+from printhammer.printing.rates.materials import Material, materials
+from printhammer.printing.rates.safe_rate import FIRST, LAST, rate_grid
+from printhammer.printing.rates.safe_rates import safe_rates
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
+    from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -136,7 +136,7 @@ class DampingStudy:
 
     def to_dataset(self) -> xr.Dataset:
         """Return the materials as a Dataset over `material`, with units and provenance in the attributes."""
-        from printhammer.printing.study_tables import damping_dataset
+        from printhammer.printing.rates.study_tables import damping_dataset
 
         return damping_dataset(self)
 
@@ -166,7 +166,7 @@ def damping_study(
     hammer : Hammer
         The hammer that is studied, with pack, backstop and waveform.
     others : sequence of Material, optional
-        What is exchanged; by default those of `printhammer.printing.materials.materials`.
+        What is exchanged; by default those of `printhammer.printing.rates.materials.materials`.
     current : float or str, optional
         Largest current allowed, A, or text with a unit.
     limits : Limits, optional
@@ -291,7 +291,7 @@ def tuned(
     force : float
         Force wanted, N.
     tolerance, threads
-        As for `printhammer.printing.nominal.single_pulses`.
+        As for `printhammer.printing.dots.nominal.single_pulses`.
 
     Returns
     -------

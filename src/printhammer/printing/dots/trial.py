@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from printhammer.printing.judging import judge
-from printhammer.printing.nominal import WAIT
-from printhammer.printing.slots import FIRST_SLOT
-from printhammer.printing.strategy import checked_drives, open_loop
+from printhammer.printing.dots.judging import judge
+from printhammer.printing.dots.nominal import WAIT
+from printhammer.printing.dots.slots import FIRST_SLOT
+from printhammer.printing.dots.strategy import checked_drives, open_loop
 from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.judging import Judgement
-    from printhammer.printing.limits import Limits
-    from printhammer.printing.nominal import SinglePulse
-    from printhammer.printing.strategy import Strategy
+    from printhammer.printing.dots.judging import Judgement
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.dots.nominal import SinglePulse
+    from printhammer.printing.dots.strategy import Strategy
     from printhammer.run.ensemble import DotTable
 
 

@@ -19,12 +19,12 @@ import numpy as np
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.judging import FAULTS
-from printhammer.printing.limits import Limits
-from printhammer.printing.nominal import nominal as single_pulse
-from printhammer.printing.slots import LEAD_IN, SLOTS, cycle_with_lead_in, eight_slot_patterns, slots_of
-from printhammer.printing.strategy import name_of, open_loop
-from printhammer.printing.trial import Case, attempt
+from printhammer.printing.dots.judging import FAULTS
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal as single_pulse
+from printhammer.printing.dots.slots import LEAD_IN, SLOTS, cycle_with_lead_in, eight_slot_patterns, slots_of
+from printhammer.printing.dots.strategy import name_of, open_loop
+from printhammer.printing.dots.trial import Case, attempt
 from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import SinglePulse
-    from printhammer.printing.strategy import Strategy
-    from printhammer.printing.trial import Trial
+    from printhammer.printing.dots.nominal import SinglePulse
+    from printhammer.printing.dots.strategy import Strategy
+    from printhammer.printing.dots.trial import Trial
     from printhammer.support.arrays import FloatArray
 
 FIRST: Final = 100.0
@@ -69,7 +69,7 @@ class Failure:
     slot : int
         Number of its slot; in the cycle counted from the end of the lead-in.
     fault : str
-        One of `printhammer.printing.judging.FAULTS`.
+        One of `printhammer.printing.dots.judging.FAULTS`.
     deviation : float
         Of the force, in parts of the single-pulse force, or of the arrival, s, or number of extra contacts;
         NaN where the fault is another one.
@@ -166,7 +166,7 @@ class SafeRate:
 
     def to_dataset(self) -> xr.Dataset:
         """Return the rates as a Dataset over `rate`, with units and provenance in the attributes."""
-        from printhammer.printing.quality_tables import safe_rate_dataset
+        from printhammer.printing.rates.quality_tables import safe_rate_dataset
 
         return safe_rate_dataset(self)
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing import matrix_font
-from printhammer.printing.lettering import COLUMNS, lettered
+from printhammer.printing.page import matrix_font
+from printhammer.printing.page.lettering import COLUMNS, lettered
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -76,8 +76,8 @@ class Pattern:
         wires : int, optional
             Number of wires.
         font : path, optional
-            A TrueType font; by default the built-in font for 9 wires, see `printhammer.printing.matrix_font`,
-            and DejaVu Sans Mono for others.
+            A TrueType font; by default the built-in font for 9 wires, of
+            `printhammer.printing.page.matrix_font`, and DejaVu Sans Mono for others.
         columns : int, optional
             Most characters of a print line.
 
@@ -96,7 +96,7 @@ class Pattern:
     def load(cls, path: str | Path, wires: int | None = None) -> Self:
         """Read a pattern file (.toml) or a bitmap (.png, .pbm, .bmp).
 
-        The format is told in `printhammer.printing.pattern_file`.
+        The format is told in `printhammer.printing.page.pattern_file`.
 
         Parameters
         ----------
@@ -110,7 +110,7 @@ class Pattern:
         InputError
             The file cannot be read, or is no such file.
         """
-        from printhammer.printing.pattern_file import read_pattern
+        from printhammer.printing.page.pattern_file import read_pattern
 
         return cls(*read_pattern(path, wires))
 
@@ -122,7 +122,7 @@ class Pattern:
         InputError
             The name ends in none of these, or the file cannot be written.
         """
-        from printhammer.printing.pattern_file import write_pattern
+        from printhammer.printing.page.pattern_file import write_pattern
 
         write_pattern(self, path)
 

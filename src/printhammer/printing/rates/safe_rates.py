@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.printing.safe_rate import from_rest
-from printhammer.printing.slots import LEAD_IN, cycle_with_lead_in, slots_of
-from printhammer.printing.strategy import open_loop
-from printhammer.printing.trial import Case, attempt
+from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
+from printhammer.printing.dots.strategy import open_loop
+from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.rates.safe_rate import from_rest
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.limits import Limits
-    from printhammer.printing.nominal import SinglePulse
-    from printhammer.printing.strategy import Strategy
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.dots.nominal import SinglePulse
+    from printhammer.printing.dots.strategy import Strategy
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -43,7 +43,7 @@ def all_pass(
     strategy : Strategy, optional
         How the hammers are driven.
     limits, tolerance, threads
-        As for `printhammer.printing.trial.attempt`.
+        As for `printhammer.printing.dots.trial.attempt`.
     """
     options: dict[str, Any] = {"limits": limits, "tolerance": tolerance, "threads": threads}
     patterns = from_rest(every=strategy is not open_loop)
@@ -83,7 +83,7 @@ def safe_rates(
     strategy : Strategy, optional
         How they are driven.
     limits, tolerance, threads
-        As for `printhammer.printing.trial.attempt`.
+        As for `printhammer.printing.dots.trial.attempt`.
     progress : callable, optional
         Called with the number of hammers whose rate is found and of all.
 

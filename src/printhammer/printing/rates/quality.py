@@ -11,13 +11,13 @@ import numpy as np
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.judging import judge
-from printhammer.printing.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
-from printhammer.printing.nominal import WAIT, rate_of
-from printhammer.printing.nominal import nominal as single_pulse
-from printhammer.printing.settling import wear_of
-from printhammer.printing.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
-from printhammer.printing.strategy import checked_drives, name_of, open_loop
+from printhammer.printing.dots.judging import judge
+from printhammer.printing.dots.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
+from printhammer.printing.dots.nominal import WAIT, rate_of
+from printhammer.printing.dots.nominal import nominal as single_pulse
+from printhammer.printing.dots.settling import wear_of
+from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
+from printhammer.printing.dots.strategy import checked_drives, name_of, open_loop
 from printhammer.run.coil_work import squared_current
 from printhammer.run.ensemble import DotTable
 from printhammer.run.problem import TOLERANCE
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.judging import Judgement
-    from printhammer.printing.nominal import Nominal
-    from printhammer.printing.settling import Wear
-    from printhammer.printing.strategy import Strategy
+    from printhammer.printing.dots.judging import Judgement
+    from printhammer.printing.dots.nominal import Nominal
+    from printhammer.printing.dots.settling import Wear
+    from printhammer.printing.dots.strategy import Strategy
     from printhammer.run.contacts import Dot
     from printhammer.run.ledger import Ledger
     from printhammer.support.arrays import FloatArray
@@ -109,7 +109,7 @@ class Quality:
     extra_contacts : int array
         Further pack contacts.
     fault : int array
-        Number of the first fault in `printhammer.printing.judging.FAULTS`; -1 for a dot within limits.
+        Number of the first fault in `printhammer.printing.dots.judging.FAULTS`; -1 for a dot within limits.
     wear : Wear
         What the backstop bears in the whole run, lead-in and settle-out included.
     energy : Ledger
@@ -235,7 +235,7 @@ class Quality:
 
     def to_dataset(self) -> xr.Dataset:
         """Return the dots as a Dataset over `dot`, with units, provenance and all figures as attributes."""
-        from printhammer.printing.quality_tables import quality_dataset
+        from printhammer.printing.rates.quality_tables import quality_dataset
 
         return quality_dataset(self)
 

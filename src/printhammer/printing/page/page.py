@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing.extra_dots import extra_dots
-from printhammer.printing.head import Head, head_of
-from printhammer.printing.judging import FAULTS, judge
-from printhammer.printing.limits import PRESETS, Limits
-from printhammer.printing.nominal import WAIT, Nominal, nominal, rate_of
-from printhammer.printing.pattern import Pattern
-from printhammer.printing.slots import slot_times, slots_of
-from printhammer.printing.strategy import Strategy, checked_drives, name_of, open_loop
+from printhammer.printing.dots.extra_dots import extra_dots
+from printhammer.printing.dots.judging import FAULTS, judge
+from printhammer.printing.dots.limits import PRESETS, Limits
+from printhammer.printing.dots.nominal import WAIT, Nominal, nominal, rate_of
+from printhammer.printing.dots.slots import slot_times, slots_of
+from printhammer.printing.dots.strategy import Strategy, checked_drives, name_of, open_loop
+from printhammer.printing.page.head import Head, head_of
+from printhammer.printing.page.pattern import Pattern
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Page:
     lost : bool array
         Whether the firing made no dot.
     fault : int array
-        Number of the first fault in `printhammer.printing.judging.FAULTS`; -1 for a dot within limits.
+        Number of the first fault in `printhammer.printing.dots.judging.FAULTS`; -1 for a dot within limits.
     arrival_deviation : array
         Touch less slot time and single-pulse flight time, s; NaN for a lost dot, as in all that follows.
     flight_time : array
@@ -217,7 +217,7 @@ class Page:
 
     def to_dataset(self) -> xr.Dataset:
         """Return the page as a Dataset over `dot`, `extra` and `run`, with units and provenance."""
-        from printhammer.printing.page_tables import page_dataset
+        from printhammer.printing.page.page_tables import page_dataset
 
         return page_dataset(self)
 
@@ -256,9 +256,9 @@ def print_page(
         Slots per second, Hz, or text with a unit: how often a wire may be fired. The carriage moves one pitch
         in a slot.
     strategy : Strategy, optional
-        How the hammer is driven; by default `printhammer.printing.strategy.open_loop`.
+        How the hammer is driven; by default `printhammer.printing.dots.strategy.open_loop`.
     head : Head, optional
-        Where the wires are, and how thick; by default `printhammer.printing.head.head_of` their number.
+        Where the wires are, and how thick; by default `printhammer.printing.page.head.head_of` their number.
     limits : Limits, optional
         How far a dot may be off; by default those by which drives are compared.
     tolerance : float, optional

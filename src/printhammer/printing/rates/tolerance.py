@@ -13,12 +13,12 @@ import numpy as np
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.printing.limits import Limits
-from printhammer.printing.nominal import nominal, rate_of, single_pulses
-from printhammer.printing.safe_rate import FIRST, LAST, rate_grid
-from printhammer.printing.safe_rates import all_pass, safe_rates
-from printhammer.printing.strategy import name_of, open_loop
-from printhammer.printing.trial import Case
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal, rate_of, single_pulses
+from printhammer.printing.dots.strategy import name_of, open_loop
+from printhammer.printing.dots.trial import Case
+from printhammer.printing.rates.safe_rate import FIRST, LAST, rate_grid
+from printhammer.printing.rates.safe_rates import all_pass, safe_rates
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.strategy import Strategy
+    from printhammer.printing.dots.strategy import Strategy
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -119,7 +119,7 @@ class ToleranceYield:
 
     def to_dataset(self) -> xr.Dataset:
         """Return the hammers as a Dataset over `member`, with units and provenance in the attributes."""
-        from printhammer.printing.study_tables import yield_dataset
+        from printhammer.printing.rates.study_tables import yield_dataset
 
         return yield_dataset(self)
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
-from printhammer.printing.nominal import pulse_of
-from printhammer.printing.slots import slot_times
+from printhammer.printing.dots.nominal import pulse_of
+from printhammer.printing.dots.slots import slot_times
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,8 +21,9 @@ class Strategy(Protocol):
 
     It is called with the hammer that is driven, which may differ from the one that the strategy was made for,
     the patterns as the numbers of the slots at which dots are wanted, and the slots per second, Hz. Each
-    drive has one firing for each wanted dot, in order; slot 0 is at `printhammer.printing.slots.FIRST_SLOT`,
-    so that a dot may be fired ahead of its slot. What it gives for a pattern must not depend on the others.
+    drive has one firing for each wanted dot, in order; slot 0 is at `FIRST_SLOT` of
+    `printhammer.printing.dots.slots`, so that a dot may be fired ahead of its slot. What it gives for a
+    pattern must not depend on the others.
     """
 
     def __call__(

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing.judging import FAULTS
+from printhammer.printing.dots.judging import FAULTS
 from printhammer.support.outputs import write_dataset, write_file
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from printhammer.printing.page import Page
+    from printhammer.printing.page.page import Page
 
 _GOOD = "none"
 

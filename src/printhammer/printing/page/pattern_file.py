@@ -29,14 +29,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing import matrix_font
+from printhammer.printing.page import matrix_font
 from printhammer.support.constants import shown
 from printhammer.support.outputs import write_file
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.printing.pattern import Pattern
+    from printhammer.printing.page.pattern import Pattern
 
 FORMAT: Final = 1
 """Version of the pattern file format."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing import matrix_font
-from printhammer.printing.outline_font import OutlineFont, standard_font
+from printhammer.printing.page import matrix_font
+from printhammer.printing.page.outline_font import OutlineFont, standard_font
 
 if TYPE_CHECKING:
     from collections.abc import Callable
