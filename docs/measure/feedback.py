@@ -1,7 +1,8 @@
 """Measure how fast hammers print with feedback, as they should be and not quite so, and print tables.
 
 Run it with ``.venv/bin/python docs/measure/feedback.py [--step HZ] [HAMMER ...]``; it takes hours a hammer.
-Safe rates are those of `printhammer.safe_rate`: all patterns of eight slots and the de Bruijn cycle. The grid of rates has the step asked for, from 500 Hz on, and from the last rate that passes 5 Hz to the next.
+Safe rates are those of `printhammer.safe_rate`: all patterns of eight slots and the de Bruijn cycle. The grid
+of rates has the step asked for, from 500 Hz on, and from the last rate that passes 5 Hz to the next.
 
 With ``--grid FIRST`` it looks at every rate of the grid of 5 Hz from there up to 2.2 times the open loop, for
 the hammer as it should be, and goes on after one that fails; some six seconds a rate.
