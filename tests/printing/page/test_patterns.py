@@ -129,7 +129,7 @@ def test_a_file_that_is_no_font_is_refused(tmp_path: Path) -> None:
 
 @given(patterns)
 def test_a_pattern_file_is_read_back_as_it_was_written(pattern: Pattern) -> None:
-    assert Pattern(*pattern_from_toml(pattern_toml(pattern))) == pattern
+    assert Pattern(*pattern_from_toml(pattern_toml(pattern.name, pattern.dots))) == pattern
 
 
 @pytest.mark.parametrize("suffix", [".toml", ".png", ".pbm", ".bmp"])

@@ -12,8 +12,9 @@ from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.slots import FIRST_SLOT
 from printhammer.printing.dots.strategy import open_loop
+from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
-from printhammer.printing.rates.safe_rate import rate_grid, safe_rate
+from printhammer.printing.rates.safe_rate import from_rest, rate_grid, safe_rate
 
 COARSE = {"first": 250.0, "step": 125.0, "last": 2000.0}
 
@@ -87,6 +88,18 @@ def test_limits_that_nothing_keeps_leave_no_rate(hammer: "ph.Hammer") -> None:
     assert math.isnan(found.rate)
     assert math.isnan(found.peak_drive)
     assert not found.passed.any()
+
+
+def test_patterns_that_begin_later_are_printed_alike(hammer: "ph.Hammer") -> None:
+    found = safe_rate(hammer, first=600.0, last=1500.0, step=50.0, cycle=False)
+    assert not found.cycle_run.any()
+    assert not found.at_least
+    cases = [Case(hammer, found.nominal, rate) for rate in (found.rate, found.rate + 50.0)]
+    for every, count in ((False, 128), (True, 255)):
+        patterns = from_rest(every=every)
+        assert len(patterns) == count
+        trial = attempt(cases, patterns, limits=found.limits, tolerance=found.tolerance)
+        assert trial.passed.tolist() == [True, False]
 
 
 def test_rates_beyond_the_first_failure_are_run_on_request(hammer: "ph.Hammer") -> None:

@@ -16,8 +16,6 @@ from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Contact
@@ -56,6 +54,20 @@ class Wear:
     loss: float
     largest_speed: float
     largest_force: float | None
+
+
+@dataclass(frozen=True)
+class Rebound:
+    """An interval above the backstop between two touches: times, s, and height above the backstop, m."""
+
+    start: float
+    end: float
+    height: float
+
+    @property
+    def duration(self) -> float:
+        """Duration, s."""
+        return self.end - self.start
 
 
 @dataclass(frozen=True)
@@ -121,48 +133,48 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
     top = motion.peak_after(0)
     stroke = (rest if top is None else top[1]) - hammer.position
     limit = SETTLED * max(stroke, 0.0)
-    touches = touches_of(motion.contacts)
-    heights = [height / stroke for height in _heights(motion, touches, hammer.position) if height > limit]
-    first = touches[0] if touches else None
+    heights = [one.height / stroke for one in rebounds(motion, hammer.position) if one.height > limit]
+    first = next(iter(touches(motion)), None)
     left = None if first is None or first.v_out is None or first.v_in == 0.0 else -first.v_out / first.v_in
     return Settling(
-        settle_out=_settled(motion, rest, limit) if motion.ok and touches else None,
+        settle_out=_settled(motion, rest, limit) if motion.ok and first is not None else None,
         rebounds=len(heights),
         highest=max(heights, default=0.0),
         restitution=left,
-        wear=wear_of(motion.contacts, hammer.mass),
+        wear=wear_of(motion),
         coil_work=motion.energy.coil_work,
         status=motion.status,
     )
 
 
-def touches_of(contacts: Sequence[Contact]) -> list[Contact]:
-    """Return the touches of the backstop, the rest at the start excluded."""
-    return [contact for contact in contacts if contact.surface == "backstop" and not contact.initial]
+def touches(motion: Motion) -> list[Contact]:
+    """List the touches of the backstop, the rest at the start excluded."""
+    return [contact for contact in motion.contacts if contact.surface == "backstop" and not contact.initial]
 
 
-def wear_of(contacts: Sequence[Contact], mass: float) -> Wear:
-    """Return what the backstop bears in some contacts of an armature of a mass, kg."""
-    touches = touches_of(contacts)
-    forces = [contact.peak_force for contact in touches if contact.peak_force is not None]
+def wear_of(motion: Motion) -> Wear:
+    """Return what the backstop bears in a motion."""
+    mass, found = motion.hammer.mass, touches(motion)
+    forces = [contact.peak_force for contact in found if contact.peak_force is not None]
     return Wear(
-        touches=len(touches),
+        touches=len(found),
         # Of a contact that is still open the armature is at rest in the end.
-        impulse=sum(mass * ((contact.v_out or 0.0) - contact.v_in) for contact in touches),
-        loss=sum(contact.loss for contact in contacts if contact.surface == "backstop"),
-        largest_speed=max((-contact.v_in for contact in touches), default=0.0),
+        impulse=sum(mass * ((contact.v_out or 0.0) - contact.v_in) for contact in found),
+        loss=sum(contact.loss for contact in motion.contacts if contact.surface == "backstop"),
+        largest_speed=max((-contact.v_in for contact in found), default=0.0),
         largest_force=max(forces) if forces else None,
     )
 
 
-def _heights(motion: Motion, touches: Sequence[Contact], position: float) -> list[float]:
-    """Return how high the armature rises above the backstop between touches, m."""
+def rebounds(motion: Motion, position: float) -> list[Rebound]:
+    """List the intervals above a backstop at a position, m, between touches."""
     times, x = motion.maxima
     found = []
-    for before, after in itertools.pairwise(touches):
+    for before, after in itertools.pairwise(touches(motion)):
         if before.t_out is not None:
             inside = (times >= before.t_out) & (times <= after.t_in)
-            found.append(float(x[inside].max()) - position if inside.any() else 0.0)
+            height = float(x[inside].max()) - position if inside.any() else 0.0
+            found.append(Rebound(before.t_out, after.t_in, height))
     return found
 
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.nominal import SinglePulse
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.run.ensemble import DotTable
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
 
 
 class Case(NamedTuple):
@@ -49,6 +51,10 @@ class Trial:
         What drove each member.
     slots : int array, shape (members, firings)
         Number of the slot of each firing; -1 where there is none.
+    due : array, shape (members, firings)
+        Time of that slot, s.
+    ends : array, shape (members,)
+        Ends of the runs, s.
     dots : DotTable
         What the firings did.
     judgement : Judgement
@@ -61,6 +67,8 @@ class Trial:
     patterns: tuple[tuple[int, ...], ...]
     drives: tuple[Drive, ...]
     slots: npt.NDArray[np.int64]
+    due: FloatArray
+    ends: FloatArray
     dots: DotTable
     judgement: Judgement
     statuses: tuple[str, ...]
@@ -80,6 +88,7 @@ def attempt(
     tolerance: float,
     judged_from: int = 0,
     threads: int | None = None,
+    progress: Progress | None = None,
 ) -> Trial:
     """Print all of some patterns in all of some cases, from rest.
 
@@ -99,6 +108,8 @@ def attempt(
         First slot that is judged; those before are a lead-in.
     threads : int, optional
         By default as many as there are cores.
+    progress : callable, optional
+        Called now and then with the number of runs done and of all.
 
     Returns
     -------
@@ -122,7 +133,9 @@ def attempt(
     # A drive may fire its last dot ahead of the slot, or after it.
     ends = np.maximum([drive.times[-1] for drive in drives], due.max(axis=1)) + WAIT
     hammers = [case.hammer for case in cases for _ in patterns]
-    result = Ensemble(hammers, drives, ends, tolerance=tolerance).run(dots=True, threads=threads)
+    result = Ensemble(hammers, drives, ends, tolerance=tolerance).run(
+        dots=True, threads=threads, progress=progress
+    )
     dots = result.dots
     assert dots is not None
     nominals = [case.nominal for case in cases for _ in patterns]
@@ -132,6 +145,8 @@ def attempt(
         patterns=tuple(patterns),
         drives=tuple(drives),
         slots=slots,
+        due=due,
+        ends=ends,
         dots=dots,
         judgement=judgement,
         statuses=tuple(result.status_names),

@@ -20,18 +20,17 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.printing.dots.extra_dots import extra_dots
-from printhammer.printing.dots.judging import FAULTS, judge
+from printhammer.printing.dots.judging import FAULTS
 from printhammer.printing.dots.limits import PRESETS, Limits
-from printhammer.printing.dots.nominal import WAIT, Nominal, nominal, rate_of
-from printhammer.printing.dots.slots import slot_times, slots_of
-from printhammer.printing.dots.strategy import Strategy, checked_drives, name_of, open_loop
+from printhammer.printing.dots.nominal import Nominal, nominal, rate_of
+from printhammer.printing.dots.slots import slots_of
+from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
+from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.printing.page.head import Head, head_of
 from printhammer.printing.page.pattern import Pattern
-from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import numpy.typing as npt
     import xarray as xr
 
@@ -290,6 +289,7 @@ def print_page(
         raise InputError(f"head: {used.wires} wires, expected {pattern.wires} as the pattern has")
     by = PRESETS["slots"] if limits is None else limits
     single = nominal(hammer, tolerance=tolerance)
+    options: dict[str, Any] = {"limits": by, "tolerance": tolerance, "threads": threads}
     run_line, run_wire = np.nonzero(pattern.dots.any(axis=2))
     rows = [slots_of(row) for row in pattern.dots[run_line, run_wire]]
     pieces = []
@@ -299,10 +299,10 @@ def print_page(
             if progress is not None:
                 progress(begun + done, len(rows))
 
-        drives = checked_drives(strategy, hammer, rows[first : first + _PIECE], often)
-        pieces.append(
-            _piece(hammer, drives, rows[first : first + _PIECE], often, single, by, tolerance, threads, tell)
+        trial = attempt(
+            [Case(hammer, single, often)], rows[first : first + _PIECE], strategy, progress=tell, **options
         )
+        pieces.append(_dots_of(trial, options))
     counts = np.array([len(slots) for slots in rows])
     before = np.cumsum([0, *(piece["run"].size for piece in pieces[:-1])])
     for piece, count in zip(pieces, before, strict=True):
@@ -326,38 +326,15 @@ def print_page(
     )
 
 
-def _piece(
-    hammer: Hammer,
-    drives: Sequence[Any],
-    rows: Sequence[tuple[int, ...]],
-    rate: float,
-    single: Nominal,
-    limits: Limits,
-    tolerance: float,
-    threads: int | None,
-    progress: Progress,
-) -> dict[str, Any]:
-    """Run some wires, and return what became of their dots, one wire after the other."""
-    ends = np.array(
-        [
-            max(float(drive.times[-1]), slot_times(slots[-1:], rate)[0]) + WAIT
-            for drive, slots in zip(drives, rows, strict=True)
-        ]
+def _dots_of(trial: Trial, options: dict[str, Any]) -> dict[str, Any]:
+    """Return what became of the dots of some wires, one wire after the other."""
+    ((hammer, single, _rate),) = trial.cases
+    dots, judged, wanted = trial.dots, trial.judgement, trial.slots >= 0
+    extra = extra_dots(
+        hammer, trial.drives, trial.ends, dots, tolerance=options["tolerance"], threads=options["threads"]
     )
-    result = Ensemble(hammer, list(drives), ends, tolerance=tolerance).run(
-        dots=True, threads=threads, progress=progress
-    )
-    dots = result.dots
-    assert dots is not None
-    wanted = np.zeros(dots.fired.shape, np.bool_)
-    due = np.zeros(dots.fired.shape)
-    for number, slots in enumerate(rows):
-        wanted[number, : len(slots)] = True
-        due[number, : len(slots)] = slot_times(slots, rate)
-    judged = judge(dots, wanted, due, single, limits, result.ok)
-    extra = extra_dots(hammer, drives, ends, dots, tolerance=tolerance, threads=threads)
     place = np.cumsum(wanted).reshape(wanted.shape) - 1
-    late = extra.touch - single.flight_time - due[extra.member, extra.firing]
+    late = extra.touch - single.flight_time - trial.due[extra.member, extra.firing]
     return {
         "run": judged.run[wanted],
         "lost": judged.lost[wanted],
@@ -370,5 +347,5 @@ def _piece(
         "extra_of": place[extra.member, extra.firing],
         "extra_arrival": late,
         "extra_force": extra.peak_force,
-        "status": np.array(result.status_names, "U16"),
+        "status": np.array(trial.statuses, "U16"),
     }

@@ -10,6 +10,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.printing.page import matrix_font
 from printhammer.printing.page.lettering import COLUMNS, lettered
+from printhammer.printing.page.pattern_file import read_pattern, write_pattern
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -110,8 +111,6 @@ class Pattern:
         InputError
             The file cannot be read, or is no such file.
         """
-        from printhammer.printing.page.pattern_file import read_pattern
-
         return cls(*read_pattern(path, wires))
 
     def save(self, path: str | Path) -> None:
@@ -122,9 +121,7 @@ class Pattern:
         InputError
             The name ends in none of these, or the file cannot be written.
         """
-        from printhammer.printing.page.pattern_file import write_pattern
-
-        write_pattern(self, path)
+        write_pattern(path, self.name, self.dots)
 
     @property
     def lines(self) -> int:

@@ -36,8 +36,6 @@ from printhammer.support.outputs import write_file
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.printing.page.pattern import Pattern
-
 FORMAT: Final = 1
 """Version of the pattern file format."""
 
@@ -159,15 +157,16 @@ def _bitmap(path: Path, wires: int) -> npt.NDArray[np.bool_]:
     return dots.reshape(lines, wires, -1)
 
 
-def pattern_toml(pattern: Pattern) -> str:
-    """Return the text of a pattern file; reading it back gives an equal pattern."""
-    marks = np.where(pattern.dots.reshape(-1, pattern.slots), _DOT, _EMPTY)
+def pattern_toml(name: str, dots: npt.NDArray[np.bool_]) -> str:
+    """Return the text of a pattern file; reading it back gives the same name and dots."""
+    _lines, wires, slots = dots.shape
+    marks = np.where(dots.reshape(-1, slots), _DOT, _EMPTY)
     rows = "\n".join(f'  "{"".join(row)}",' for row in marks.tolist())
-    name = json.dumps(pattern.name, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return f"format = {FORMAT}\nname = {name}\nwires = {pattern.wires}\nrows = [\n{rows}\n]\n"
+    title = json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return f"format = {FORMAT}\nname = {title}\nwires = {wires}\nrows = [\n{rows}\n]\n"
 
 
-def write_pattern(pattern: Pattern, path: str | Path) -> None:
+def write_pattern(path: str | Path, name: str, dots: npt.NDArray[np.bool_]) -> None:
     """Write a pattern file or a bitmap, whole or not at all.
 
     Raises
@@ -179,12 +178,12 @@ def write_pattern(pattern: Pattern, path: str | Path) -> None:
     suffix = target.suffix.lower()
     content: Any
     if suffix == ".toml":
-        content = pattern_toml(pattern)
+        content = pattern_toml(name, dots)
     elif suffix in BITMAPS:
         from PIL import Image
 
         buffer = BytesIO()
-        white = ~pattern.dots.reshape(-1, pattern.slots)
+        white = ~dots.reshape(-1, dots.shape[2])
         Image.fromarray(white).save(buffer, format=BITMAPS[suffix])
         content = buffer.getvalue()
     else:

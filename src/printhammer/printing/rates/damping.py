@@ -17,11 +17,11 @@ import numpy as np
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
 from printhammer.printing.dots.settling import settle
 from printhammer.printing.rates.materials import Material, materials
+from printhammer.printing.rates.perturbation import changed
 from printhammer.printing.rates.safe_rate import FIRST, LAST, rate_grid
 from printhammer.printing.rates.safe_rates import safe_rates
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
@@ -204,7 +204,8 @@ def damping_study(
     tried = tuple(materials(hammer, single) if others is None else others)
     if not tried:
         raise InputError("others: expected at least one material")
-    made, status = _made(hammer, tried)
+    made, fate = changed(hammer, [(material.changes, material.label) for material in tried])
+    status = np.array(fate, "U17")
     values = {name: np.full(len(tried), np.nan) for name in _COLUMNS}
     resting = np.flatnonzero(status == "ok")
     factors = tuned([made[k] for k in resting], single.force, tolerance=tolerance, threads=threads)
@@ -332,20 +333,3 @@ def tuned(
 def _driven(hammer: Hammer, factor: float) -> Hammer:
     """Return the hammer with its waveform a factor larger."""
     return hammer.replace("waveform", pulse_of(hammer).scaled(float(factor)), source="the same print force")
-
-
-def _made(hammer: Hammer, tried: Sequence[Material]) -> tuple[list[Hammer], npt.NDArray[np.str_]]:
-    made, status = [], np.full(len(tried), "ok", "U17")
-    for number, material in enumerate(tried):
-        one = hammer
-        try:
-            one = hammer.replace(material.changes, source=material.label) if material.changes else hammer
-        except InputError:
-            status[number] = "no hammer"
-        else:
-            try:
-                rest_state(one)
-            except InputError:
-                status[number] = "does not rest"
-        made.append(one)
-    return made, status

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from printhammer.hammer.hammer import Hammer
 
 
@@ -111,3 +115,35 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
                 f"{hammer.path}: perturbation of damping, expected a backstop with damping or relaxation time"
             )
     return hammer.replace(changes, source=f"perturbed: {by.name}") if changes else hammer
+
+
+def changed(
+    hammer: Hammer, changes: Iterable[tuple[Mapping[str, Any], str]]
+) -> tuple[list[Hammer], list[str]]:
+    """Return hammers with other constants, and what becomes of each.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer that all of them come from.
+    changes : iterable of (mapping, str)
+        For each what `Hammer.replace` takes, and its source; without changes it is the hammer itself.
+
+    Returns
+    -------
+    hammers : list of Hammer
+        One for each; the hammer itself where there is none with these constants.
+    status : list of str
+        "ok", "no hammer" or "does not rest".
+    """
+    made, status = [], []
+    for change, source in changes:
+        one, fate = hammer, "no hammer"
+        with suppress(InputError):
+            one = hammer.replace(change, source=source) if change else hammer
+            fate = "does not rest"
+            rest_state(one)
+            fate = "ok"
+        made.append(one)
+        status.append(fate)
+    return made, status

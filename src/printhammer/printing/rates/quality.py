@@ -322,7 +322,7 @@ def quality(
         lost=found.lost[0, judged],
         extra_contacts=found.extra_contacts[0, judged],
         fault=found.faults[0, judged],
-        wear=wear_of(motion.contacts, hammer.mass),
+        wear=wear_of(motion),
         energy=motion.energy,
         heat=_heat(hammer, drive, motion.end),
         fired=len(motion.dots),

@@ -195,6 +195,7 @@ def safe_rate(
     last: float | str = LAST,
     step: float | str = STEP,
     stop: bool = True,
+    cycle: bool = True,
     tolerance: float = TOLERANCE,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -217,6 +218,8 @@ def safe_rate(
     stop : bool, optional
         Whether to stop at the first rate that does not pass; otherwise the rates up to the last one are run
         as well, for a chart.
+    cycle : bool, optional
+        Whether the dots of the cycle have to be within limits too, beside those of the patterns from rest.
     tolerance : float, optional
         As for `printhammer.simulate`.
     threads : int, optional
@@ -239,7 +242,7 @@ def safe_rate(
     bounds = Limits() if limits is None else limits
     single = single_pulse(hammer, tolerance=tolerance) if nominal is None else nominal
     patterns = from_rest(every=strategy is not open_loop)
-    cycle = [slots_of(cycle_with_lead_in())]
+    around_it = [slots_of(cycle_with_lead_in())]
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     rows: list[_Row] = []
     failure: Failure | None = None
@@ -251,8 +254,8 @@ def safe_rate(
         if stop and failure is None and not trial.passed.all():
             good = good[good < np.argmin(trial.passed)]
         around = None
-        if good.size:
-            around = attempt([cases[k] for k in good], cycle, strategy, judged_from=LEAD_IN, **options)
+        if cycle and good.size:
+            around = attempt([cases[k] for k in good], around_it, strategy, judged_from=LEAD_IN, **options)
         for k, case in enumerate(cases):
             place = int(np.searchsorted(good, k))
             run = around if around is not None and place < good.size and good[place] == k else None

@@ -12,16 +12,18 @@ import numpy as np
 
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.nominal import nominal, rate_of, single_pulses
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case
+from printhammer.printing.rates.perturbation import changed
 from printhammer.printing.rates.safe_rate import FIRST, LAST, rate_grid
 from printhammer.printing.rates.safe_rates import all_pass, safe_rates
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import numpy.typing as npt
     import xarray as xr
 
@@ -201,7 +203,10 @@ def tolerance_yield(
     spread = spreads_of(hammer, spreads)
     design = nominal(hammer, tolerance=tolerance)
     factors = draw(spread, count, int(seed))
-    made, status = _made(hammer, spread, factors)
+    made, fate = changed(
+        hammer, [(row, "drawn within its spread") for row in _changes(hammer, spread, factors)]
+    )
+    status = np.array(fate, "U16")
     resting = np.flatnonzero(status == "ok")
     force, flight = np.full(count, np.nan), np.full(count, np.nan)
     alone = single_pulses([made[k] for k in resting], tolerance=tolerance, threads=threads)
@@ -309,26 +314,11 @@ def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
     return np.asarray(1.0 + (2.0 * points - 1.0) * np.array(list(spreads.values())))
 
 
-def _made(
-    hammer: Hammer, spreads: Mapping[str, float], factors: FloatArray
-) -> tuple[list[Hammer], npt.NDArray[np.str_]]:
-    """Return the hammers, the design where there is none, and their statuses."""
-    values = {key: hammer.constants[key].si for key in spreads}
-    made, status = [], np.full(len(factors), "ok", "U16")
-    for number, row in enumerate(factors.tolist()):
-        changes = {}
-        for (key, value), factor in zip(values.items(), row, strict=True):
-            from_here = hammer.origin if key == GAP else 0.0
-            changes[key] = from_here + (value - from_here) * factor
-        one = hammer
-        try:
-            one = hammer.replace(changes, source="drawn within its spread")
-        except InputError:
-            status[number] = "no hammer"
-        else:
-            try:
-                rest_state(one)
-            except InputError:
-                status[number] = "does not rest"
-        made.append(one)
-    return made, status
+def _changes(hammer: Hammer, spreads: Iterable[str], factors: FloatArray) -> list[dict[str, float]]:
+    """Return the constants of the hammers, SI, by the factors on those of the design."""
+    zero = {key: hammer.origin if key == GAP else 0.0 for key in spreads}
+    values = {key: hammer.constants[key].si for key in zero}
+    return [
+        {key: zero[key] + (values[key] - zero[key]) * factor for key, factor in zip(zero, row, strict=True)}
+        for row in factors.tolist()
+    ]
