@@ -1,8 +1,8 @@
 """Measure how fast hammers print with feedback, as they should be and not quite so, and print tables.
 
 Run it with ``.venv/bin/python docs/measure/feedback.py [--step HZ] [HAMMER ...]``; it takes hours a hammer.
-Safe rates are those of `printhammer.printing.safe_rate`: all patterns of eight slots and the de Bruijn cycle.
-The grid of rates has the step asked for, from 500 Hz on, and from the last rate that passes 5 Hz to the next.
+Safe rates are those of `printhammer.safe_rate`: all patterns of eight slots and the de Bruijn cycle. The grid
+of rates has the step asked for, from 500 Hz on, and from the last rate that passes 5 Hz to the next.
 
 With ``--grid FIRST`` it looks at every rate of the grid of 5 Hz from there up to 2.2 times the open loop, for
 the hammer as it should be, and goes on after one that fails; some six seconds a rate.
@@ -19,12 +19,12 @@ from printhammer.control.controller import Controller
 from printhammer.control.driver import driver_of
 from printhammer.control.feedback import FeedbackStrategy
 from printhammer.control.sensor import PositionSensor
-from printhammer.printing.limits import Limits
-from printhammer.printing.page import Page
-from printhammer.printing.perturbation import Perturbation, perturbed
-from printhammer.printing.safe_rate import from_rest, safe_rate
-from printhammer.printing.strategy import Strategy, open_loop
-from printhammer.printing.trial import Case, attempt
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.strategy import Strategy, open_loop
+from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.page.page import Page
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
+from printhammer.printing.rates.safe_rate import from_rest, safe_rate
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 FIRST, FINE = 500.0, 5.0

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 
 import printhammer as ph
-from printhammer.printing.page import Page
+from printhammer.printing.page.page import Page
 
 HAMMER = ph.load("hendriks-1983")
 TEXT = "The quick brown fox jumps over the lazy dog, 0123456789 time"

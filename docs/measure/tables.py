@@ -16,9 +16,9 @@ from pathlib import Path
 import printhammer as ph
 from printhammer.control.table import CompensationTable
 from printhammer.control.table_report import PERTURBATIONS
-from printhammer.printing.nominal import nominal
-from printhammer.printing.perturbation import Perturbation, perturbed
-from printhammer.printing.safe_rate import SafeRate
+from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
+from printhammer.printing.rates.safe_rate import SafeRate
 from printhammer.reconstruction.family.family import family_hammers
 
 OTHERS = (1, 5, 9, 13, 17)

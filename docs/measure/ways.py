@@ -15,8 +15,8 @@ import printhammer as ph
 from printhammer.control.controller import Controller
 from printhammer.control.driver import driver_of
 from printhammer.control.feedback import Feedback, FeedbackStrategy
-from printhammer.printing.page import Page
-from printhammer.printing.strategy import Strategy, open_loop
+from printhammer.printing.dots.strategy import Strategy, open_loop
+from printhammer.printing.page.page import Page
 
 RATES = ("1 kHz", "1.3 kHz", "1.6 kHz")
 TEXT = "The quick brown fox\njumps over the lazy dog\n0123456789 !?"

@@ -2,9 +2,9 @@ import pytest
 
 from printhammer.claims import Context, claims, judge
 from printhammer.claims.bursts import hung_up, spreads
-from printhammer.claims.context import touches
 from printhammer.claims.integrators import REFERENCE_TOLERANCE
 from printhammer.drive.trains import PulseTrain
+from printhammer.printing.dots.settling import touches
 
 
 def test_the_peak_after_the_second_pulse_is_no_position_at_the_firing(context: Context) -> None:

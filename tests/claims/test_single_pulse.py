@@ -4,8 +4,7 @@ import pytest
 
 import printhammer as ph
 from printhammer.claims import JUDGES, Context, claims, judge
-from printhammer.claims.context import touches
-from printhammer.claims.shapes import rebounds
+from printhammer.printing.dots.settling import rebounds, touches
 
 SINGLE = (
     "single_pulse_stroke",

@@ -48,7 +48,7 @@ def test_share_inside_the_window(context: Context, given_panels) -> None:
 
 
 def test_points_on_the_orbit_and_anywhere(context: Context, given_panels) -> None:
-    from printhammer.claims.context import touches
+    from printhammer.printing.dots.settling import touches
 
     start = touches(context.single)[0].t_in
     on_orbit = np.column_stack(context.single.at(RANDOM.uniform(start, start + 1e-3, 200)))

@@ -11,7 +11,7 @@ from tests.hammers import CRUDE
 import printhammer as ph
 from printhammer.cli.main import app
 from printhammer.cli.print_ import EXAMPLE
-from printhammer.printing.pattern import Pattern
+from printhammer.printing.page.pattern import Pattern
 
 HAMMER = ("--hammer", CRUDE)
 

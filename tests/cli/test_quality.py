@@ -11,8 +11,8 @@ from tests.hammers import CRUDE
 import printhammer as ph
 from printhammer.cli.main import app
 from printhammer.cli.quality import EXAMPLE
-from printhammer.printing import damping
-from printhammer.printing.materials import Material
+from printhammer.printing.rates import damping
+from printhammer.printing.rates.materials import Material
 
 GRID = ("--first", "400 Hz", "--last", "1.2 kHz", "--step", "400 Hz")
 

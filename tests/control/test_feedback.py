@@ -16,10 +16,10 @@ from printhammer.control.feedback import Feedback, FeedbackStrategy
 from printhammer.control.learning import FRONT_ERROR, SCALE_ERROR
 from printhammer.control.sensor import PositionSensor
 from printhammer.drive.file import read_drive
-from printhammer.printing.limits import Limits
-from printhammer.printing.perturbation import Perturbation, perturbed
-from printhammer.printing.slots import eight_slot_patterns, slots_of
-from printhammer.printing.trial import Case, attempt
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.slots import eight_slot_patterns, slots_of
+from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
 
 CURRENT = 2.0
 RATE = 1600.0

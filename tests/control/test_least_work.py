@@ -25,7 +25,7 @@ from printhammer.control.least_work_search import Task, printing_current
 from printhammer.control.least_work_slot import NodeCurrent, Outcomes, SlotState, node_times, outcomes
 from printhammer.control.least_work_tables import save_least_work
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
-from printhammer.printing.nominal import nominal
+from printhammer.printing.dots.nominal import nominal
 
 
 def thrown(task: Any, begin: SlotState, duration: float, arrival: float, nodes: int, *_: Any) -> np.ndarray:

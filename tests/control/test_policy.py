@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from printhammer.control.policy import Policy
-from printhammer.printing.limits import Limits
+from printhammer.printing.dots.limits import Limits
 
 SPEEDS = np.linspace(0.6, 1.3, 15)
 

@@ -9,7 +9,7 @@ import printhammer as ph
 from printhammer.control.table import COLUMNS
 from printhammer.control.table_drive import fading, of_width, print_pulse
 from printhammer.drive.waveforms.shapes import Chain, HalfSine
-from printhammer.printing.slots import slot_times
+from printhammer.printing.dots.slots import slot_times
 
 
 def test_at_its_own_rates_a_table_says_what_it_holds() -> None:

@@ -10,8 +10,8 @@ import printhammer as ph
 from printhammer.control import table_search, table_tuning, table_ways
 from printhammer.control.table_polish import Work
 from printhammer.control.table_ways import Ways
-from printhammer.printing.nominal import nominal
-from printhammer.printing.perturbation import perturbed
+from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.rates.perturbation import perturbed
 
 TOLERANCE = 1e-10
 PERIOD = 1.0 / RATE

@@ -7,9 +7,9 @@ from tests.hammers import crude
 import printhammer as ph
 from printhammer.control.table import COLUMNS, CompensationTable
 from printhammer.control.table_report import PERTURBATIONS, STRATEGIES, between, random_patterns
-from printhammer.printing.nominal import nominal
-from printhammer.printing.perturbation import Perturbation
-from printhammer.printing.slots import slot_times
+from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.dots.slots import slot_times
+from printhammer.printing.rates.perturbation import Perturbation
 
 RATE = 1850.0
 """Slots per second at which rebounds of the hammer of these tests disturb the next dot."""

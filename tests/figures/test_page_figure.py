@@ -14,9 +14,9 @@ from printhammer.drive.trains import Drive
 from printhammer.figures.elements import ink
 from printhammer.figures.elements.ink import INK, PAPER, Sheet, coloured, inked
 from printhammer.figures.printing.page import summary, whole_sheet, zoom_slots, zoomed_sheet
-from printhammer.printing.page import Page, print_page
-from printhammer.printing.pattern import Pattern
-from printhammer.printing.strategy import open_loop
+from printhammer.printing.dots.strategy import open_loop
+from printhammer.printing.page.page import Page, print_page
+from printhammer.printing.page.pattern import Pattern
 
 MM = 1e-3
 

@@ -9,14 +9,14 @@ from matplotlib.figure import Figure
 
 import printhammer as ph
 from printhammer.figures.printing.quality import plot_safe_rate
-from printhammer.printing.damping import DampingStudy
-from printhammer.printing.judging import FAULTS
-from printhammer.printing.limits import Limits
-from printhammer.printing.materials import Material
-from printhammer.printing.nominal import nominal
-from printhammer.printing.quality import Quality
-from printhammer.printing.safe_rate import SafeRate
-from printhammer.printing.tolerance import ToleranceYield
+from printhammer.printing.dots.judging import FAULTS
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.rates.damping import DampingStudy
+from printhammer.printing.rates.materials import Material
+from printhammer.printing.rates.quality import Quality
+from printhammer.printing.rates.safe_rate import SafeRate
+from printhammer.printing.rates.tolerance import ToleranceYield
 
 
 def lines(drawn: Figure, gid: str) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -77,7 +77,7 @@ def test_an_unknown_format_is_refused(hammer: "ph.Hammer", tmp_path: Path) -> No
     ("code", "absent"),
     [
         (
-            "import printhammer.figures, printhammer.buzz",
+            "import printhammer.figures, printhammer.printing.dots.buzz",
             ["matplotlib", "numba", "scipy", "pandas", "xarray"],
         ),
         (

@@ -8,7 +8,7 @@ import pytest
 import printhammer as ph
 from printhammer.claims import Context
 from printhammer.claims.context import NotMeasurableError
-from printhammer.reconstruction.family import conclusions, safe_rate
+from printhammer.reconstruction.family import conclusions
 from printhammer.reconstruction.family.conclusions import QUANTITIES, Conclusions, conclude
 
 
@@ -61,23 +61,11 @@ def test_at_the_safe_rate_all_patterns_are_printed_well_and_at_the_next_one_not(
     assert bad_patterns(hammer, rate + 5.0) != []
 
 
-def test_patterns_that_begin_later_are_printed_alike(
+def test_without_a_rate_at_which_patterns_are_printed_well_there_is_no_safe_rate(
     context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert len(safe_rate.patterns()) == 128
-    assert len(safe_rate.patterns(later=True)) == 255
-    monkeypatch.setattr(safe_rate, "FIRST", 600)
-    rate = safe_rate.safe_rate(context)
-    assert rate is not None
-    for later in (False, True):
-        assert safe_rate.printed_well(context, [rate, rate + 5.0], later=later) == [True, False]
-
-
-def test_a_hammer_that_never_prints_two_dots_alike_has_no_safe_rate(
-    context: Context, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(safe_rate, "FORCE", -1.0)
-    assert safe_rate.safe_rate(context) is None
+    monkeypatch.setattr(conclusions, "GRID", (1900, 2000, 50))
+    assert conclusions.rate_from_rest(context) is None
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.linear import LinearSpring
-from printhammer.printing.nominal import nominal
+from printhammer.printing.dots.nominal import nominal
 from printhammer.run.coil_work import coil_power
 
 

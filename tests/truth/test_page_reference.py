@@ -5,9 +5,9 @@ import pytest
 from tests.hammers import CRUDE, TRUTH
 
 import printhammer as ph
+from printhammer.printing.dots.slots import FIRST_SLOT
 from printhammer.printing.page import Page, print_page
-from printhammer.printing.pattern import Pattern
-from printhammer.printing.slots import FIRST_SLOT
+from printhammer.printing.page.pattern import Pattern
 from printhammer.reference.integrator import reference
 
 RATE = 1500.0

@@ -8,7 +8,7 @@ from tests.hammers import MASS, STOP, hertz, interpreted, made_of, preload, rigi
 
 import printhammer as ph
 from printhammer.drive.waveforms.shapes import Rectangle
-from printhammer.printing.settling import SETTLED, settle, wear_of
+from printhammer.printing.dots.settling import SETTLED, settle, wear_of
 
 PUSH = 12.0
 WIDTH = 150e-6
@@ -56,7 +56,7 @@ def test_one_touch_of_a_damped_backstop(damping: float) -> None:
     z = damping / stiffness * v_in
     y = brentq(lambda y: z - math.log1p(z) + y + math.log1p(-y), 1e-12, min(z, 1.0 - 1e-12), xtol=1e-15)
     v_out = y * stiffness / damping
-    wear = wear_of(motion.contacts, hammer.mass)
+    wear = wear_of(motion)
     assert wear.touches == 1
     assert wear.impulse == pytest.approx(MASS * (v_in + v_out), rel=1e-8)
     assert wear.loss == pytest.approx(0.5 * MASS * (v_in**2 - v_out**2), rel=1e-8)

@@ -5,7 +5,7 @@ import pytest
 from tests.hammers import crude
 
 import printhammer as ph
-from printhammer.printing.slots import slot_times
+from printhammer.printing.dots.slots import slot_times
 from printhammer.reference.integrator import reference
 
 

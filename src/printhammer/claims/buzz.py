@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from printhammer.buzz import BuzzSearch, BuzzTrain, delayed_train, find_buzz_train, longest_run
-from printhammer.claims.context import TAIL, Context, touches
+from printhammer.claims.context import TAIL, Context
 from printhammer.claims.definition import claims
 from printhammer.claims.judging import Measured, measures
 from printhammer.drive.trains import PulseTrain
+from printhammer.printing.dots.buzz import BuzzSearch, BuzzTrain, delayed_train, find_buzz_train, longest_run
+from printhammer.printing.dots.settling import touches
 
 if TYPE_CHECKING:
     from printhammer.claims.definition import Claim

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.contacts import Contact, Dot
+    from printhammer.run.contacts import Dot
     from printhammer.run.ensemble import DotTable, EnsembleResult
     from printhammer.run.motion import Motion
 
@@ -208,8 +208,3 @@ class Context:
         if not force:
             raise NotMeasurableError("The single-pulse dot has no peak force")
         return force
-
-
-def touches(motion: Motion) -> list[Contact]:
-    """List the touches of the backstop, the rest at the start excluded."""
-    return [c for c in motion.contacts if c.surface == "backstop" and not c.initial]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.claims.context import CYCLE, NotMeasurableError, touches
+from printhammer.claims.context import CYCLE, NotMeasurableError
 from printhammer.claims.judging import Measured, measures
 from printhammer.drive.trains import PulseTrain
+from printhammer.printing.dots.settling import touches
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context

@@ -1,19 +1,15 @@
-"""Numbers read off a motion or a set of points: largest values, rebounds, rank correlation."""
+"""Numbers read off a motion or a set of points: largest values, rank correlation."""
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.claims.context import touches
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
 
 _POINTS: Final = 4001
@@ -30,33 +26,6 @@ def largest(function: Callable[[FloatArray], FloatArray], start: float, end: flo
         best = max(best, float(values[top]))
         start, end = grid[max(top - 1, 0)], grid[min(top + 1, _POINTS - 1)]
     return best
-
-
-@dataclass(frozen=True)
-class Rebound:
-    """An interval above the backstop between two touches: times, s, and height above the backstop, m."""
-
-    start: float
-    end: float
-    height: float
-
-    @property
-    def duration(self) -> float:
-        """Duration, s."""
-        return self.end - self.start
-
-
-def rebounds(motion: Motion, position: float) -> list[Rebound]:
-    """List the intervals above the backstop between touches, the rest at the start excluded."""
-    times, x = motion.maxima
-    found = []
-    for before, after in itertools.pairwise(touches(motion)):
-        if before.t_out is None:
-            continue
-        inside = (times >= before.t_out) & (times <= after.t_in)
-        height = float(x[inside].max()) - position if inside.any() else 0.0
-        found.append(Rebound(before.t_out, after.t_in, height))
-    return found
 
 
 def falling(values: Sequence[float]) -> bool:

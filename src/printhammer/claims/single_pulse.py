@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from printhammer.claims.context import NotMeasurableError, touches
+from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.judging import Measured, measures
-from printhammer.claims.shapes import falling, largest, rank_correlation, rebounds
+from printhammer.claims.shapes import falling, largest, rank_correlation
+from printhammer.printing.dots.settling import rebounds, touches
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.claims.context import NotMeasurableError, touches
+from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.definition import claims
 from printhammer.claims.judging import Measured, measures
 from printhammer.claims.shapes import rank_correlation
+from printhammer.printing.dots.settling import touches
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from printhammer.claims.context import TAIL, touches
+from printhammer.claims.context import TAIL
 from printhammer.claims.judging import Measured, measures
+from printhammer.printing.dots.settling import touches
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context

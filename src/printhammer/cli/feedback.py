@@ -172,7 +172,7 @@ def _sensor(given: dict[str, Any]) -> Any:
 def _driven(hammer: Hammer, supply: str, travel: str) -> Hammer:
     """Return the hammer that is driven, which may differ from the nominal one."""
     from printhammer.drive.input import read_number, read_positive
-    from printhammer.printing.perturbation import Perturbation, perturbed
+    from printhammer.printing.rates.perturbation import Perturbation, perturbed
 
     current = read_positive(number(supply, "supply") or 0.0, "1", "supply") - 1.0
     return perturbed(hammer, Perturbation(current=current, travel=read_number(travel, "m", "travel")))

@@ -48,7 +48,7 @@ def rates_between(text: str, name: str, *, most: int) -> list[float]:
     """
     import numpy as np
 
-    from printhammer.printing.nominal import rate_of
+    from printhammer.printing.dots.nominal import rate_of
 
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:

@@ -16,8 +16,8 @@ from printhammer.cli.units import Units
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from printhammer.printing.page import Page
-    from printhammer.printing.pattern import Pattern
+    from printhammer.printing.page.page import Page
+    from printhammer.printing.page.pattern import Pattern
 
 EXAMPLE: Final = "Example: printhammer print 'Bounce and chaotic motion' --rate 1.4kHz --out page.png"
 
@@ -125,11 +125,11 @@ def print_(
     from printhammer.cli.saving import PICTURES, check_endings, say_written, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.errors import InputError
-    from printhammer.printing.limits import limits_named
-    from printhammer.printing.nominal import rate_of
-    from printhammer.printing.page import print_page
-    from printhammer.printing.page_tables import save_page
-    from printhammer.printing.pattern_file import BITMAPS, SUFFIXES
+    from printhammer.printing.dots.limits import limits_named
+    from printhammer.printing.dots.nominal import rate_of
+    from printhammer.printing.page.page import print_page
+    from printhammer.printing.page.page_tables import save_page
+    from printhammer.printing.page.pattern_file import BITMAPS, SUFFIXES
     from printhammer.support.outputs import check_outputs
 
     if rate is None:
@@ -193,9 +193,9 @@ def _pattern(
     text: str | None, path: Path | None, font: Path | None, wires: int | None, columns: int | None
 ) -> Pattern:
     from printhammer.errors import InputError
-    from printhammer.printing.lettering import COLUMNS
-    from printhammer.printing.matrix_font import WIRES
-    from printhammer.printing.pattern import Pattern
+    from printhammer.printing.page.lettering import COLUMNS
+    from printhammer.printing.page.matrix_font import WIRES
+    from printhammer.printing.page.pattern import Pattern
 
     if (text is None) == (path is None):
         given = "neither is" if text is None else "both are"
@@ -220,7 +220,7 @@ def _head(
     wires: int, pitch: str | None, wire_diameter: str | None, density: float | None, gap: float | None
 ) -> Any:
     from printhammer.drive.input import read_positive
-    from printhammer.printing.head import DENSITY, LINE_GAP, head_of
+    from printhammer.printing.page.head import DENSITY, LINE_GAP, head_of
 
     return head_of(
         wires,

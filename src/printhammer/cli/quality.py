@@ -15,7 +15,7 @@ from printhammer.cli.units import Units
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.limits import Limits
+    from printhammer.printing.dots.limits import Limits
 
 EXAMPLE: Final = "Example: printhammer quality hendriks-1983 --rate 900Hz --out quality.png"
 
@@ -107,7 +107,7 @@ def quality(
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.drive.trains import PulseTrain
     from printhammer.errors import InputError
-    from printhammer.printing.quality_tables import SUFFIXES, save_result
+    from printhammer.printing.rates.quality_tables import SUFFIXES, save_result
     from printhammer.support.outputs import check_outputs
 
     wanted = out or []
@@ -164,7 +164,7 @@ def quality(
     bad = ""
     found: Any
     if task == "report":
-        from printhammer.printing.quality import quality as report
+        from printhammer.printing.rates.quality import quality as report
 
         slots = pattern if pulses is None else whole(pulses, "pulses")
         placed: dict[str, Any] = {} if pitch is None else {"pitch": pitch}
@@ -172,13 +172,13 @@ def quality(
         lines = quality_screen.report(found, units)
         bad = "" if found.ok else f"the run ended early: {found.status}"
     elif task == "safe-rate":
-        from printhammer.printing.safe_rate import safe_rate as safe
+        from printhammer.printing.rates.safe_rate import safe_rate as safe
 
         with telling("patterns") as say:
             found = safe(loaded, progress=lambda at: say(f"patterns up to {at:g} Hz"), **many)
         lines = quality_screen.safe_rate(found, units)
     elif task == "yield":
-        from printhammer.printing.tolerance import tolerance_yield
+        from printhammer.printing.rates.tolerance import tolerance_yield
 
         if seed is not None:
             many["seed"] = whole(seed, "seed")
@@ -192,7 +192,7 @@ def quality(
             found = tolerance_yield(loaded, rate, number=count, progress=tell, **spreads, **many)
         lines = quality_screen.tolerance_yield(found, units)
     else:
-        from printhammer.printing.damping import damping_study
+        from printhammer.printing.rates.damping import damping_study
 
         if current is not None:
             many["current"] = current
@@ -246,7 +246,7 @@ def _limits(name: str | None, force: str | None, arrival: str | None) -> Limits:
     from dataclasses import replace
 
     from printhammer.drive.input import read_number
-    from printhammer.printing.limits import limits_named
+    from printhammer.printing.dots.limits import limits_named
 
     found = limits_named("slots" if name is None else name)
     if force is not None:
@@ -266,7 +266,7 @@ def _share(text: str, name: str) -> float:
 def _spreads(hammer: Hammer, given: list[str]) -> dict[str, Any]:
     """Read spreads: one number for all constants, and others by key."""
     from printhammer.errors import InputError
-    from printhammer.printing.tolerance import spreads_of
+    from printhammer.printing.rates.tolerance import spreads_of
 
     if not given:
         return {}

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from printhammer.cli.units import Units
-    from printhammer.printing.damping import DampingStudy
-    from printhammer.printing.limits import Limits
-    from printhammer.printing.quality import Quality, Spread
-    from printhammer.printing.safe_rate import SafeRate
-    from printhammer.printing.tolerance import ToleranceYield
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.rates.damping import DampingStudy
+    from printhammer.printing.rates.quality import Quality, Spread
+    from printhammer.printing.rates.safe_rate import SafeRate
+    from printhammer.printing.rates.tolerance import ToleranceYield
 
 _SHARES: Final = (0.95, 0.5)
 

@@ -17,7 +17,7 @@ from printhammer.control.sensor import run_key
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Switched
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.printing.slots import slot_times
+from printhammer.printing.dots.slots import slot_times
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 
 if TYPE_CHECKING:

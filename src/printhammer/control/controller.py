@@ -21,8 +21,8 @@ from printhammer.control.learning import Contacts, Touched
 from printhammer.control.policy import KNOWN, Done, Policy, between
 from printhammer.control.swing_table import ALWAYS, FREE, PUSHED, force_map
 from printhammer.errors import InputError
-from printhammer.printing.limits import Limits
-from printhammer.printing.nominal import nominal
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

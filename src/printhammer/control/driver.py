@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.nominal import pulse_of
+from printhammer.printing.dots.nominal import pulse_of
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer

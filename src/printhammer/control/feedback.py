@@ -20,12 +20,12 @@ from printhammer.control.driver import LARGEST_CURRENT, driver_of
 from printhammer.control.sensor import PositionSensor
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
-from printhammer.printing.limits import Limits
-from printhammer.printing.nominal import WAIT, rate_of
-from printhammer.printing.safe_rate import from_rest
-from printhammer.printing.slots import slots_of
-from printhammer.printing.strategy import name_of, open_loop
-from printhammer.printing.trial import Case, attempt
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import WAIT, rate_of
+from printhammer.printing.dots.slots import slots_of
+from printhammer.printing.dots.strategy import name_of, open_loop
+from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.simulate import simulate
 
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from printhammer.control.driver import Driver
     from printhammer.drive.sequence import PulseSequence
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
-    from printhammer.printing.strategy import Strategy
+    from printhammer.printing.dots.nominal import Nominal
+    from printhammer.printing.dots.strategy import Strategy
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
 
@@ -53,7 +53,7 @@ _GAPS: Final = (1.5, 6.0, 46)
 
 
 class FeedbackStrategy:
-    """Feedback as a way to drive a hammer, see `printhammer.printing.strategy.Strategy`.
+    """Feedback as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ import numpy as np
 from printhammer.control.bounded import BoundedSequence
 from printhammer.control.landing import landing
 from printhammer.control.swing_table import AHEAD, first_pulse, force_map, swing_table
-from printhammer.printing.perturbation import Perturbation, perturbed
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.control.launch import Launch
     from printhammer.control.swing_table import ForceMap, IntArray, SwingTable
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
+    from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import FloatArray
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from printhammer.control.driver import Driver
     from printhammer.control.swing_table import ForceMap, IntArray
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
+    from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import FloatArray
 
 _STARTS: Final = np.linspace(0.85, 1.75, 28)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from printhammer.control.driver import Driver
     from printhammer.control.swing_table import ForceMap
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
+    from printhammer.printing.dots.nominal import Nominal
 
 _WIDTHS: Final = np.linspace(0.2, 1.0, 81)
 _ALMOST: Final = 0.9

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.flight import least_squares
-from printhammer.printing.perturbation import Perturbation, perturbed
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.printing.nominal import Nominal, nominal, pulse_of, rate_of
+from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of, rate_of
 from printhammer.run.ledger import stored_energy
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import CYCLE, simulate

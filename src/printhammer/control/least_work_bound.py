@@ -29,7 +29,7 @@ from printhammer.support.roots import bisect
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
+    from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import FloatArray
 
 _POINTS: Final = 4001

@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.control.least_work import NoBurstError, least_work
 from printhammer.errors import InputError
-from printhammer.printing.nominal import rate_of
+from printhammer.printing.dots.nominal import rate_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -22,7 +22,7 @@ from printhammer.control.swing_table import FORCES
 if TYPE_CHECKING:
     from printhammer.control.fronts import Fronts
     from printhammer.control.swing_table import IntArray, SwingTable
-    from printhammer.printing.limits import Limits
+    from printhammer.printing.dots.limits import Limits
     from printhammer.support.arrays import FloatArray
 
 NEVER: Final = 50.0

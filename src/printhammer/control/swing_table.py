@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from printhammer.control.driver import Driver
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
+    from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import FloatArray
 
     IntArray = npt.NDArray[np.int64]

@@ -220,7 +220,7 @@ class CompensationTable:
             )
 
     def strategy(self, hammer: Hammer) -> TableStrategy:
-        """Return the table as a way to drive a hammer, see `printhammer.printing.strategy.Strategy`.
+        """Return the table as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`.
 
         Parameters
         ----------
@@ -245,7 +245,7 @@ class CompensationTable:
         hammer : Hammer
             The hammer the table is made for.
         slots : sequence of int
-            Numbers of the slots, ascending; slot 0 is at `printhammer.printing.slots.FIRST_SLOT`.
+            Numbers of the slots, ascending; slot 0 is at `printhammer.printing.dots.slots.FIRST_SLOT`.
         rate : float or str
             Slots per second, Hz, or text with a unit.
 

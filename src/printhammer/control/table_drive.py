@@ -10,8 +10,8 @@ import numpy as np
 from printhammer.control.histories import histories_of
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.nominal import pulse_of
-from printhammer.printing.slots import slot_times
+from printhammer.printing.dots.nominal import pulse_of
+from printhammer.printing.dots.slots import slot_times
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.limits import Limits
+    from printhammer.printing.dots.limits import Limits
     from printhammer.support.arrays import FloatArray
 
 ROUNDS: Final = 7

@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.printing.nominal import Nominal, nominal
+from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:

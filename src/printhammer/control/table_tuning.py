@@ -22,8 +22,8 @@ from printhammer.control.table_search import SPACING, chosen, spaced
 from printhammer.control.table_single import Single, single_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
-from printhammer.printing.limits import Limits
-from printhammer.printing.perturbation import Perturbation, perturbed
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""What a hammer prints: patterns of dots and how well they come out, quality, safe rate, pages.
+"""What a hammer prints: `dots` one by one, the `rates` at which they come out well, and whole `page`s.
 
 Everything here takes a hammer and what is to be printed, runs ensembles, and returns frozen results that can
 be tabulated and drawn.

@@ -13,13 +13,13 @@ from printhammer.units import from_si
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.buzz import BuzzSearch, BuzzTrain
     from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.buzz import BuzzSearch, BuzzTrain
     from printhammer.run.motion import Motion
 
 
 def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | str | None = None) -> Figure:
-    """Draw Fig. 7: the train that `printhammer.buzz.find_buzz_train` finds, or its best attempt, saying so.
+    """Draw Fig. 7: the train that `find_buzz_train` finds, or its best attempt, saying so.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | 
     InputError
         The hammer has no waveform, pack, backstop or rest state.
     """
-    from printhammer.buzz import find_buzz_train
+    from printhammer.printing.dots.buzz import find_buzz_train
 
     found = search if search is not None else find_buzz_train(hammer)
     train = found.best

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.printing.damping import DampingStudy
+    from printhammer.printing.rates.damping import DampingStudy
     from printhammer.support.arrays import FloatArray
 
 COLOURS: Final = {"as it is": INK, "hard": BLUE, "elastomer": GREEN, "pack": ORANGE}

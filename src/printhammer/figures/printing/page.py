@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.collections import EllipseCollection
     from matplotlib.figure import Figure
 
-    from printhammer.printing.page import Page
+    from printhammer.printing.page.page import Page
     from printhammer.support.arrays import FloatArray
 
 View = Literal["page", "zoom", "sheet"]

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.printing.limits import Limits
-    from printhammer.printing.quality import Quality
-    from printhammer.printing.safe_rate import SafeRate
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.rates.quality import Quality
+    from printhammer.printing.rates.safe_rate import SafeRate
     from printhammer.support.arrays import FloatArray
 
 _MOST_SLOTS: Final = 64

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.printing.tolerance import ToleranceYield
+    from printhammer.printing.rates.tolerance import ToleranceYield
 
 
 @styled

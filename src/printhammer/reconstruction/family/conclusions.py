@@ -6,6 +6,7 @@ same; which of them can be trusted is seen where they are compared over a family
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,18 +14,20 @@ from printhammer.chaos.scan import scan
 from printhammer.claims import Context
 from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.definition import claims
-from printhammer.claims.shapes import rebounds, spread
+from printhammer.claims.shapes import spread
 from printhammer.drive.trains import PulseTrain
-from printhammer.reconstruction.family.safe_rate import safe_rate
+from printhammer.printing.dots.nominal import SinglePulse
+from printhammer.printing.dots.settling import SETTLED, rebounds
+from printhammer.printing.rates.safe_rate import safe_rate
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
-SETTLED: Final = 0.01
-"""Height of a rebound over the stroke up to which it counts as settled."""
-
 ONSET_STEP: Final = 5e-6
 """Step of the strobe times at which chaos is looked for, s."""
+
+GRID: Final = (100, 3000, 5)
+"""First and last rate and step of the grid of the safe rate, Hz."""
 
 RATES: Final = (500, 1250, 5)
 """First and last rate and step of the grid of bursts, Hz: from where dots are independent into the erratic
@@ -166,7 +169,7 @@ def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
     largest, limits = flight_times(shared)
     energy = shared.single.energy
     return Conclusions(
-        safe_rate_Hz=safe_rate(shared),
+        safe_rate_Hz=rate_from_rest(shared),
         chaos_onset_s=chaos_onset(shared),
         flight_time_spread_s=largest,
         engraved_limit_Hz=limits["engraved_s"],
@@ -177,6 +180,29 @@ def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
         settle_out_s=settle_out(shared),
         print_force_N=force,
     )
+
+
+def rate_from_rest(context: Context) -> float | None:
+    """Return the rate up to which all patterns of eight slots from rest are printed well, Hz; None without.
+
+    Raises
+    ------
+    NotMeasurableError
+        The single pulse does not print.
+    """
+    force, flight = context.print_force, context.dot.flight_time
+    assert flight is not None
+    first, last, step = GRID
+    found = safe_rate(
+        context.hammer,
+        nominal=SinglePulse(force, flight),
+        first=first,
+        last=last,
+        step=step,
+        cycle=False,
+        tolerance=context.tolerance,
+    )
+    return None if math.isnan(found.rate) else found.rate
 
 
 def settle_out(context: Context) -> float:

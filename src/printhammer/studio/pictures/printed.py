@@ -15,7 +15,7 @@ from printhammer.studio.work import Patience, try_through
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.printing.pattern import Pattern
+    from printhammer.printing.page.pattern import Pattern
     from printhammer.studio.states.state import State
 
 _TRIED: Final = 16
@@ -52,8 +52,8 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
     GivenUp
         A newer state has come before it was done.
     """
-    from printhammer.printing.page import print_page
-    from printhammer.printing.pattern import Pattern
+    from printhammer.printing.page.page import print_page
+    from printhammer.printing.page.pattern import Pattern
 
     try:
         hammer = state.changed

@@ -1,0 +1,146 @@
+"""Whether dots are within limits, and how far each is off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.printing.dots.nominal import SinglePulse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.run.ensemble import DotTable
+    from printhammer.support.arrays import FloatArray
+
+    BoolArray = npt.NDArray[np.bool_]
+
+FAULTS: Final = ("not run", "lost", "extra contacts", "force", "arrival")
+"""What may be wrong with a wanted dot, in the order in which it is told; "not run": the run ended before."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """How far dots are off: arrays of shape (members, firings).
+
+    Attributes
+    ----------
+    wanted : bool array
+        Where a dot is judged; the others are False and NaN in all that follows.
+    run : bool array
+        Whether the run came so far.
+    lost : bool array
+        Whether the firing made no dot.
+    force_deviation : array
+        Peak force less that of the single pulse, in parts of it; NaN for a lost dot.
+    arrival_deviation : array
+        Touch less slot time and single-pulse flight time, s; NaN for a lost dot.
+    extra_contacts : int array
+        Further pack contacts.
+    limits : Limits
+        By which it is judged.
+    """
+
+    wanted: BoolArray
+    run: BoolArray
+    lost: BoolArray
+    force_deviation: FloatArray
+    arrival_deviation: FloatArray
+    extra_contacts: npt.NDArray[np.int64]
+    limits: Limits
+
+    @property
+    def faults(self) -> npt.NDArray[np.int64]:
+        """Number of the first fault of each wanted dot in `FAULTS`; -1 for a good one and an unwanted one."""
+        found = np.full(self.wanted.shape, -1)
+        # Compared the other way round, a NaN would pass.
+        with np.errstate(invalid="ignore"):
+            wrong = (
+                ~self.run,
+                self.lost,
+                self.extra_contacts > self.limits.extra_contacts,
+                ~(np.abs(self.force_deviation) <= self.limits.force),
+                ~(np.abs(self.arrival_deviation) <= self.limits.arrival),
+            )
+        for number in range(len(wrong) - 1, -1, -1):
+            found[self.wanted & wrong[number]] = number
+        return found
+
+    @property
+    def good(self) -> BoolArray:
+        """Which wanted dots are within limits."""
+        return np.asarray(self.wanted & (self.faults < 0))
+
+    @property
+    def passed(self) -> BoolArray:
+        """Which members have all wanted dots within limits, shape (members,)."""
+        return np.asarray((self.faults < 0).all(axis=1))
+
+
+def judge(
+    dots: DotTable,
+    wanted: BoolArray,
+    slot_times: FloatArray,
+    nominal: SinglePulse | Sequence[SinglePulse],
+    limits: Limits,
+    ok: BoolArray | None = None,
+) -> Judgement:
+    """Judge dots.
+
+    Parameters
+    ----------
+    dots : DotTable
+        What the firings did, one firing for each dot.
+    wanted : bool array, shape (members, firings)
+        Which dots to judge; those of a lead-in, for instance, are not.
+    slot_times : array, shape (members, firings)
+        Time of the slot of each firing, s, which need not be that of the firing; of no matter where no dot is
+        judged.
+    nominal : SinglePulse or sequence of SinglePulse
+        The dot of the single pulse: one for all members, or one for each.
+    limits : Limits
+        How far a dot may be off.
+    ok : bool array, shape (members,), optional
+        Which runs reached their ends. The last dot of one that did not is not run: its contact may be open.
+
+    Returns
+    -------
+    Judgement
+        With the deviations.
+
+    Raises
+    ------
+    InputError
+        Arrays whose shapes do not fit together.
+    """
+    shape = dots.fired.shape
+    for name, values in (("wanted", wanted), ("slot_times", slot_times)):
+        if np.shape(values) != shape:
+            raise InputError(f"{name}: an array of shape {np.shape(values)}, expected {shape}")
+    asked = np.asarray(wanted, dtype=np.bool_)
+    run = dots.fired.copy()
+    if ok is not None:
+        last = run.sum(axis=1) - 1
+        early = np.flatnonzero(~np.asarray(ok) & (last >= 0))
+        run[early, last[early]] = False
+    struck = dots.struck & run & asked
+    single = [nominal] if isinstance(nominal, SinglePulse) else nominal
+    single_force = np.array([one.force for one in single])[:, np.newaxis]
+    single_flight = np.array([one.flight_time for one in single])[:, np.newaxis]
+    force = np.where(struck, dots.peak_force / single_force - 1.0, np.nan)
+    arrival = dots.fired_at + dots.flight_time - (slot_times + single_flight)
+    return Judgement(
+        wanted=asked,
+        run=run & asked,
+        lost=run & asked & ~dots.struck,
+        force_deviation=force,
+        arrival_deviation=np.where(struck, arrival, np.nan),
+        extra_contacts=np.where(struck, dots.extra_contacts, 0),
+        limits=limits,
+    )

@@ -1,0 +1,195 @@
+"""How a hammer settles after a single pulse: settle-out time, rebounds, and the wear of the backstop."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.printing.dots.nominal import pulse_of
+from printhammer.run.problem import TOLERANCE
+from printhammer.run.simulate import simulate
+
+if TYPE_CHECKING:
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.contacts import Contact
+    from printhammer.run.motion import Motion
+
+SETTLED: Final = 0.01
+"""Distance from rest, in parts of the stroke, within which the armature counts as settled."""
+
+CYCLE: Final = 20e-3
+"""Duration of the run, s."""
+
+_SPACING: Final = 1e-6
+_BISECTIONS: Final = 40
+
+
+@dataclass(frozen=True)
+class Wear:
+    """What the backstop bears.
+
+    Attributes
+    ----------
+    touches : int
+        Number of touches.
+    impulse : float
+        Sum over the touches of the change of momentum of the armature, N s.
+    loss : float
+        Energy that the backstop takes, J.
+    largest_speed : float
+        Largest speed at touch, m/s.
+    largest_force : float or None
+        Largest contact force, N; None on a rigid backstop, where it is not finite.
+    """
+
+    touches: int
+    impulse: float
+    loss: float
+    largest_speed: float
+    largest_force: float | None
+
+
+@dataclass(frozen=True)
+class Rebound:
+    """An interval above the backstop between two touches: times, s, and height above the backstop, m."""
+
+    start: float
+    end: float
+    height: float
+
+    @property
+    def duration(self) -> float:
+        """Duration, s."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class Settling:
+    """What follows a single pulse.
+
+    Attributes
+    ----------
+    settle_out : float or None
+        Time from the firing until the armature stays within `SETTLED` of the stroke from its rest, s; None
+        where it does not within `CYCLE`.
+    rebounds : int
+        Number of rebounds from the backstop higher than `SETTLED` of the stroke.
+    highest : float
+        Height of the highest rebound, in parts of the stroke; 0 without any.
+    restitution : float or None
+        Speed after the first touch of the backstop over the speed before; None where it does not leave.
+    wear : Wear
+        What the backstop bears until the end of the run.
+    coil_work : float
+        Net work of the coil, J.
+    status : str
+        How the run ended.
+    """
+
+    settle_out: float | None
+    rebounds: int
+    highest: float
+    restitution: float | None
+    wear: Wear
+    coil_work: float
+    status: str
+
+
+def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:
+    """Fire a hammer once from rest and watch it settle.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        A hammer with a backstop.
+    waveform : Waveform, optional
+        By default that of the hammer.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+
+    Returns
+    -------
+    Settling
+        Settle-out time, rebounds and wear.
+
+    Raises
+    ------
+    InputError
+        The hammer has no backstop, no waveform or no rest state.
+    """
+    if hammer.position is None:
+        raise InputError(f"{hammer.path}: the hammer has no backstop, expected one to settle on")
+    rest = rest_state(hammer)
+    motion = simulate(
+        hammer, PulseTrain(pulse_of(hammer, waveform)), duration=CYCLE, points=2, tolerance=tolerance
+    )
+    top = motion.peak_after(0)
+    stroke = (rest if top is None else top[1]) - hammer.position
+    limit = SETTLED * max(stroke, 0.0)
+    heights = [one.height / stroke for one in rebounds(motion, hammer.position) if one.height > limit]
+    first = next(iter(touches(motion)), None)
+    left = None if first is None or first.v_out is None or first.v_in == 0.0 else -first.v_out / first.v_in
+    return Settling(
+        settle_out=_settled(motion, rest, limit) if motion.ok and first is not None else None,
+        rebounds=len(heights),
+        highest=max(heights, default=0.0),
+        restitution=left,
+        wear=wear_of(motion),
+        coil_work=motion.energy.coil_work,
+        status=motion.status,
+    )
+
+
+def touches(motion: Motion) -> list[Contact]:
+    """List the touches of the backstop, the rest at the start excluded."""
+    return [contact for contact in motion.contacts if contact.surface == "backstop" and not contact.initial]
+
+
+def wear_of(motion: Motion) -> Wear:
+    """Return what the backstop bears in a motion."""
+    mass, found = motion.hammer.mass, touches(motion)
+    forces = [contact.peak_force for contact in found if contact.peak_force is not None]
+    return Wear(
+        touches=len(found),
+        # Of a contact that is still open the armature is at rest in the end.
+        impulse=sum(mass * ((contact.v_out or 0.0) - contact.v_in) for contact in found),
+        loss=sum(contact.loss for contact in motion.contacts if contact.surface == "backstop"),
+        largest_speed=max((-contact.v_in for contact in found), default=0.0),
+        largest_force=max(forces) if forces else None,
+    )
+
+
+def rebounds(motion: Motion, position: float) -> list[Rebound]:
+    """List the intervals above a backstop at a position, m, between touches."""
+    times, x = motion.maxima
+    found = []
+    for before, after in itertools.pairwise(touches(motion)):
+        if before.t_out is not None:
+            inside = (times >= before.t_out) & (times <= after.t_in)
+            height = float(x[inside].max()) - position if inside.any() else 0.0
+            found.append(Rebound(before.t_out, after.t_in, height))
+    return found
+
+
+def _settled(motion: Motion, rest: float, limit: float) -> float | None:
+    """Return the last time at which the armature is farther from its rest than a limit, s."""
+    count = round((motion.end - motion.start) / _SPACING) + 1
+    grid = np.union1d(np.linspace(motion.start, motion.end, count), motion.maxima[0])
+    away = np.flatnonzero(np.abs(motion.at(grid)[0] - rest) > limit)
+    if not away.size or away[-1] == grid.size - 1:
+        return None
+    low, high = float(grid[away[-1]]), float(grid[away[-1] + 1])
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if abs(float(motion.at(middle)[0][0]) - rest) > limit:
+            low = middle
+        else:
+            high = middle
+    return high - float(motion.drive.times[0])

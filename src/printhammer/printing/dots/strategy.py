@@ -1,0 +1,88 @@
+"""Strategies: from what is wanted to a drive. Open loop here; tables and feedback are others of the kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.printing.dots.nominal import pulse_of
+from printhammer.printing.dots.slots import slot_times
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+
+
+class Strategy(Protocol):
+    """A way to drive a hammer: a function that gives a drive for each pattern.
+
+    It is called with the hammer that is driven, which may differ from the one that the strategy was made for,
+    the patterns as the numbers of the slots at which dots are wanted, and the slots per second, Hz. Each
+    drive has one firing for each wanted dot, in order; slot 0 is at `FIRST_SLOT` of
+    `printhammer.printing.dots.slots`, so that a dot may be fired ahead of its slot. What it gives for a
+    pattern must not depend on the others.
+    """
+
+    def __call__(
+        self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float, /
+    ) -> Sequence[Drive]:
+        """Return a drive for each pattern."""
+        ...
+
+
+def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
+    """Fire the waveform of the hammer at every slot at which a dot is wanted, whatever the hammer does.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        Whose waveform is fired.
+    patterns : sequence of tuple of int
+        Numbers of the slots at which dots are wanted.
+    rate : float
+        Slots per second, Hz.
+
+    Returns
+    -------
+    list of Drive
+        One for each pattern.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform.
+    """
+    if not patterns:
+        return []
+    pulse = PulseTrain(pulse_of(hammer))
+    return [pulse.with_times(slot_times(slots, rate)) for slots in patterns]
+
+
+def checked_drives(
+    strategy: Strategy, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
+) -> list[Drive]:
+    """Return the drives of a strategy.
+
+    Raises
+    ------
+    InputError
+        It gives another number of drives, or drives with another number of firings, than is wanted.
+    """
+    drives = list(strategy(hammer, patterns, rate))
+    if len(drives) != len(patterns):
+        raise InputError(f"the strategy gives {len(drives)} drives, expected {len(patterns)}")
+    for slots, drive in zip(patterns, drives, strict=True):
+        if len(drive.times) != len(slots):
+            raise InputError(
+                f"the strategy gives {len(drive.times)} firings for the slots {slots}, expected {len(slots)}"
+            )
+    return drives
+
+
+def name_of(strategy: Strategy) -> str:
+    """Return the name of a strategy, such as "open loop"."""
+    given = getattr(strategy, "name", None) or getattr(strategy, "__name__", type(strategy).__name__)
+    return str(given).replace("_", " ")

@@ -1,0 +1,153 @@
+"""Patterns printed by a strategy: all of them run as one ensemble, and judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from printhammer.printing.dots.judging import judge
+from printhammer.printing.dots.nominal import WAIT
+from printhammer.printing.dots.slots import FIRST_SLOT
+from printhammer.printing.dots.strategy import checked_drives, open_loop
+from printhammer.run.ensemble import Ensemble
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.judging import Judgement
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.dots.nominal import SinglePulse
+    from printhammer.printing.dots.strategy import Strategy
+    from printhammer.run.ensemble import DotTable
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+
+class Case(NamedTuple):
+    """A hammer at a rate, Hz, and the single-pulse dot by which it is judged."""
+
+    hammer: Hammer
+    nominal: SinglePulse
+    rate: float
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What became of all patterns in all cases: members by case first, then by pattern.
+
+    Attributes
+    ----------
+    cases : tuple of Case
+        Hammers and rates.
+    patterns : tuple of tuple of int
+        Numbers of the slots at which dots are wanted.
+    drives : tuple of Drive
+        What drove each member.
+    slots : int array, shape (members, firings)
+        Number of the slot of each firing; -1 where there is none.
+    due : array, shape (members, firings)
+        Time of that slot, s.
+    ends : array, shape (members,)
+        Ends of the runs, s.
+    dots : DotTable
+        What the firings did.
+    judgement : Judgement
+        How far off they are.
+    statuses : tuple of str
+        How the runs ended.
+    """
+
+    cases: tuple[Case, ...]
+    patterns: tuple[tuple[int, ...], ...]
+    drives: tuple[Drive, ...]
+    slots: npt.NDArray[np.int64]
+    due: FloatArray
+    ends: FloatArray
+    dots: DotTable
+    judgement: Judgement
+    statuses: tuple[str, ...]
+
+    @property
+    def passed(self) -> npt.NDArray[np.bool_]:
+        """Whether every pattern passes, for each case."""
+        return np.asarray(self.judgement.passed.reshape(len(self.cases), -1).all(axis=1))
+
+
+def attempt(
+    cases: Sequence[Case],
+    patterns: Sequence[tuple[int, ...]],
+    strategy: Strategy = open_loop,
+    *,
+    limits: Limits,
+    tolerance: float,
+    judged_from: int = 0,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Trial:
+    """Print all of some patterns in all of some cases, from rest.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        Hammers and rates.
+    patterns : sequence of tuple of int
+        Numbers of the slots at which dots are wanted, at least one each.
+    strategy : Strategy, optional
+        How the hammers are driven.
+    limits : Limits
+        How far a dot may be off.
+    tolerance : float
+        As for `printhammer.simulate`.
+    judged_from : int, optional
+        First slot that is judged; those before are a lead-in.
+    threads : int, optional
+        By default as many as there are cores.
+    progress : callable, optional
+        Called now and then with the number of runs done and of all.
+
+    Returns
+    -------
+    Trial
+        With a status for each member; a run that could not go on is no exception, and does not pass.
+
+    Raises
+    ------
+    InputError
+        The strategy gives drives that do not fit.
+    """
+    drives: list[Drive] = []
+    for case in cases:
+        drives += checked_drives(strategy, case.hammer, patterns, case.rate)
+    every = list(patterns) * len(cases)
+    slots = np.full((len(every), max(len(pattern) for pattern in patterns)), -1)
+    for row, pattern in zip(slots, every, strict=True):
+        row[: len(pattern)] = pattern
+    rates = np.repeat([case.rate for case in cases], len(patterns))
+    due = FIRST_SLOT + slots / rates[:, np.newaxis]
+    # A drive may fire its last dot ahead of the slot, or after it.
+    ends = np.maximum([drive.times[-1] for drive in drives], due.max(axis=1)) + WAIT
+    hammers = [case.hammer for case in cases for _ in patterns]
+    result = Ensemble(hammers, drives, ends, tolerance=tolerance).run(
+        dots=True, threads=threads, progress=progress
+    )
+    dots = result.dots
+    assert dots is not None
+    nominals = [case.nominal for case in cases for _ in patterns]
+    judgement = judge(dots, slots >= judged_from, due, nominals, limits, result.ok)
+    return Trial(
+        cases=tuple(cases),
+        patterns=tuple(patterns),
+        drives=tuple(drives),
+        slots=slots,
+        due=due,
+        ends=ends,
+        dots=dots,
+        judgement=judgement,
+        statuses=tuple(result.status_names),
+    )

@@ -1,0 +1,351 @@
+"""The printed page: every dot at its true place and as dark as it was struck.
+
+Each wire of each print line is a run of its own, from rest; all of them are one ensemble. The carriage passes
+slot n at the time of the slot, n / rate after slot 0, at the speed rate x pitch. A dot lands where the
+carriage is at touch; all dots are shifted together by what the carriage moves in the flight time of the
+single pulse, which a printer allows for. What is left is the placement error: arrival deviation x speed.
+
+How dark a dot is: its optical density is that of the single-pulse dot in the proportion of the peak forces,
+so that its darkness, the share of the light that does not come back, is 1 - 10^-density. This is an
+assumption: ink in proportion to force, density in proportion to ink. Dots are as wide as the wire.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.printing.dots.extra_dots import extra_dots
+from printhammer.printing.dots.judging import FAULTS
+from printhammer.printing.dots.limits import PRESETS, Limits
+from printhammer.printing.dots.nominal import Nominal, nominal, rate_of
+from printhammer.printing.dots.slots import slots_of
+from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
+from printhammer.printing.dots.trial import Case, Trial, attempt
+from printhammer.printing.page.head import Head, head_of
+from printhammer.printing.page.pattern import Pattern
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+    IntArray = npt.NDArray[np.int64]
+    BoolArray = npt.NDArray[np.bool_]
+
+_PIECE: Final = 512
+_MOST_DOTS: Final = 5_000_000
+
+
+@dataclass(frozen=True)
+class Page:
+    """What was printed: arrays of shape (N,), one entry for each wanted dot.
+
+    Attributes
+    ----------
+    hammer : Hammer
+        The hammer of every wire.
+    pattern : Pattern
+        What was wanted.
+    head : Head
+        Where the wires are, and how thick.
+    rate : float
+        Slots per second, Hz.
+    strategy : str
+        Name of the way to drive.
+    nominal : Nominal
+        The dot of the single pulse.
+    limits : Limits
+        By which dots are judged.
+    line, wire, slot : int array
+        Where dots are wanted, counted from 0: print line, wire and slot.
+    run : bool array
+        Whether the run came so far.
+    lost : bool array
+        Whether the firing made no dot.
+    fault : int array
+        Number of the first fault in `printhammer.printing.dots.judging.FAULTS`; -1 for a dot within limits.
+    arrival_deviation : array
+        Touch less slot time and single-pulse flight time, s; NaN for a lost dot, as in all that follows.
+    flight_time : array
+        From firing to touch, s.
+    peak_force : array
+        Largest pack force, N.
+    indentation : array
+        Largest indentation, m.
+    extra_contacts : int array
+        Further pack contacts.
+    extra_of : int array, shape (E,)
+        To which dot each extra contact belongs.
+    extra_arrival : array, shape (E,)
+        Its touch less slot time and single-pulse flight time, s.
+    extra_force : array, shape (E,)
+        Its largest pack force, N.
+    run_line, run_wire : int array, shape (R,)
+        Print line and wire of each run; a wire without a wanted dot in a line has none.
+    status : str array, shape (R,)
+        How the runs ended.
+    tolerance : float
+        Of the integration.
+    """
+
+    hammer: Hammer
+    pattern: Pattern
+    head: Head
+    rate: float
+    strategy: str
+    nominal: Nominal
+    limits: Limits
+    line: IntArray = field(repr=False)
+    wire: IntArray = field(repr=False)
+    slot: IntArray = field(repr=False)
+    run: BoolArray = field(repr=False)
+    lost: BoolArray = field(repr=False)
+    fault: IntArray = field(repr=False)
+    arrival_deviation: FloatArray = field(repr=False)
+    flight_time: FloatArray = field(repr=False)
+    peak_force: FloatArray = field(repr=False)
+    indentation: FloatArray = field(repr=False)
+    extra_contacts: IntArray = field(repr=False)
+    extra_of: IntArray = field(repr=False)
+    extra_arrival: FloatArray = field(repr=False)
+    extra_force: FloatArray = field(repr=False)
+    run_line: IntArray = field(repr=False)
+    run_wire: IntArray = field(repr=False)
+    status: npt.NDArray[np.str_] = field(repr=False)
+    tolerance: float
+
+    @property
+    def speed(self) -> float:
+        """Carriage speed, m/s."""
+        return self.rate * self.head.pitch
+
+    @property
+    def printed(self) -> BoolArray:
+        """Which dots are on the paper."""
+        return self.run & ~self.lost
+
+    @property
+    def good(self) -> BoolArray:
+        """Which dots are within the limits."""
+        return np.asarray(self.fault < 0)
+
+    @property
+    def placement_error(self) -> FloatArray:
+        """How far each dot is from its place, m, positive where the carriage goes; NaN without a dot."""
+        return self.arrival_deviation * self.speed
+
+    @property
+    def force_ratio(self) -> FloatArray:
+        """Peak force over that of the single pulse; NaN without a dot."""
+        return self.peak_force / self.nominal.force
+
+    @property
+    def darkness(self) -> FloatArray:
+        """Share of the light that does not come back from the dot, 0 to 1; NaN without one."""
+        return darkness(self.density)
+
+    @property
+    def density(self) -> FloatArray:
+        """Optical density of each dot; NaN without one."""
+        return self.head.density * self.force_ratio
+
+    @property
+    def places(self) -> tuple[FloatArray, FloatArray]:
+        """Where each dot is, m: from the middle of slot 0 to the right, from the topmost wire down."""
+        across, down = self.intended
+        return np.asarray(across + self.placement_error), down
+
+    @property
+    def intended(self) -> tuple[FloatArray, FloatArray]:
+        """Where each dot is wanted, m; as `places`."""
+        down = self.line * self.head.line_pitch + self.wire * self.head.wire_pitch
+        return np.asarray(self.slot * self.head.pitch), np.asarray(down, dtype=np.float64)
+
+    @property
+    def extra_places(self) -> tuple[FloatArray, FloatArray]:
+        """Where each extra contact is, m; as `places`."""
+        across, down = self.intended
+        return np.asarray(across[self.extra_of] + self.extra_arrival * self.speed), down[self.extra_of]
+
+    @property
+    def extra_density(self) -> FloatArray:
+        """Optical density of each extra contact."""
+        return self.head.density * self.extra_force / self.nominal.force
+
+    @property
+    def fault_counts(self) -> dict[str, int]:
+        """Number of dots by their first fault."""
+        return {name: int((self.fault == number).sum()) for number, name in enumerate(FAULTS)}
+
+    def worst_place(self, slots: int) -> tuple[int, int]:
+        """Return where the print is worst.
+
+        What counts is the sum, over some slots in a row of a print line, of what is off: a lost dot counts 1,
+        another one its placement error in slots and its deviation in density, an extra contact its density.
+
+        Parameters
+        ----------
+        slots : int
+            Number of slots in a row.
+
+        Returns
+        -------
+        line, first : int
+            Print line and first slot, counted from 0; the first such place where there are several.
+        """
+        off = np.abs(self.placement_error) / self.head.pitch + np.abs(self.density - self.head.density)
+        worth = np.where(self.printed, np.nan_to_num(off), 1.0)
+        np.add.at(worth, self.extra_of, self.extra_density)
+        sums = np.zeros((self.pattern.lines, self.pattern.slots))
+        np.add.at(sums, (self.line, self.slot), worth)
+        many = min(slots, self.pattern.slots)
+        total = np.cumsum(np.pad(sums, ((0, 0), (1, 0))), axis=1)
+        windows = total[:, many:] - total[:, :-many]
+        # Rounding tells no two places apart.
+        line, first = np.unravel_index(int(np.argmax(np.round(windows, 9))), windows.shape)
+        return int(line), int(first)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the page as a Dataset over `dot`, `extra` and `run`, with units and provenance."""
+        from printhammer.printing.page.page_tables import page_dataset
+
+        return page_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the page; returns a matplotlib figure, see `printhammer.figures.printing.page`."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.printing.page").plot(self, **options)
+
+
+def darkness(density: npt.ArrayLike) -> FloatArray:
+    """Return the share of the light that does not come back from ink of an optical density."""
+    return np.asarray(1.0 - 10.0 ** -np.asarray(density, dtype=np.float64))
+
+
+def print_page(
+    hammer: Hammer,
+    what: Pattern | str,
+    rate: float | str,
+    *,
+    strategy: Strategy = open_loop,
+    head: Head | None = None,
+    limits: Limits | None = None,
+    tolerance: float = DISPLAY_TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Page:
+    """Print a pattern, or a text in the built-in font, with a hammer on every wire.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer of every wire.
+    what : Pattern or str
+        What is wanted; a text is set in the built-in font of nine wires.
+    rate : float or str
+        Slots per second, Hz, or text with a unit: how often a wire may be fired. The carriage moves one pitch
+        in a slot.
+    strategy : Strategy, optional
+        How the hammer is driven; by default `printhammer.printing.dots.strategy.open_loop`.
+    head : Head, optional
+        Where the wires are, and how thick; by default `printhammer.printing.page.head.head_of` their number.
+    limits : Limits, optional
+        How far a dot may be off; by default those by which drives are compared.
+    tolerance : float, optional
+        As for `printhammer.simulate`; by default that for pictures.
+    threads : int, optional
+        By default as many as there are cores; the page does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of runs done and of all.
+
+    Returns
+    -------
+    Page
+        With a status for each run; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; a hammer whose single pulse makes no dot; a strategy that
+        gives drives that do not fit.
+    """
+    pattern = Pattern.from_text(what) if isinstance(what, str) else what
+    if not isinstance(pattern, Pattern):
+        raise InputError(f"{what!r} is expected to be a pattern or a text")
+    often = rate_of(rate)
+    if pattern.wanted > _MOST_DOTS:
+        raise InputError(f"{pattern.wanted} dots are wanted, expected {_MOST_DOTS} at most")
+    used = head_of(pattern.wires) if head is None else head
+    if used.wires != pattern.wires:
+        raise InputError(f"head: {used.wires} wires, expected {pattern.wires} as the pattern has")
+    by = PRESETS["slots"] if limits is None else limits
+    single = nominal(hammer, tolerance=tolerance)
+    options: dict[str, Any] = {"limits": by, "tolerance": tolerance, "threads": threads}
+    run_line, run_wire = np.nonzero(pattern.dots.any(axis=2))
+    rows = [slots_of(row) for row in pattern.dots[run_line, run_wire]]
+    pieces = []
+    for first in range(0, len(rows), _PIECE):
+
+        def tell(done: int, _all: int, begun: int = first) -> None:
+            if progress is not None:
+                progress(begun + done, len(rows))
+
+        trial = attempt(
+            [Case(hammer, single, often)], rows[first : first + _PIECE], strategy, progress=tell, **options
+        )
+        pieces.append(_dots_of(trial, options))
+    counts = np.array([len(slots) for slots in rows])
+    before = np.cumsum([0, *(piece["run"].size for piece in pieces[:-1])])
+    for piece, count in zip(pieces, before, strict=True):
+        piece["extra_of"] = piece["extra_of"] + count
+    joined = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+    return Page(
+        hammer=hammer,
+        pattern=pattern,
+        head=used,
+        rate=often,
+        strategy=name_of(strategy),
+        nominal=single,
+        limits=by,
+        line=np.repeat(run_line, counts),
+        wire=np.repeat(run_wire, counts),
+        slot=np.concatenate([np.asarray(slots) for slots in rows]),
+        run_line=run_line,
+        run_wire=run_wire,
+        tolerance=tolerance,
+        **joined,
+    )
+
+
+def _dots_of(trial: Trial, options: dict[str, Any]) -> dict[str, Any]:
+    """Return what became of the dots of some wires, one wire after the other."""
+    ((hammer, single, _rate),) = trial.cases
+    dots, judged, wanted = trial.dots, trial.judgement, trial.slots >= 0
+    extra = extra_dots(
+        hammer, trial.drives, trial.ends, dots, tolerance=options["tolerance"], threads=options["threads"]
+    )
+    place = np.cumsum(wanted).reshape(wanted.shape) - 1
+    late = extra.touch - single.flight_time - trial.due[extra.member, extra.firing]
+    return {
+        "run": judged.run[wanted],
+        "lost": judged.lost[wanted],
+        "fault": judged.faults[wanted],
+        "arrival_deviation": judged.arrival_deviation[wanted],
+        "flight_time": dots.flight_time[wanted],
+        "peak_force": dots.peak_force[wanted],
+        "indentation": dots.indentation[wanted],
+        "extra_contacts": judged.extra_contacts[wanted],
+        "extra_of": place[extra.member, extra.firing],
+        "extra_arrival": late,
+        "extra_force": extra.peak_force,
+        "status": np.array(trial.statuses, "U16"),
+    }

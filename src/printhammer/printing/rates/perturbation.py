@@ -1,0 +1,149 @@
+"""Hammers that differ a little from the one that a drive was made for: supply, travel, forms, drift."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.parts.backstop.elastomer import ElastomerBackstop
+from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.parts.magnet.inverse_root import InverseRootMagnet
+from printhammer.parts.pack.power import PowerPack
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from printhammer.hammer.hammer import Hammer
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """By how much a hammer differs; everything 0 by default.
+
+    Attributes
+    ----------
+    current : float
+        Relative change of every current, as by the supply rail: 0.03 for 3 % more.
+    travel : float
+        By how much pack and platen lie farther from the armature, m: the wire travel.
+    forms : float
+        Relative change of the thickness of the pack, the number of forms. The platen stays, so that the front
+        of the pack comes nearer.
+    magnet : float
+        Relative change of the flux of the permanent magnet, Am of equation (3).
+    damping : float
+        Relative change of the damping of the backstop: l of equation (7), or the relaxation time of an
+        elastomer.
+    """
+
+    current: float = 0.0
+    travel: float = 0.0
+    forms: float = 0.0
+    magnet: float = 0.0
+    damping: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """In words, such as "current +3 %, travel -10 µm"; "nominal" where nothing differs."""
+        told = [
+            f"{key} {1e6 * value:+.3g} µm" if key == "travel" else f"{key} {100.0 * value:+.3g} %"
+            for key, value in asdict(self).items()
+            if value
+        ]
+        return ", ".join(told) or "nominal"
+
+
+def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
+    """Return a hammer that differs by a perturbation.
+
+    The current enters equation (3) as Bm I. Every current a factor larger is therefore the same as Bm that
+    factor larger, and a strategy that knows nothing of it stays as it is.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    by : Perturbation
+        What differs.
+
+    Returns
+    -------
+    Hammer
+        Another hammer.
+
+    Raises
+    ------
+    InputError
+        A number is not finite, a relative change is not above -1, the hammer does not have the constant that
+        changes, or would not be one any more.
+    """
+    changes: dict[str, Any] = {}
+    for key, value in asdict(by).items():
+        if not math.isfinite(value) or (key != "travel" and value <= -1.0):
+            raise InputError(f"perturbation: {key} = {value!r} is expected to be finite and above -1")
+    magnet, pack, backstop = hammer.magnet, hammer.pack, hammer.backstop
+    if by.current or by.magnet:
+        if not isinstance(magnet, InverseRootMagnet):
+            raise InputError(
+                f"{hammer.path}: perturbation of current or magnet, expected a magnet of law 'inverse-root'"
+            )
+        changes["magnet.Bm"] = magnet.Bm * (1.0 + by.current)
+        changes["magnet.Am"] = magnet.Am * (1.0 + by.magnet)
+    if by.travel or by.forms:
+        if pack is None:
+            raise InputError(f"{hammer.path}: perturbation of travel or forms, expected a hammer with a pack")
+        front = pack.front + by.travel
+        if by.forms:
+            if not isinstance(pack, PowerPack):
+                raise InputError(f"{hammer.path}: perturbation of forms, expected a pack of the law 'power'")
+            front -= by.forms * pack.thickness
+            changes["pack.thickness"] = pack.thickness * (1.0 + by.forms)
+        changes["pack.front"] = front
+        if by.travel and hammer.platen is not None:
+            changes["platen"] = hammer.platen + by.travel
+    if by.damping:
+        if isinstance(backstop, HertzBackstop) and backstop.damping is not None:
+            changes["backstop.damping"] = backstop.damping * (1.0 + by.damping)
+        elif isinstance(backstop, ElastomerBackstop):
+            changes["backstop.relaxation_time"] = backstop.relaxation_time * (1.0 + by.damping)
+        else:
+            raise InputError(
+                f"{hammer.path}: perturbation of damping, expected a backstop with damping or relaxation time"
+            )
+    return hammer.replace(changes, source=f"perturbed: {by.name}") if changes else hammer
+
+
+def changed(
+    hammer: Hammer, changes: Iterable[tuple[Mapping[str, Any], str]]
+) -> tuple[list[Hammer], list[str]]:
+    """Return hammers with other constants, and what becomes of each.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer that all of them come from.
+    changes : iterable of (mapping, str)
+        For each what `Hammer.replace` takes, and its source; without changes it is the hammer itself.
+
+    Returns
+    -------
+    hammers : list of Hammer
+        One for each; the hammer itself where there is none with these constants.
+    status : list of str
+        "ok", "no hammer" or "does not rest".
+    """
+    made, status = [], []
+    for change, source in changes:
+        one, fate = hammer, "no hammer"
+        with suppress(InputError):
+            one = hammer.replace(change, source=source) if change else hammer
+            fate = "does not rest"
+            rest_state(one)
+            fate = "ok"
+        made.append(one)
+        status.append(fate)
+    return made, status

@@ -1,0 +1,413 @@
+"""The quality report: what a hammer prints at a rate, how evenly, and what it costs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.drive.input import read_positive
+from printhammer.errors import InputError
+from printhammer.printing.dots.judging import judge
+from printhammer.printing.dots.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
+from printhammer.printing.dots.nominal import WAIT, rate_of
+from printhammer.printing.dots.nominal import nominal as single_pulse
+from printhammer.printing.dots.settling import wear_of
+from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
+from printhammer.printing.dots.strategy import checked_drives, name_of, open_loop
+from printhammer.run.coil_work import squared_current
+from printhammer.run.ensemble import DotTable
+from printhammer.run.problem import TOLERANCE
+from printhammer.run.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.judging import Judgement
+    from printhammer.printing.dots.nominal import Nominal
+    from printhammer.printing.dots.settling import Wear
+    from printhammer.printing.dots.strategy import Strategy
+    from printhammer.run.contacts import Dot
+    from printhammer.run.ledger import Ledger
+    from printhammer.support.arrays import FloatArray
+
+PITCH: Final = 25.4e-3 / 60.0
+"""Distance of neighbouring slots on the paper, m, unless told otherwise: sixty to the inch."""
+
+MOST_SLOTS: Final = 20_000
+"""Number of slots above which a pattern is refused."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How some numbers are spread.
+
+    Attributes
+    ----------
+    count : int
+        How many there are.
+    mean, deviation : float
+        Mean, and standard deviation about it; NaN without any.
+    low, high : float
+        Least and largest.
+    """
+
+    count: int
+    mean: float
+    deviation: float
+    low: float
+    high: float
+
+    @property
+    def peak_to_peak(self) -> float:
+        """Largest less least."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What a hammer prints at a rate: arrays of shape (N,), one entry for each dot that is judged.
+
+    Attributes
+    ----------
+    hammer : Hammer
+        What is driven.
+    strategy : str
+        How, in words.
+    drive : Drive
+        What drove it.
+    rate : float
+        Slots per second, Hz.
+    wanted : bool array, shape (slots,)
+        The pattern, the lead-in among it.
+    judged_from : int
+        First slot that is judged; those before are a lead-in.
+    limits : Limits
+        By which dots are judged.
+    nominal : Nominal
+        The single-pulse dot.
+    slot : int array
+        Number of the slot.
+    flight_time : array
+        From firing to touch, s; NaN for a lost dot, as in all that follows.
+    force : array
+        Largest pack force, N.
+    indentation : array
+        Largest indentation, m.
+    arrival_deviation : array
+        Touch less slot time and single-pulse flight time, s.
+    lost : bool array
+        Whether the firing made no dot.
+    extra_contacts : int array
+        Further pack contacts.
+    fault : int array
+        Number of the first fault in `printhammer.printing.dots.judging.FAULTS`; -1 for a dot within limits.
+    wear : Wear
+        What the backstop bears in the whole run, lead-in and settle-out included.
+    energy : Ledger
+        Of the whole run.
+    heat : float or None
+        Of the coil in the whole run, J; None for a hammer without `coil.resistance`.
+    fired : int
+        Number of firings in the whole run.
+    pitch : float
+        Distance of neighbouring slots on the paper, m.
+    status : str
+        How the run ended.
+    tolerance : float
+        Of the integration.
+    """
+
+    hammer: Hammer
+    strategy: str
+    drive: Drive = field(repr=False)
+    rate: float
+    wanted: npt.NDArray[np.bool_] = field(repr=False)
+    judged_from: int
+    limits: Limits
+    nominal: Nominal
+    slot: npt.NDArray[np.int64] = field(repr=False)
+    flight_time: FloatArray = field(repr=False)
+    force: FloatArray = field(repr=False)
+    indentation: FloatArray = field(repr=False)
+    arrival_deviation: FloatArray = field(repr=False)
+    lost: npt.NDArray[np.bool_] = field(repr=False)
+    extra_contacts: npt.NDArray[np.int64] = field(repr=False)
+    fault: npt.NDArray[np.int64] = field(repr=False)
+    wear: Wear
+    energy: Ledger
+    heat: float | None
+    fired: int
+    pitch: float
+    status: str
+    tolerance: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached its end."""
+        return self.status == "ok"
+
+    @property
+    def passed(self) -> bool:
+        """Whether all dots are within limits."""
+        return bool((self.fault < 0).all())
+
+    @property
+    def missing(self) -> float:
+        """Part of the wanted dots that are lost."""
+        return float(self.lost.mean())
+
+    @property
+    def flight_time_spread(self) -> Spread:
+        """How the flight times are spread, s."""
+        return spread_of(self.flight_time)
+
+    @property
+    def force_spread(self) -> Spread:
+        """How the peak forces are spread, N."""
+        return spread_of(self.force)
+
+    @property
+    def indentation_spread(self) -> Spread:
+        """How the indentations are spread, m."""
+        return spread_of(self.indentation)
+
+    @property
+    def arrival_spread(self) -> Spread:
+        """How the arrivals are spread about slot time plus single-pulse flight time, s."""
+        return spread_of(self.arrival_deviation)
+
+    @property
+    def placement_spread(self) -> Spread:
+        """How far from their places the dots are on the paper, m: arrival deviation times carriage speed."""
+        return spread_of(self.arrival_deviation * self.rate * self.pitch)
+
+    @property
+    def dot_matrix(self) -> bool:
+        """Whether no dot is lost and arrivals vary by 200 us at most, what dot matrix printing bears.
+
+        Where every dot is fired at its slot they vary as the flight times do, of which the paper tells.
+        """
+        return self._within(DOT_MATRIX_SPREAD)
+
+    @property
+    def engraved(self) -> bool:
+        """Whether no dot is lost and arrivals vary by 30 us at most, what engraved characters bear."""
+        return self._within(ENGRAVED_SPREAD)
+
+    def _within(self, peak_to_peak: float) -> bool:
+        # Comparison with the NaN of dots that are lost or not run is False.
+        known = not np.isnan(self.arrival_deviation).any()
+        return bool(known and self.arrival_spread.peak_to_peak <= peak_to_peak)
+
+    @property
+    def backstop_impulse(self) -> float:
+        """Change of momentum at the backstop for each firing, N s: wear."""
+        return self.wear.impulse / self.fired
+
+    @property
+    def backstop_loss(self) -> float:
+        """Energy that the backstop takes for each firing, J: wear."""
+        return self.wear.loss / self.fired
+
+    @property
+    def work(self) -> float:
+        """Net work of the drive for each firing, J."""
+        return (self.energy.coil_work + self.energy.drive_work) / self.fired
+
+    @property
+    def mean_power(self) -> float:
+        """Net work of the drive over the duration of all slots, W."""
+        return self.work * self.fired * self.rate / len(self.wanted)
+
+    @property
+    def mean_heat(self) -> float | None:
+        """Heat of the coil over the duration of all slots, W; None without `coil.resistance`."""
+        return None if self.heat is None else self.heat * self.rate / len(self.wanted)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the dots as a Dataset over `dot`, with units, provenance and all figures as attributes."""
+        from printhammer.printing.rates.quality_tables import quality_dataset
+
+        return quality_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw force and arrival of the dots; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.printing.quality").plot(self, **options)
+
+
+def quality(
+    hammer: Hammer,
+    rate: float | str,
+    pattern: str | int | npt.ArrayLike | None = None,
+    *,
+    strategy: Strategy = open_loop,
+    limits: Limits | None = None,
+    nominal: Nominal | None = None,
+    pitch: float | str = PITCH,
+    tolerance: float = TOLERANCE,
+) -> Quality:
+    """Print a pattern from rest, and report how well.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        What is driven.
+    rate : float or str
+        Slots per second, Hz, or text with a unit.
+    pattern : str, int or bool array, optional
+        The slots: text such as "10110111", 1 where a dot is wanted; a number of dots without a gap; or truth
+        values. By default once around the binary de Bruijn cycle of order 8, in which every word of eight
+        slots occurs once, after 64 slots of it that are not judged.
+    strategy : Strategy, optional
+        How it is driven; by default open loop.
+    limits : Limits, optional
+        By which dots are judged; by default 10 % of the force, 50 us, no extra contacts.
+    nominal : Nominal, optional
+        The single-pulse dot by which the others are judged; by default that of the hammer.
+    pitch : float or str, optional
+        Distance of neighbouring slots on the paper, m, or text with a unit.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+
+    Returns
+    -------
+    Quality
+        The dots, their spreads, wear and energy; with a status.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; a hammer whose single pulse makes no dot; a strategy whose
+        drives do not fit.
+    """
+    often = rate_of(rate)
+    apart = read_positive(pitch, "m", "pitch")
+    wanted = cycle_with_lead_in() if pattern is None else pattern_of(pattern)
+    judged_from = LEAD_IN if pattern is None else 0
+    bounds = Limits() if limits is None else limits
+    single = single_pulse(hammer, tolerance=tolerance) if nominal is None else nominal
+    slots = slots_of(wanted)
+    drive = checked_drives(strategy, hammer, [slots], often)[0]
+    due = slot_times(slots, often)
+    end = max(float(due[-1]), float(drive.times[-1])) + WAIT
+    motion = simulate(hammer, drive, duration=end, points=2, tolerance=tolerance)
+    dots = dot_table(motion.dots, drive.times)
+    judged = np.asarray(slots) >= judged_from
+    found: Judgement = judge(dots, judged[np.newaxis], due[np.newaxis], single, bounds, np.array([motion.ok]))
+    run = found.run[0, judged]
+    return Quality(
+        hammer=hammer,
+        strategy=name_of(strategy),
+        drive=drive,
+        rate=often,
+        wanted=wanted,
+        judged_from=judged_from,
+        limits=bounds,
+        nominal=single,
+        slot=np.asarray(slots)[judged],
+        flight_time=np.where(run, dots.flight_time[0, judged], np.nan),
+        force=np.where(run, dots.peak_force[0, judged], np.nan),
+        indentation=np.where(run, dots.indentation[0, judged], np.nan),
+        arrival_deviation=found.arrival_deviation[0, judged],
+        lost=found.lost[0, judged],
+        extra_contacts=found.extra_contacts[0, judged],
+        fault=found.faults[0, judged],
+        wear=wear_of(motion),
+        energy=motion.energy,
+        heat=_heat(hammer, drive, motion.end),
+        fired=len(motion.dots),
+        pitch=apart,
+        status=motion.status,
+        tolerance=tolerance,
+    )
+
+
+def pattern_of(given: str | int | npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    """Read a pattern of slots.
+
+    Parameters
+    ----------
+    given : str, int or bool array
+        As for `quality`.
+
+    Returns
+    -------
+    bool array, shape (slots,)
+        Where a dot is wanted.
+
+    Raises
+    ------
+    InputError
+        It is none of these, wants no dot, or is too long.
+    """
+    if isinstance(given, str):
+        if not given or set(given) - {"0", "1"}:
+            raise InputError(f"pattern = {given!r}, expected slots such as '10110111'")
+        found = np.array([letter == "1" for letter in given])
+    elif isinstance(given, int) and not isinstance(given, bool):
+        if not 1 <= given <= MOST_SLOTS:
+            raise InputError(f"pattern = {given!r}, expected 1 to {MOST_SLOTS} dots")
+        found = np.ones(given, dtype=np.bool_)
+    else:
+        found = np.asarray(given)
+        if found.dtype != np.bool_ or found.ndim != 1:
+            raise InputError("pattern: expected text, a number of dots, or truth values in one row")
+    if not found.any() or len(found) > MOST_SLOTS:
+        raise InputError(f"pattern: expected at least one dot and at most {MOST_SLOTS} slots")
+    return found
+
+
+def _heat(hammer: Hammer, drive: Drive, end: float) -> float | None:
+    """Return the heat of the coil up to the end of a run, J."""
+    if hammer.coil_resistance is None:
+        return None
+    squared = squared_current(drive, 0.0, end) if drive.quantity == "current" else 0.0
+    return hammer.coil_resistance * squared
+
+
+def spread_of(values: FloatArray) -> Spread:
+    """Return how numbers are spread; NaN among them are left out."""
+    known = values[~np.isnan(values)]
+    if not known.size:
+        return Spread(0, math.nan, math.nan, math.nan, math.nan)
+    return Spread(known.size, float(known.mean()), float(known.std()), float(known.min()), float(known.max()))
+
+
+def dot_table(dots: Sequence[Dot], times: FloatArray) -> DotTable:
+    """Return the dots of one motion as the table that an ensemble gives of one member.
+
+    Parameters
+    ----------
+    dots : sequence of Dot
+        What the firings up to the end of the run did.
+    times : array, shape (firings,)
+        All firing times, s.
+    """
+
+    def column(name: str) -> FloatArray:
+        values = [getattr(dot, name) for dot in dots]
+        known = [math.nan if value is None else value for value in values]
+        return np.array([[*known, *[math.nan] * (len(times) - len(dots))]])
+
+    missing = np.arange(len(times))[np.newaxis] >= len(dots)
+    return DotTable(
+        fired=~missing,
+        fired_at=np.array(times, dtype=np.float64)[np.newaxis],
+        struck=np.nan_to_num(column("struck")) > 0.0,
+        flight_time=column("flight_time"),
+        impact_speed=column("impact_speed"),
+        peak_force=column("peak_force"),
+        indentation=column("indentation"),
+        contact_time=column("contact_time"),
+        extra_contacts=np.nan_to_num(column("extra_contacts")).astype(np.int64),
+    )

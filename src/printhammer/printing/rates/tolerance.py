@@ -1,0 +1,324 @@
+"""Tolerance yield: how many hammers of a production still print well, and how fast."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
+
+import numpy as np
+
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal, rate_of, single_pulses
+from printhammer.printing.dots.strategy import name_of, open_loop
+from printhammer.printing.dots.trial import Case
+from printhammer.printing.rates.perturbation import changed
+from printhammer.printing.rates.safe_rate import FIRST, LAST, rate_grid
+from printhammer.printing.rates.safe_rates import all_pass, safe_rates
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.strategy import Strategy
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+SPREAD: Final = 0.01
+"""Relative spread of a constant, to either side, unless told otherwise."""
+
+STEP: Final = 25.0
+"""Step of the grid of rates, Hz, unless told otherwise: coarser than that of one safe rate."""
+
+MOST: Final = 100_000
+"""Number of hammers above which a yield is refused."""
+
+Judged = Literal["own", "design"]
+GAP: Final = "pack.front"
+"""The constant whose spread is that of its distance from the backstop, since the origin is arbitrary."""
+
+FIXED: Final = ("backstop.position", "platen")
+"""Constants that have no spread unless it is stated: the origin, and one that enters no force."""
+
+
+@dataclass(frozen=True)
+class ToleranceYield:
+    """Random hammers, and which of them print well: arrays of shape (N,), one entry for each hammer.
+
+    Attributes
+    ----------
+    hammer : Hammer
+        The design.
+    strategy : str
+        How they are driven, in words.
+    limits : Limits
+        How far a dot may be off.
+    rate : float
+        Rate at which they are tried, Hz; NaN where their safe rates were looked for.
+    spreads : mapping
+        Relative spread of each constant that varies, to either side.
+    factors : array, shape (N, constants)
+        Constants of the hammers over those of the design, by the order of `spreads`; for the front of the
+        pack, of the distance from the backstop.
+    judged_by : str
+        "own": by the single-pulse dot of each hammer; "design": by that of the design.
+    status : str array
+        "ok", "no hammer" where the constants make none, "does not rest", "makes no dot".
+    single_force, single_flight_time : array
+        Of the single-pulse dots, N and s; NaN where there is none.
+    passed : bool array
+        Which print every pattern within limits at `rate`; where there is none, at the first rate of the grid.
+    safe_rates : array
+        Their safe rates, Hz; NaN where not even the first rate passes, or where they were not looked for.
+    grid : array
+        Rates that were tried, Hz.
+    seed : int
+        Of the draw.
+    tolerance : float
+        Of the integration.
+    """
+
+    hammer: Hammer
+    strategy: str
+    limits: Limits
+    rate: float
+    spreads: Mapping[str, float]
+    factors: FloatArray = field(repr=False)
+    judged_by: Judged
+    status: npt.NDArray[np.str_] = field(repr=False)
+    single_force: FloatArray = field(repr=False)
+    single_flight_time: FloatArray = field(repr=False)
+    passed: npt.NDArray[np.bool_] = field(repr=False)
+    safe_rates: FloatArray = field(repr=False)
+    grid: FloatArray = field(repr=False)
+    seed: int
+    tolerance: float
+
+    @property
+    def share(self) -> float:
+        """Part of the hammers that pass; those that are none or make no dot do not."""
+        return float(self.passed.mean())
+
+    @property
+    def share_error(self) -> float:
+        """Standard error of the share as of a plain random draw; a Sobol sequence does better."""
+        count = len(self.passed)
+        # Of a share of 0 or 1 the plain formula would say that it is exact.
+        share = (self.passed.sum() + 0.5) / (count + 1.0)
+        return float(math.sqrt(share * (1.0 - share) / count))
+
+    def share_at(self, rate: float) -> float:
+        """Return the part of the hammers whose safe rate is a rate, Hz, or more."""
+        return float((self.safe_rates >= rate).mean())
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the hammers as a Dataset over `member`, with units and provenance in the attributes."""
+        from printhammer.printing.rates.study_tables import yield_dataset
+
+        return yield_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the distribution of safe rates, or which hammers pass; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.printing.tolerance").plot(self, **options)
+
+
+def tolerance_yield(
+    hammer: Hammer,
+    rate: float | str | None = None,
+    *,
+    number: SupportsIndex = 64,
+    spreads: float | Mapping[str, float] = SPREAD,
+    seed: SupportsIndex = 0,
+    judged_by: Judged = "own",
+    strategy: Strategy = open_loop,
+    limits: Limits | None = None,
+    first: float | str = FIRST,
+    last: float | str = LAST,
+    step: float | str = STEP,
+    tolerance: float = DISPLAY_TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> ToleranceYield:
+    """Draw hammers whose constants are spread about those of a design, and see which print well.
+
+    Every constant is drawn evenly within its spread, by a scrambled Sobol sequence.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The design.
+    rate : float or str, optional
+        Slots per second, Hz, or text with a unit, at which all patterns from rest and the cycle are to be
+        within limits. Without it the safe rate of each hammer is looked for.
+    number : int, optional
+        Number of hammers.
+    spreads : float or mapping, optional
+        Relative spread to either side of every constant, or by key, such as {"magnet.Am": 0.02}; constants
+        that are not named then stay as they are.
+    seed : int, optional
+        Of the draw.
+    judged_by : str, optional
+        "own": the dots of a hammer are judged by its own single pulse, as if each were adjusted; "design": by
+        that of the design.
+    strategy : Strategy, optional
+        How they are driven; by default open loop.
+    limits : Limits, optional
+        How far a dot may be off; by default 10 % of the force, 50 us, no extra contacts.
+    first, last, step : float or str, optional
+        The grid of rates, Hz, on which safe rates are looked for.
+    tolerance : float, optional
+        As for `printhammer.simulate`; by default that for pictures.
+    threads : int, optional
+        By default as many as there are cores; the result does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of hammers done and of all.
+
+    Returns
+    -------
+    ToleranceYield
+        With a status for each hammer.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; a constant that the hammer does not have; a design whose
+        single pulse makes no dot.
+    """
+    count = read_count(number, "number")
+    if count > MOST:
+        raise InputError(f"number = {count}, expected at most {MOST} hammers")
+    if judged_by not in get_args(Judged):
+        raise InputError(f"judged_by = {judged_by!r}, expected one of {', '.join(get_args(Judged))}")
+    grid = rate_grid(first, last, step) if rate is None else np.array([rate_of(rate)])
+    bounds = Limits() if limits is None else limits
+    spread = spreads_of(hammer, spreads)
+    design = nominal(hammer, tolerance=tolerance)
+    factors = draw(spread, count, int(seed))
+    made, fate = changed(
+        hammer, [(row, "drawn within its spread") for row in _changes(hammer, spread, factors)]
+    )
+    status = np.array(fate, "U16")
+    resting = np.flatnonzero(status == "ok")
+    force, flight = np.full(count, np.nan), np.full(count, np.nan)
+    alone = single_pulses([made[k] for k in resting], tolerance=tolerance, threads=threads)
+    for k, one in zip(resting.tolist(), alone, strict=True):
+        if one is None:
+            status[k] = "makes no dot"
+        else:
+            force[k], flight[k] = one.force, one.flight_time
+    singles = [one for one in alone if one is not None]
+    left = np.flatnonzero(status == "ok")
+    hammers = [made[k] for k in left]
+    judges = [design] * len(left) if judged_by == "design" else singles
+    passed, rates = np.zeros(count, dtype=np.bool_), np.full(count, np.nan)
+    if rate is None:
+        rates[left] = safe_rates(
+            hammers,
+            judges,
+            grid,
+            strategy,
+            limits=bounds,
+            tolerance=tolerance,
+            threads=threads,
+            progress=progress,
+        )
+        passed = ~np.isnan(rates)
+    elif left.size:
+        cases = [Case(one, judge, float(grid[0])) for one, judge in zip(hammers, judges, strict=True)]
+        passed[left] = all_pass(cases, strategy, limits=bounds, tolerance=tolerance, threads=threads)
+        if progress is not None:
+            progress(count, count)
+    return ToleranceYield(
+        hammer=hammer,
+        strategy=name_of(strategy),
+        limits=bounds,
+        rate=math.nan if rate is None else float(grid[0]),
+        spreads=spread,
+        factors=factors,
+        judged_by=judged_by,
+        status=status,
+        single_force=force,
+        single_flight_time=flight,
+        passed=passed,
+        safe_rates=rates,
+        grid=grid,
+        seed=int(seed),
+        tolerance=tolerance,
+    )
+
+
+def spreads_of(hammer: Hammer, given: float | Mapping[str, float]) -> dict[str, float]:
+    """Return the spread of each constant of a hammer that varies.
+
+    Raises
+    ------
+    InputError
+        A spread is not from 0 to below 1, a constant is not known or zero, or none varies.
+    """
+    constants = hammer.constants
+    wanted: dict[str, Any]
+    if isinstance(given, Mapping):
+        wanted = dict(given)
+    else:
+        wanted = {
+            key: given for key, constant in constants.items() if key not in FIXED and constant.si != 0.0
+        }
+    for key, value in wanted.items():
+        if key not in constants:
+            raise InputError(f"{hammer.path}: spread of {key!r}, expected one of {', '.join(constants)}")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1.0:
+            raise InputError(f"spread of {key} = {value!r} is expected to be from 0 to below 1")
+    found = {key: float(value) for key, value in wanted.items() if value > 0.0}
+    if not found:
+        raise InputError("spreads: expected at least one constant that varies")
+    return found
+
+
+def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
+    """Draw factors on constants, evenly within their spreads.
+
+    Parameters
+    ----------
+    spreads : mapping
+        Relative spread to either side, by constant.
+    number : int
+        Number of draws.
+    seed : int
+        Of the scrambling.
+
+    Returns
+    -------
+    array, shape (number, constants)
+        From a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
+
+    Raises
+    ------
+    InputError
+        The seed is negative.
+    """
+    from scipy.stats import qmc
+
+    if seed < 0:
+        raise InputError(f"seed = {seed}, expected 0 or more")
+    sequence = qmc.Sobol(len(spreads), scramble=True, rng=np.random.default_rng(seed))
+    points = sequence.random_base2(math.ceil(math.log2(number)) if number > 1 else 0)[:number]
+    return np.asarray(1.0 + (2.0 * points - 1.0) * np.array(list(spreads.values())))
+
+
+def _changes(hammer: Hammer, spreads: Iterable[str], factors: FloatArray) -> list[dict[str, float]]:
+    """Return the constants of the hammers, SI, by the factors on those of the design."""
+    zero = {key: hammer.origin if key == GAP else 0.0 for key in spreads}
+    values = {key: hammer.constants[key].si for key in zero}
+    return [
+        {key: zero[key] + (values[key] - zero[key]) * factor for key, factor in zip(zero, row, strict=True)}
+        for row in factors.tolist()
+    ]

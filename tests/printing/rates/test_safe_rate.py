@@ -1,0 +1,228 @@
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from tests.hammers import made_of, preload
+
+import printhammer as ph
+from printhammer.drive.trains import Drive
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal, single_pulses
+from printhammer.printing.dots.slots import FIRST_SLOT
+from printhammer.printing.dots.strategy import open_loop
+from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
+from printhammer.printing.rates.safe_rate import from_rest, rate_grid, safe_rate
+
+COARSE = {"first": 250.0, "step": 125.0, "last": 2000.0}
+
+
+def printed_well(hammer: "ph.Hammer", rate: float, limits: Limits) -> bool:
+    """Whether all patterns from rest print well, one motion after the other, without ensembles."""
+    single = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), duration=4e-3).dots[0]
+    for row in itertools.product((False, True), repeat=8):
+        slots = [slot for slot, wanted in enumerate(row) if wanted]
+        if not slots or slots[0]:
+            continue
+        train = ph.PulseTrain(hammer.waveform, at=[slot / rate for slot in slots])
+        for slot, dot in zip(slots, ph.simulate(hammer, train, points=2).dots, strict=True):
+            if not dot.struck or dot.extra_contacts > limits.extra_contacts:
+                return False
+            if abs(dot.peak_force / single.peak_force - 1.0) > limits.force:
+                return False
+            late = dot.fired_at + dot.flight_time - slot / rate - single.flight_time
+            if abs(late) > limits.arrival:
+                return False
+    return True
+
+
+@pytest.mark.slow
+def test_patterns_from_rest_against_one_motion_after_the_other(hammer: "ph.Hammer") -> None:
+    limits = Limits(force=0.3, arrival=100e-6)
+    found = safe_rate(hammer, limits=limits, **COARSE)
+    assert math.isfinite(found.rate)
+    assert all(printed_well(hammer, rate, limits) for rate in found.rates[found.passed][-2:])
+    bad = found.rates[~found.passed]
+    assert bad.tolist() == [found.rate + 125.0]
+    if not found.failure.in_cycle:
+        assert not printed_well(hammer, float(bad[0]), limits)
+
+
+def test_what_fails_first_fails_alone_as_well(hammer: "ph.Hammer") -> None:
+    found = safe_rate(hammer, **COARSE)
+    failure = found.failure
+    assert failure is not None
+    assert not failure.in_cycle
+    slots = [slot for slot, letter in enumerate(failure.pattern) if letter == "1"]
+    assert slots[-1] == failure.slot == len(failure.pattern) - 1
+    train = ph.PulseTrain(hammer.waveform, at=[slot / failure.rate for slot in slots])
+    dot = ph.simulate(hammer, train, points=2).dots[-1]
+    single = nominal(hammer)
+    if failure.fault == "lost":
+        assert not dot.struck
+    elif failure.fault == "force":
+        assert dot.peak_force / single.force - 1.0 == pytest.approx(failure.deviation, abs=1e-6)
+        assert abs(failure.deviation) > found.limits.force
+    elif failure.fault == "arrival":
+        assert dot.flight_time - single.flight_time == pytest.approx(failure.deviation, abs=1e-10)
+        assert abs(failure.deviation) > found.limits.arrival
+    else:
+        assert dot.extra_contacts == failure.deviation > 0
+    assert failure.text.endswith(".")
+
+
+def test_slow_enough_everything_passes(hammer: "ph.Hammer") -> None:
+    found = safe_rate(hammer, first=40.0, last=60.0, step=10.0)
+    assert found.passed.tolist() == [True] * 3
+    assert found.cycle_run.all()
+    assert found.at_least
+    assert found.rate == 60.0
+    assert max(np.abs(found.force_low).max(), np.abs(found.force_high).max()) < 1e-6
+    assert found.peak_drive == pytest.approx(hammer.waveform.peak)
+
+
+def test_limits_that_nothing_keeps_leave_no_rate(hammer: "ph.Hammer") -> None:
+    found = safe_rate(hammer, limits=Limits(arrival=0.0), first=900.0, last=950.0)
+    assert math.isnan(found.rate)
+    assert math.isnan(found.peak_drive)
+    assert not found.passed.any()
+
+
+def test_patterns_that_begin_later_are_printed_alike(hammer: "ph.Hammer") -> None:
+    found = safe_rate(hammer, first=600.0, last=1500.0, step=50.0, cycle=False)
+    assert not found.cycle_run.any()
+    assert not found.at_least
+    cases = [Case(hammer, found.nominal, rate) for rate in (found.rate, found.rate + 50.0)]
+    for every, count in ((False, 128), (True, 255)):
+        patterns = from_rest(every=every)
+        assert len(patterns) == count
+        trial = attempt(cases, patterns, limits=found.limits, tolerance=found.tolerance)
+        assert trial.passed.tolist() == [True, False]
+
+
+def test_rates_beyond_the_first_failure_are_run_on_request(hammer: "ph.Hammer") -> None:
+    short = safe_rate(hammer, **COARSE)
+    long = safe_rate(hammer, stop=False, **COARSE)
+    assert long.rate == short.rate
+    assert long.failure == short.failure
+    assert long.rates[-1] == 2000.0
+    assert len(short.rates) < len(long.rates)
+    np.testing.assert_array_equal(long.force_high[: len(short.rates)], short.force_high)
+
+
+def test_a_strategy_may_fire_ahead(hammer: "ph.Hammer") -> None:
+    """All dots as much too early are judged by their slots, not by their firings."""
+
+    def ahead(driven: "ph.Hammer", patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
+        return [drive.with_times(drive.times - 40e-6) for drive in open_loop(driven, patterns, rate)]
+
+    found = safe_rate(hammer, ahead, first=40.0, last=40.0)
+    assert found.strategy == "ahead"
+    assert found.arrival_low[0] == pytest.approx(-40e-6, abs=1e-9)
+    assert found.arrival_high[0] == pytest.approx(-40e-6, abs=1e-9)
+    assert safe_rate(hammer, ahead, limits=Limits(arrival=39e-6), first=40.0, last=40.0).failure is not None
+
+
+def test_a_strategy_whose_drives_do_not_fit_is_refused(hammer: "ph.Hammer") -> None:
+    one = ph.PulseTrain(hammer.waveform, start=FIRST_SLOT)
+    with pytest.raises(ph.InputError, match="expected 255"):
+        safe_rate(hammer, lambda *_: [one], first=100.0, last=100.0)
+    with pytest.raises(ph.InputError, match="1 firings for the slots"):
+        safe_rate(hammer, lambda _h, patterns, _r: [one] * len(patterns), first=100.0, last=100.0)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_the_result_does_not_depend_on_threads(hammer: "ph.Hammer", threads: int) -> None:
+    few = {"first": 600.0, "last": 800.0, "step": 100.0, "stop": False}
+    one, other = safe_rate(hammer, **few), safe_rate(hammer, threads=threads, **few)
+    for name in ("force_low", "force_high", "arrival_low", "arrival_high", "passed"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_more_current_is_a_stronger_coil(hammer: "ph.Hammer") -> None:
+    more = perturbed(hammer, Perturbation(current=0.05))
+    drive = ph.PulseTrain(hammer.waveform)
+    ours = ph.simulate(more, drive, duration=4e-3).dots[0]
+    theirs = ph.simulate(hammer, drive.scaled(1.05), duration=4e-3).dots[0]
+    assert ours.flight_time == pytest.approx(theirs.flight_time, rel=1e-9)
+    assert ours.peak_force == pytest.approx(theirs.peak_force, rel=1e-8)
+
+
+def test_other_perturbations_change_what_they_name(hammer: "ph.Hammer") -> None:
+    travel = perturbed(hammer, Perturbation(travel=10e-6))
+    assert travel.front - hammer.front == pytest.approx(10e-6, rel=1e-9)
+    assert travel.platen - hammer.platen == pytest.approx(10e-6, rel=1e-9)
+    forms = perturbed(hammer, Perturbation(forms=0.1))
+    assert forms.platen == hammer.platen
+    assert forms.front + forms.pack.thickness == pytest.approx(
+        hammer.front + hammer.pack.thickness, rel=1e-12
+    )
+    assert perturbed(hammer, Perturbation()) == hammer
+    assert Perturbation(current=0.03, travel=-1e-5).name == "current +3 %, travel -10 µm"
+    assert perturbed(hammer, Perturbation(damping=-0.2)).backstop.l == pytest.approx(0.8 * hammer.backstop.l)
+    assert perturbed(hammer, Perturbation(magnet=0.01)).magnet.Am == pytest.approx(1.01 * hammer.magnet.Am)
+
+
+def test_single_pulses_are_those_of_single_motions(hammer: "ph.Hammer") -> None:
+    weak = hammer.replace("waveform.amplitude", 1e-3)
+    found = single_pulses([hammer, weak])
+    assert found[1] is None
+    single = nominal(hammer)
+    assert found[0].force == pytest.approx(single.force, rel=1e-8)
+    assert found[0].flight_time == pytest.approx(single.flight_time, rel=1e-9)
+    with pytest.raises(ph.InputError, match="makes no dot"):
+        nominal(weak)
+
+
+def test_the_grid_ends_where_it_is_told() -> None:
+    np.testing.assert_allclose(rate_grid(100, 101, 0.1), 100.0 + 0.1 * np.arange(11), rtol=1e-14)
+    assert rate_grid("0.1 kHz", "0.11 kHz", 4).tolist() == [100.0, 104.0, 108.0]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"first": 0.0}, "first"),
+        ({"last": 50.0}, "last = 50.0"),
+        ({"step": "1 ms"}, "step"),
+        ({"step": 1e-3}, "rates, expected at most"),
+    ],
+)
+def test_bad_grids_are_refused(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
+    with pytest.raises(ph.InputError, match=said):
+        safe_rate(hammer, **options)
+
+
+@pytest.mark.parametrize(
+    ("by", "said"),
+    [
+        (Perturbation(current=-1.0), "current = -1.0"),
+        (Perturbation(travel=math.inf), "travel = inf"),
+        (Perturbation(current=0.1), "law 'inverse-root'"),
+        (Perturbation(travel=1e-6), "with a pack"),
+        (Perturbation(damping=0.1), "expected a backstop"),
+    ],
+)
+def test_perturbations_that_make_no_sense_are_refused(by: Perturbation, said: str) -> None:
+    with pytest.raises(ph.InputError, match=said):
+        perturbed(made_of(spring=preload(-1.0)), by)
+
+
+def test_drives_may_fire_waveforms_of_their_own(hammer: "ph.Hammer") -> None:
+    """The same pulses as a sequence, which runs through another kernel path, are judged alike."""
+
+    def sequence(driven: "ph.Hammer", patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
+        drives = open_loop(driven, patterns, rate)
+        return [ph.PulseSequence([driven.waveform] * len(drive.times), at=drive.times) for drive in drives]
+
+    few = {"first": 800.0, "last": 800.0, "tolerance": 1e-8}
+    ours, theirs = safe_rate(hammer, sequence, **few), safe_rate(hammer, **few)
+    assert ours.cycle_run.tolist() == theirs.cycle_run.tolist()
+    np.testing.assert_allclose(ours.force_high, theirs.force_high, atol=1e-4)
+    np.testing.assert_allclose(ours.arrival_low, theirs.arrival_low, atol=1e-8)
+    assert ours.failure == theirs.failure or (ours.failure.slot, ours.failure.fault) == (
+        theirs.failure.slot,
+        theirs.failure.fault,
+    )
