@@ -12,26 +12,26 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from printhammer.chaos.basins import basins
-    from printhammer.chaos.bifurcation import bifurcation
-    from printhammer.chaos.continuation import continuation
-    from printhammer.chaos.continuation_regimes import regimes
-    from printhammer.chaos.impact_train import impact_train
-    from printhammer.chaos.lyapunov import lyapunov
-    from printhammer.chaos.orbit_search import orbits
-    from printhammer.chaos.quench import quench_map
-    from printhammer.chaos.recurrence import recurrence
-    from printhammer.chaos.sections import section
-    from printhammer.chaos.sensitivity import sensitivities
-    from printhammer.chaos.stability_chart import stability_chart
-    from printhammer.chaos.strobe import strobe
-    from printhammer.chaos.zero_one import zero_one
+    from printhammer.chaos.basins.basins import basins
+    from printhammer.chaos.basins.quench import quench_map
+    from printhammer.chaos.bifurcation.diagram import bifurcation
+    from printhammer.chaos.continuation.continuation import continuation
+    from printhammer.chaos.continuation.regimes import regimes
+    from printhammer.chaos.continuation.stability_chart import stability_chart
+    from printhammer.chaos.exponents.lyapunov import lyapunov
+    from printhammer.chaos.exponents.recurrence import recurrence
+    from printhammer.chaos.exponents.zero_one import zero_one
+    from printhammer.chaos.impacts.sections import section
+    from printhammer.chaos.impacts.train import impact_train
+    from printhammer.chaos.orbits.search import orbits
+    from printhammer.chaos.strobe.points import strobe
     from printhammer.control.feedback import feedback
     from printhammer.control.least_work import least_work
     from printhammer.control.table import CompensationTable
     from printhammer.control.table_files import load_table
     from printhammer.control.table_report import judge_table
     from printhammer.control.table_tuning import tune
+    from printhammer.derivatives.sensitivities import sensitivities
     from printhammer.drive.sequence import PulseSequence
     from printhammer.drive.trains import Burst, PulseTrain, SineForce
     from printhammer.drive.waveforms.shapes import Chain, Waveform
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from printhammer.printing.tolerance import tolerance_yield
     from printhammer.run.ensemble import Ensemble, EnsembleResult
     from printhammer.run.motion import Motion
+    from printhammer.run.regime import Regime
     from printhammer.run.simulate import simulate
     from printhammer.sweep import sweep
 
@@ -73,6 +74,7 @@ __all__ = [
     "PrinthammerError",
     "PulseSequence",
     "PulseTrain",
+    "Regime",
     "SineForce",
     "Waveform",
     "__version__",
@@ -129,43 +131,44 @@ _HOME = {
     "PrinthammerError": "errors",
     "PulseSequence": "drive_sequence",
     "PulseTrain": "drive",
+    "Regime": "run.regime",
     "SineForce": "drive",
     "Waveform": "waveforms",
-    "basins": "chaos.basins",
-    "bifurcation": "chaos.bifurcation",
-    "continuation": "chaos.continuation",
+    "basins": "chaos.basins.basins",
+    "bifurcation": "chaos.bifurcation.diagram",
+    "continuation": "chaos.continuation.continuation",
     "damping_study": "printing.damping",
     "equilibria": "equilibrium",
     "feedback": "control.feedback",
     "fit": "identify.fitting",
     "frequency_map": "maps",
     "holding_margin": "equilibrium",
-    "impact_train": "chaos.impact_train",
+    "impact_train": "chaos.impacts.train",
     "judge_table": "control.table_report",
     "least_work": "control.least_work",
     "load": "hammer",
     "load_table": "control.table_files",
-    "lyapunov": "chaos.lyapunov",
+    "lyapunov": "chaos.exponents.lyapunov",
     "measure": "identify.laboratory",
-    "orbits": "chaos.orbit_search",
+    "orbits": "chaos.orbits.search",
     "perturbed": "printing.perturbation",
     "print_page": "printing.page",
     "quality": "printing.quality",
-    "quench_map": "chaos.quench",
-    "recurrence": "chaos.recurrence",
-    "regimes": "chaos.continuation_regimes",
+    "quench_map": "chaos.basins.quench",
+    "recurrence": "chaos.exponents.recurrence",
+    "regimes": "chaos.continuation.regimes",
     "release_current": "equilibrium",
     "rest_state": "equilibrium",
     "safe_rate": "printing.safe_rate",
-    "section": "chaos.sections",
-    "sensitivities": "chaos.sensitivity",
+    "section": "chaos.impacts.sections",
+    "sensitivities": "derivatives.sensitivities",
     "simulate": "simulate",
-    "stability_chart": "chaos.stability_chart",
-    "strobe": "chaos.strobe",
+    "stability_chart": "chaos.continuation.stability_chart",
+    "strobe": "chaos.strobe.points",
     "sweep": "sweep",
     "tolerance_yield": "printing.tolerance",
     "tune": "control.table_tuning",
-    "zero_one": "chaos.zero_one",
+    "zero_one": "chaos.exponents.zero_one",
 }
 
 

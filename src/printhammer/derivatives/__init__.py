@@ -1,1 +1,1 @@
-"""Derivatives of states and dots, with respect to states and constants."""
+"""Derivatives of motion: of states and of constants."""
