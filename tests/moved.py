@@ -9,8 +9,8 @@ import numpy as np
 from tests.tangents import SHARP, arrive, richardson
 
 import printhammer as ph
-from printhammer.chaos.sensitivity_dots import RUN_QUANTITIES, dot_values
 from printhammer.derivatives.constants import constant_map
+from printhammer.derivatives.dots import RUN_QUANTITIES, dot_values
 from printhammer.derivatives.parameters import parameters
 from printhammer.run.problem import Problem
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
-from printhammer.chaos.continuation_regimes import Branches, InterruptedBranches
+from printhammer.chaos.continuation.regimes import Branches, InterruptedBranches
 from printhammer.cli.continuation import EXAMPLE
 from printhammer.cli.main import app
 

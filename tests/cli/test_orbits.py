@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
-from printhammer.chaos import orbit_search
+from printhammer.chaos.orbits import search
 from printhammer.cli import orbits as verb
 from printhammer.cli.main import app
 from printhammer.cli.orbits import EXAMPLE
@@ -89,6 +89,6 @@ def test_the_example_of_the_help_can_be_read() -> None:
 
 
 def test_defaults_are_those_of_the_library() -> None:
-    assert verb._LONGEST == orbit_search.LONGEST
-    assert verb._STARTS == orbit_search.STARTS
-    assert verb._GUESSES == orbit_search.GUESSES
+    assert verb._LONGEST == search.LONGEST
+    assert verb._STARTS == search.STARTS
+    assert verb._GUESSES == search.GUESSES

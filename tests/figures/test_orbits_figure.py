@@ -58,7 +58,8 @@ def test_one_orbit_closes_in_the_plane(found: Orbits) -> None:
 
 
 def test_traces_begin_at_the_firing_whatever_the_section(hammer: ph.Hammer) -> None:
-    from printhammer.chaos import Regime, orbit
+    from printhammer.chaos import orbit
+    from printhammer.run.regime import Regime
 
     late = ph.strobe(hammer, period=1.3e-3, points=1, transient=20, phase=0.75, verdict=False)
     one = orbit(Regime.of(hammer, period=1.3e-3), (late.x[0], late.v[0]), phase=0.75)

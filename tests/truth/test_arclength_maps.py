@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from printhammer.chaos.arclength import Curve, Follower, MapFamily, MapValue, Steps, follow
-from printhammer.chaos.branch_points import birth_of, follow_doubled, iterated, points_of
+from printhammer.chaos.continuation.arclength import Curve, Follower, MapFamily, MapValue, Steps, follow
+from printhammer.chaos.continuation.branch_points import birth_of, follow_doubled, iterated, points_of
 
 STEPS = Steps(precision=1e-12, most=200)
 SHARP = 1e-9

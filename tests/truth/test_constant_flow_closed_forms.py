@@ -13,8 +13,8 @@ from tests.tangents import SHARP
 from tests.truth import oracles
 
 import printhammer as ph
-from printhammer.chaos.sensitivity_dots import DOT_QUANTITIES
 from printhammer.derivatives.constants import constant_map, flow, rest_columns
+from printhammer.derivatives.dots import DOT_QUANTITIES
 from printhammer.derivatives.parameters import parameters
 from printhammer.derivatives.states import tangent_map
 from printhammer.drive.waveforms.shapes import Rectangle

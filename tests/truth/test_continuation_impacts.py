@@ -7,8 +7,8 @@ import pytest
 from tests.truth.impact_orbits import BouncingBall, LinearImpacts
 
 import printhammer as ph
-from printhammer.chaos.continuation import Branch, continuation
-from printhammer.chaos.stability_chart import stability_chart
+from printhammer.chaos.continuation.continuation import Branch, continuation
+from printhammer.chaos.continuation.stability_chart import stability_chart
 
 SHARP = 1e-8
 MASS, GRAVITY, FREQUENCY = 1e-3, 9.80665, 50.0

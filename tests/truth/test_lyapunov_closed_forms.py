@@ -11,7 +11,7 @@ from tests.tangents import SHARP
 
 import printhammer as ph
 from printhammer.chaos import strobes
-from printhammer.chaos.lyapunov import kaplan_yorke
+from printhammer.chaos.exponents.lyapunov import kaplan_yorke
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.derivatives.states import standard_error, tangent_map
 from printhammer.parts.pack.dashpot import DashpotPack

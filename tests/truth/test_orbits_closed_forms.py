@@ -9,11 +9,11 @@ from tests.truth.impact_orbits import BouncingBall
 
 import printhammer as ph
 from printhammer.chaos import orbit
-from printhammer.chaos.orbit_newton import Images, close_orbits
-from printhammer.chaos.orbit_result import multipliers_of
-from printhammer.chaos.orbit_search import shortest
-from printhammer.chaos.regime import Regime
+from printhammer.chaos.orbits.newton import Images, close_orbits
+from printhammer.chaos.orbits.orbit import multipliers_of
+from printhammer.chaos.orbits.search import shortest
 from printhammer.parts.pack.dashpot import DashpotPack
+from printhammer.run.regime import Regime
 
 A, B = 1.4, 0.3
 ONE = np.ones(2)

@@ -1,26 +1,24 @@
-"""Chaos: strobe points of trains, and what kind of motion they tell of."""
+"""Nonsmooth dynamics of trains: stroboscopic maps, orbits, continuation, exponents, diagrams, basins."""
 
-from printhammer.chaos.basins import Basins, basins
-from printhammer.chaos.basins_entropy import BasinEntropy, basin_entropy
-from printhammer.chaos.bifurcation import Bifurcation, bifurcation
-from printhammer.chaos.continuation import continuation
-from printhammer.chaos.continuation_branch import Branch
-from printhammer.chaos.continuation_events import BranchEvent
-from printhammer.chaos.continuation_regimes import Branches, regimes
-from printhammer.chaos.impact_train import ImpactTrain, impact_train
-from printhammer.chaos.lyapunov import Lyapunov, lyapunov
-from printhammer.chaos.lyapunov_chart import LyapunovChart, lyapunovs
-from printhammer.chaos.orbit_result import Orbit
-from printhammer.chaos.orbit_search import Orbits, orbit, orbits
-from printhammer.chaos.quench import QuenchMap, quench_map
-from printhammer.chaos.recurrence import Recurrence, recurrence
-from printhammer.chaos.regime import Regime
-from printhammer.chaos.sections import Section, section, sections
-from printhammer.chaos.sensitivity import Sensitivities, Spread, sensitivities
-from printhammer.chaos.stability_chart import LossCurve, StabilityChart, stability_chart
-from printhammer.chaos.strobe import Strobe, strobe, strobes
-from printhammer.chaos.verdict import Verdict
-from printhammer.chaos.zero_one import ZeroOne, zero_one
+from printhammer.chaos.basins.basins import Basins, basins
+from printhammer.chaos.basins.entropy import BasinEntropy, basin_entropy
+from printhammer.chaos.basins.quench import QuenchMap, quench_map
+from printhammer.chaos.bifurcation.diagram import Bifurcation, bifurcation
+from printhammer.chaos.continuation.branch import Branch
+from printhammer.chaos.continuation.continuation import continuation
+from printhammer.chaos.continuation.events import BranchEvent
+from printhammer.chaos.continuation.regimes import Branches, regimes
+from printhammer.chaos.continuation.stability_chart import LossCurve, StabilityChart, stability_chart
+from printhammer.chaos.exponents.chart import LyapunovChart, lyapunovs
+from printhammer.chaos.exponents.lyapunov import Lyapunov, lyapunov
+from printhammer.chaos.exponents.recurrence import Recurrence, recurrence
+from printhammer.chaos.exponents.zero_one import ZeroOne, zero_one
+from printhammer.chaos.impacts.sections import Section, section, sections
+from printhammer.chaos.impacts.train import ImpactTrain, impact_train
+from printhammer.chaos.orbits.orbit import Orbit
+from printhammer.chaos.orbits.search import Orbits, orbit, orbits
+from printhammer.chaos.strobe.points import Strobe, strobe, strobes
+from printhammer.chaos.strobe.verdict import Verdict
 
 __all__ = [
     "BasinEntropy",
@@ -37,10 +35,7 @@ __all__ = [
     "Orbits",
     "QuenchMap",
     "Recurrence",
-    "Regime",
     "Section",
-    "Sensitivities",
-    "Spread",
     "StabilityChart",
     "Strobe",
     "Verdict",
@@ -59,7 +54,6 @@ __all__ = [
     "regimes",
     "section",
     "sections",
-    "sensitivities",
     "stability_chart",
     "strobe",
     "strobes",

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.chaos import strobes
-from printhammer.chaos.scan import scan
-from printhammer.chaos.verdict import LAST
+from printhammer.chaos.strobe.scan import scan
+from printhammer.chaos.strobe.verdict import LAST
 from printhammer.claims.definition import claims
 from printhammer.claims.judging import Measured, measures
 

@@ -16,8 +16,8 @@ from printhammer.cli.units import Units
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from printhammer.chaos.basins import Basins
-    from printhammer.chaos.quench import QuenchMap
+    from printhammer.chaos.basins.basins import Basins
+    from printhammer.chaos.basins.quench import QuenchMap
 
 EXAMPLE: Final = (
     "Example: printhammer basins hendriks-1983 --period '1.05 ms' --x '30 um, 260 um, 24'"
@@ -115,8 +115,8 @@ def basins(
     begin = perf_counter()
     found: Basins | QuenchMap
     if quench:
-        from printhammer.chaos.quench import quench_map
-        from printhammer.chaos.quench_tables import save_quench
+        from printhammer.chaos.basins.quench import quench_map
+        from printhammer.chaos.basins.quench_tables import save_quench
 
         with counting("cells") as tell:
             found = mapped = quench_map(loaded, progress=tell, **options)
@@ -125,9 +125,9 @@ def basins(
         save = partial(save_quench, mapped)
 
     else:
-        from printhammer.chaos.basins import NO_STATE_STATUS
-        from printhammer.chaos.basins import basins as computed
-        from printhammer.chaos.basins_tables import save_basins
+        from printhammer.chaos.basins.basins import NO_STATE_STATUS
+        from printhammer.chaos.basins.basins import basins as computed
+        from printhammer.chaos.basins.tables import save_basins
 
         with counting("cells") as tell:
             found = planes = computed(loaded, progress=tell, **options)
@@ -174,7 +174,7 @@ def told(found: Basins, box: int | None, units: Units) -> Table:
     """Return the attractors with their shares, the cells that lead to none, and the basin entropy."""
     import math
 
-    from printhammer.chaos.basins_entropy import BOX
+    from printhammer.chaos.basins.entropy import BOX
     from printhammer.cli.terminal import plain_table
     from printhammer.cli.units import with_unit
 

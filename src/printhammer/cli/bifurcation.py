@@ -16,7 +16,7 @@ from printhammer.cli.run import HAMMER, HammerArgument, Overlap
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from printhammer.chaos.bifurcation import Bifurcation
+    from printhammer.chaos.bifurcation.diagram import Bifurcation
     from printhammer.hammer.hammer import Hammer
 
 EXAMPLE: Final = (
@@ -91,9 +91,9 @@ def bifurcation(
     """
     from rich.markup import escape
 
-    from printhammer.chaos.bifurcation import InterruptedDiagram
-    from printhammer.chaos.bifurcation import bifurcation as computed
-    from printhammer.chaos.bifurcation_tables import save_bifurcation
+    from printhammer.chaos.bifurcation.diagram import InterruptedDiagram
+    from printhammer.chaos.bifurcation.diagram import bifurcation as computed
+    from printhammer.chaos.bifurcation.tables import save_bifurcation
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
@@ -147,7 +147,7 @@ def bifurcation(
 
 
 def _check(wanted: list[Path], show: str) -> None:
-    from printhammer.chaos.bifurcation_tables import SUFFIXES
+    from printhammer.chaos.bifurcation.tables import SUFFIXES
     from printhammer.cli.saving import PICTURES, check_endings
     from printhammer.errors import InputError
 
@@ -167,10 +167,10 @@ def _values(
     """Return the parameter and its values as arguments of `printhammer.bifurcation`."""
     import numpy as np
 
-    from printhammer.chaos.bifurcation_tables import meaning_of
-    from printhammer.chaos.regime import Regime
+    from printhammer.chaos.bifurcation.tables import meaning_of
     from printhammer.drive.input import read_number
     from printhammer.errors import InputError
+    from printhammer.run.regime import Regime
 
     timed = parameter in ("period", "rate")
     if timed and (period is not None or rate is not None):
@@ -227,7 +227,7 @@ def summary(found: Bifurcation, direction: str) -> Table:
 
 def sentences(found: Bifurcation) -> list[str]:
     """Return what the diagram tells: the routes to the first strange train, and hysteresis."""
-    from printhammer.chaos.bifurcation_windows import cells, hysteresis
+    from printhammer.chaos.bifurcation.windows import cells, hysteresis
 
     told = [""]
     for direction in found.directions:

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from printhammer.chaos.continuation_branch import Branch
-    from printhammer.chaos.continuation_regimes import Branches
-    from printhammer.chaos.stability_chart import StabilityChart
+    from printhammer.chaos.continuation.branch import Branch
+    from printhammer.chaos.continuation.regimes import Branches
+    from printhammer.chaos.continuation.stability_chart import StabilityChart
     from printhammer.hammer.hammer import Hammer
 
 EXAMPLE: Final = (
@@ -101,8 +101,8 @@ def continue_(
     """
     from rich.markup import escape
 
-    from printhammer.chaos.continuation_regimes import InterruptedBranches
-    from printhammer.chaos.continuation_tables import SUFFIXES, save_branches
+    from printhammer.chaos.continuation.regimes import InterruptedBranches
+    from printhammer.chaos.continuation.tables import SUFFIXES, save_branches
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
@@ -192,8 +192,8 @@ def _state(text: str | None) -> tuple[float, float] | None:
 def _followed(
     hammer: Hammer, parameter: str, bounds: tuple[str, str], levels: int, **options: Any
 ) -> Branches:
-    from printhammer.chaos.continuation import continuation
-    from printhammer.chaos.continuation_regimes import follow_doublings
+    from printhammer.chaos.continuation.continuation import continuation
+    from printhammer.chaos.continuation.regimes import follow_doublings
     from printhammer.cli.progress import counting
     from printhammer.errors import InputError
 
@@ -205,7 +205,7 @@ def _followed(
 
 
 def _regimes(hammer: Hammer, rates: tuple[str, str], **options: Any) -> Branches:
-    from printhammer.chaos.continuation_regimes import regimes
+    from printhammer.chaos.continuation.regimes import regimes
     from printhammer.cli.progress import counting
 
     with counting("regimes", remaining=False) as told:
@@ -213,7 +213,7 @@ def _regimes(hammer: Hammer, rates: tuple[str, str], **options: Any) -> Branches
 
 
 def _charted(branch: Branch, second: str, bounds: tuple[str, str], grid: int) -> StabilityChart:
-    from printhammer.chaos.stability_chart import stability_chart
+    from printhammer.chaos.continuation.stability_chart import stability_chart
     from printhammer.cli.progress import counting
 
     with counting("curves", remaining=False) as told:

@@ -65,7 +65,7 @@ def lyapunov(
 
     from printhammer.chaos import LyapunovChart, lyapunovs
     from printhammer.chaos import lyapunov as exponents_of
-    from printhammer.chaos.lyapunov_tables import SUFFIXES, save_lyapunov
+    from printhammer.chaos.exponents.tables import SUFFIXES, save_lyapunov
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty

@@ -15,7 +15,7 @@ from printhammer.cli.units import Units
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from printhammer.chaos.orbit_search import Orbits
+    from printhammer.chaos.orbits.search import Orbits
 
 EXAMPLE: Final = "Example: printhammer orbits hendriks-1983 --period '1.05 ms' --longest 4 --out orbits.csv"
 
@@ -62,9 +62,9 @@ def orbits(
     """
     from rich.markup import escape
 
-    from printhammer.chaos.orbit_search import orbits as search
-    from printhammer.chaos.orbit_tables import SUFFIXES, save_orbits
-    from printhammer.chaos.strobe_map import MAP_TOLERANCE
+    from printhammer.chaos.orbits.search import orbits as search
+    from printhammer.chaos.orbits.tables import SUFFIXES, save_orbits
+    from printhammer.chaos.strobe.map import MAP_TOLERANCE
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty

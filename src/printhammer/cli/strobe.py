@@ -59,7 +59,7 @@ def strobe(
     from rich.markup import escape
 
     from printhammer.chaos import strobe as strobed
-    from printhammer.chaos.tables import SUFFIXES, save_strobe
+    from printhammer.chaos.strobe.tables import SUFFIXES, save_strobe
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError

@@ -1,1 +1,1 @@
-"""Runs: one hammer or many, from a state through a drive."""
+"""Running a hammer: what is fired, how it moves and what it touches."""

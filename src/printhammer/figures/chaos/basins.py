@@ -15,7 +15,7 @@ from printhammer.figures.elements.style import INK, SMALL, new_figure, sign, sty
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.basins import Basins
+    from printhammer.chaos.basins.basins import Basins
 
 SHADES: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00", "#999933")
 """Colours of the basins, of M. Okabe and K. Ito (2008); further ones begin anew, lighter."""

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.bifurcation_tables import meaning_of
-from printhammer.chaos.bifurcation_windows import cells, hysteresis, windows_of
-from printhammer.chaos.regime import PERIOD
+from printhammer.chaos.bifurcation.tables import meaning_of
+from printhammer.chaos.bifurcation.windows import cells, hysteresis, windows_of
 from printhammer.errors import InputError
 from printhammer.figures.elements.marks import note
 from printhammer.figures.elements.scales import Scale, label, scale
@@ -26,6 +25,7 @@ from printhammer.figures.elements.style import (
     sign,
     styled,
 )
+from printhammer.run.regime import PERIOD
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.bifurcation import Bifurcation
+    from printhammer.chaos.bifurcation.diagram import Bifurcation
     from printhammer.support.arrays import FloatArray
 
 SHADES: Final = {

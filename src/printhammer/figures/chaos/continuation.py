@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.continuation_branch import Branch
-    from printhammer.chaos.continuation_regimes import Branches
+    from printhammer.chaos.continuation.branch import Branch
+    from printhammer.chaos.continuation.regimes import Branches
     from printhammer.support.arrays import FloatArray
 
 _COLOURS: Final = {1: BLUE, 2: ORANGE, 3: GREEN, 4: YELLOW}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.zero_one import CHAOTIC, REGULAR
+from printhammer.chaos.exponents.zero_one import CHAOTIC, REGULAR
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements.marks import HALO, note
 from printhammer.figures.elements.scales import label, scale

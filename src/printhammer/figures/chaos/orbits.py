@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.strobe import strobe as strobed
+from printhammer.chaos.strobe.points import strobe as strobed
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements.marks import HALO, name_lines, note, place_lines
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.orbit_result import Orbit
-    from printhammer.chaos.orbit_search import Orbits
-    from printhammer.chaos.regime import Regime
+    from printhammer.chaos.orbits.orbit import Orbit
+    from printhammer.chaos.orbits.search import Orbits
     from printhammer.figures.elements.scales import Scale
     from printhammer.run.motion import Motion
+    from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
 POINTS: Final = 600

@@ -14,7 +14,7 @@ from printhammer.figures.paper.two_pulses import DELAYS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.quench import QuenchMap
+    from printhammer.chaos.basins.quench import QuenchMap
 
 PRINTED: Final = "viridis"
 LOST: Final = "bone"
@@ -31,7 +31,7 @@ def plot(found: QuenchMap) -> Figure:
     Parameters
     ----------
     found : QuenchMap
-        From `printhammer.chaos.quench.quench_map`.
+        From `printhammer.chaos.basins.quench.quench_map`.
 
     Returns
     -------

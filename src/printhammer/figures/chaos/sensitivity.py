@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.sensitivity import Sensitivities
+    from printhammer.derivatives.sensitivities import Sensitivities
     from printhammer.support.arrays import FloatArray
 
 SHOWN: Final = ("flight_time", "impact_speed", "peak_force", "net_loss")

@@ -23,7 +23,7 @@ from printhammer.figures.elements.style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.stability_chart import StabilityChart
+    from printhammer.chaos.continuation.stability_chart import StabilityChart
 
 _STYLES: Final = {
     "fold": (BLUE, "-"),

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.window import Window
 from printhammer.figures.elements.marks import HALO, note
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import (
@@ -22,6 +21,7 @@ from printhammer.figures.elements.style import (
     sign,
     styled,
 )
+from printhammer.run.window import Window
 from printhammer.units import from_si
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.chaos.scan import scan
+from printhammer.chaos.strobe.scan import scan
 from printhammer.claims import Context
 from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.definition import claims

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.verdict import repeats
+from printhammer.chaos.strobe.verdict import repeats
 from printhammer.claims.definition import claims
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.drive.trains import PulseTrain

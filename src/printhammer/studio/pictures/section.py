@@ -58,7 +58,7 @@ def strobe_frame(
     InputError
         The state describes no hammer or drive that could be run.
     """
-    from printhammer.chaos.strobe import strobe
+    from printhammer.chaos.strobe.points import strobe
 
     found = strobe(
         state.changed,

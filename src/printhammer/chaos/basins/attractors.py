@@ -1,0 +1,196 @@
+"""Attractors, found and known again from the states of trains that lead to them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from printhammer.chaos.bifurcation.columns import OK, cycles_of, run_columns
+from printhammer.chaos.strobe.train import Train, exponents_of
+from printhammer.chaos.strobe.verdict import SIGNIFICANT
+from printhammer.drive.trains import PulseTrain
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.chaos.bifurcation.columns import Columns
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+
+MATCH: Final = 1e-2
+"""Distance, in half-widths of the window, up to which periodic orbits count as the same attractor."""
+
+CLOUD: Final = 2000
+"""Points by which a strange attractor is known."""
+
+SETTLING: Final = 1000
+"""Firings before these, so that they lie on it."""
+
+REACH: Final = 0.99
+"""Share of one half of these points that lies within reach of the other half: this defines the reach."""
+
+INSIDE: Final = 0.95
+"""Share of the points of a train that must lie within reach for it to be on a strange attractor."""
+
+ATTEMPTS: Final = 12
+"""Trains without a period that are followed for long, at most, to find strange attractors."""
+
+_BEFORE: Final = 100
+
+
+@dataclass(frozen=True)
+class Attractor:
+    """What trains lead to.
+
+    Attributes
+    ----------
+    name : str
+        "period-q" or "strange".
+    period : int or None
+        q; None for a strange one.
+    states : array, shape (q, 2) or (n, 2)
+        Displacements, m, and velocities, m/s, at successive firings: the orbit from its least displacement
+        on, or points of a strange attractor.
+    exponent, standard_error : float
+        Largest exponent of the strobe map, per firing, of a strange one; else NaN.
+    """
+
+    name: str
+    period: int | None
+    states: FloatArray
+    exponent: float = math.nan
+    standard_error: float = math.nan
+
+
+class Attractors:
+    """The attractors that were found so far, in the order in which they were.
+
+    Parameters
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    scales : array, shape (3,)
+        By which differences of displacement, velocity and memory are divided.
+    tolerance : float
+        Of the integration.
+    threads : int or None
+        As for `printhammer.Ensemble.run`.
+    """
+
+    def __init__(self, regime: Regime, scales: FloatArray, tolerance: float, threads: int | None) -> None:
+        self.regime = regime
+        self.scales = scales
+        self.tolerance = tolerance
+        self.threads = threads
+        self.found: list[Attractor] = []
+        self._trees: dict[int, tuple[cKDTree, float]] = {}
+        self._attempts = 0
+
+    def judge(self, columns: Columns) -> npt.NDArray[np.int64]:
+        """Return to which attractor trains have come: its place in `found`, -1 where that is not known."""
+        cycles, _ = self._cycles(columns)
+        places = np.full(len(columns), -1, np.int64)
+        for q in np.unique(cycles[cycles > 0]).tolist():
+            rows = np.flatnonzero(cycles == q)
+            orbits = self._scaled(columns.x[rows, -q:], columns.v[rows, -q:])
+            places[rows] = self._periodic(orbits)
+        self._strange(columns, np.flatnonzero((cycles == 0) & (columns.status == OK)), places)
+        return places
+
+    def _cycles(self, columns: Columns) -> tuple[npt.NDArray[np.int64], FloatArray]:
+        front = math.inf if self.regime.hammer.front is None else self.regime.hammer.front
+        count = len(columns)
+        return cycles_of(columns, np.full(count, front), np.tile(self.scales, (count, 1)))
+
+    def _scaled(self, x: FloatArray, v: FloatArray) -> FloatArray:
+        return np.stack([x, v], axis=-1) / self.scales[:2]
+
+    def _periodic(self, orbits: FloatArray) -> npt.NDArray[np.int64]:
+        """Return the places of orbits of one period, shape (n, q, 2); those that are new are added."""
+        q = orbits.shape[1]
+        places = np.full(len(orbits), -1, np.int64)
+        for place, attractor in enumerate(self.found):
+            if attractor.period == q:
+                left = np.flatnonzero(places < 0)
+                places[left[_agree(orbits[left], attractor.states / self.scales[:2])]] = place
+        while (left := np.flatnonzero(places < 0)).size:
+            new = orbits[left[0]]
+            states = np.roll(new, -int(np.argmin(new[:, 0])), axis=0) * self.scales[:2]
+            places[left[_agree(orbits[left], new)]] = len(self.found)
+            self.found.append(Attractor(f"period-{q}", q, states))
+        return places
+
+    def _strange(self, columns: Columns, rows: npt.NDArray[np.int64], places: npt.NDArray[np.int64]) -> None:
+        """Find trains without a period on strange attractors; new ones are looked for where they begin."""
+        points = self._scaled(columns.x, columns.v)
+        left = rows
+        for place in self._trees:
+            left = self._within(points, left, place, places)
+        while left.size and self._attempts < ATTEMPTS:
+            self._attempts += 1
+            row = int(left[0])
+            followed = self._follow(columns, row)
+            left = left[1:]
+            if followed is None:
+                continue
+            places[row] = followed
+            # After a long transient to a periodic orbit the others must show for themselves.
+            if followed in self._trees:
+                left = self._within(points, left, followed, places)
+
+    def _within(
+        self, points: FloatArray, rows: npt.NDArray[np.int64], place: int, places: npt.NDArray[np.int64]
+    ) -> npt.NDArray[np.int64]:
+        """Label the trains that lie on a strange attractor; return the others."""
+        if not rows.size:
+            return rows
+        tree, reach = self._trees[place]
+        apart, _ = tree.query(points[rows].reshape(-1, 2), distance_upper_bound=reach)
+        share = np.isfinite(apart).reshape(len(rows), -1).mean(axis=1)
+        places[rows[share >= INSIDE]] = place
+        return np.asarray(rows[share < INSIDE])
+
+    def _follow(self, columns: Columns, row: int) -> int | None:
+        """Follow one train for long; return the place of the attractor, None where there is no saying."""
+        begin = columns.last[row : row + 1]
+        if math.isnan(begin[0, 0]):
+            return None
+        longer = run_columns([self.regime], begin, SETTLING + CLOUD, SETTLING, 0.0, self.tolerance, threads=1)
+        if longer.status[0] != OK:
+            return None
+        cycles, _ = self._cycles(longer)
+        q = int(cycles[0])
+        if q:
+            return int(self._periodic(self._scaled(longer.x[:, -q:], longer.v[:, -q:]))[0])
+        x, v, branch, _memory = longer.last[0].tolist()
+        if branch >= 0.0:
+            return None
+        regime = self.regime
+        window = (_BEFORE + 1, _BEFORE + CLOUD)
+        drive = regime.drive or PulseTrain(
+            regime.fired, period=regime.period, pulses=window[1] + 2, overlap=regime.overlap
+        )
+        train = Train(regime.hammer, drive, regime.period, (x, v))
+        (exponent,) = exponents_of([train], window, self.tolerance, threads=1)
+        if not (exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error):
+            return None
+        cloud = self._scaled(longer.x[0], longer.v[0])
+        half = CLOUD // 2
+        apart, _ = cKDTree(cloud[:half]).query(cloud[half:])
+        self._trees[len(self.found)] = (cKDTree(cloud), float(np.quantile(apart, REACH)))
+        states = np.column_stack([longer.x[0], longer.v[0]])
+        self.found.append(Attractor("strange", None, states, exponent.value, exponent.standard_error))
+        return len(self.found) - 1
+
+
+def _agree(orbits: FloatArray, known: FloatArray) -> npt.NDArray[np.bool_]:
+    """Tell which of some orbits, shape (n, q, 2), are a known one, shape (q, 2), whatever their phase."""
+    count = len(known)
+    # The point nearest to the first one tells the shift.
+    shift = np.abs(known - orbits[:, :1]).max(axis=2).argmin(axis=1)
+    turned = known[(shift[:, np.newaxis] + np.arange(count)) % count]
+    return np.asarray(np.abs(turned - orbits).max(axis=(1, 2)) <= MATCH)

@@ -1,0 +1,292 @@
+"""Basins: which initial states lead to which attractor.
+
+A grid of states at the moment of a firing, with the pulses before it under way, is fired at until it is known
+where each leads. The attractors are found from the cells themselves. A cell whose train repeats itself, by
+the rule of `printhammer.chaos.strobe.verdict`, leads to that periodic orbit. For one that does not, a train
+is followed for thousands of firings; where its exponent shows it to be strange, its points are an attractor
+to which those cells lead whose points lie among them. A cell of which neither is true after several rounds is
+undecided.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.basins.attractors import Attractor, Attractors
+from printhammer.chaos.basins.entropy import BOX, BasinEntropy, basin_entropy
+from printhammer.chaos.bifurcation.columns import OK, TOLERANCE, run_columns, scales_of_columns
+from printhammer.chaos.strobe.verdict import LARGEST_PERIOD
+from printhammer.drive.input import read_count, read_number
+from printhammer.errors import InputError
+from printhammer.run.problem import check_tolerance
+from printhammer.run.regime import Regime
+from printhammer.run.start import initial_state
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+FIRINGS: Final = 200
+"""Firings of a round unless told otherwise."""
+
+ROUNDS: Final = 4
+"""Rounds that a cell gets, at most, unless told otherwise."""
+
+CELLS: Final = 128
+"""Cells along each side unless told otherwise."""
+
+MOST_CELLS: Final = 10_000_000
+"""Number of cells above which a plane is refused."""
+
+UNDECIDED: Final = 0
+FAILED: Final = -1
+NO_STATE: Final = -2
+"""Labels of cells that lead to no known attractor, whose run ended early, and where there is no state."""
+
+NO_STATE_STATUS: Final = "no state"
+
+_PIECE: Final = 4096
+_FEWEST: Final = 4
+
+Range = tuple[float | str, float | str, SupportsIndex]
+
+
+@dataclass(frozen=True)
+class Basins:
+    """Which initial states lead to which attractor.
+
+    Attributes
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    x, v : array, shape (X,), (V,)
+        Displacements, m, and velocities, m/s, of the cells at the first firing.
+    labels : int array, shape (V, X)
+        Number of the attractor, from 1 on; 0 undecided, -1 the run ended early, -2 there is no such state.
+    attractors : tuple of Attractor
+        In the order of their numbers: by period, strange ones last, then by their least displacement.
+    firings : int array, shape (V, X)
+        Firings after which the cell was decided, or given up.
+    status : str array, shape (V, X)
+        How the run ended; "no state" where there is none.
+    tolerance : float
+        Of the integration.
+    """
+
+    regime: Regime
+    x: FloatArray = field(repr=False)
+    v: FloatArray = field(repr=False)
+    labels: npt.NDArray[np.int64] = field(repr=False)
+    attractors: tuple[Attractor, ...]
+    firings: npt.NDArray[np.int64] = field(repr=False)
+    status: npt.NDArray[np.str_] = field(repr=False)
+    tolerance: float
+
+    @property
+    def counts(self) -> dict[int, int]:
+        """Number of cells by label: of every attractor, and of -2, -1 and 0."""
+        every = (NO_STATE, FAILED, UNDECIDED, *range(1, len(self.attractors) + 1))
+        return {label: int((self.labels == label).sum()) for label in every}
+
+    @property
+    def shares(self) -> tuple[FloatArray, FloatArray]:
+        """Share of each attractor in the cells that have a state, and its standard error, shape (A,).
+
+        The error is that of as many states drawn at random, sqrt(p (1 - p) / n). A regular grid knows the
+        share better than that where the boundary is smooth.
+        """
+        count = int((self.labels != NO_STATE).sum())
+        share = np.array([self.counts[k + 1] for k in range(len(self.attractors))], dtype=np.float64)
+        share /= max(count, 1)
+        return share, np.sqrt(share * (1.0 - share) / max(count, 1))
+
+    def entropy(self, *, box: SupportsIndex = BOX) -> BasinEntropy:
+        """Return the basin entropy, of boxes of so many cells along a side."""
+        return basin_entropy(self.labels, box=box)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the cells as a Dataset over `v` and `x`, with units and provenance in the attributes."""
+        from printhammer.chaos.basins.tables import basins_dataset
+
+        return basins_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the basins; returns a matplotlib figure, see `printhammer.figures.chaos.basins`."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.basins").plot(self, **options)
+
+
+def basins(
+    hammer: Hammer,
+    *,
+    period: float | str | None = None,
+    rate: float | str | None = None,
+    x: Range | None = None,
+    v: Range | None = None,
+    firings: SupportsIndex = FIRINGS,
+    rounds: SupportsIndex = ROUNDS,
+    waveform: Waveform | None = None,
+    drive: Drive | None = None,
+    overlap: Overlap = "add",
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Basins:
+    """Find out which initial states lead to which attractor.
+
+    A state in the pack meets fresh paper at its own depth: on the loading branch where it goes in, on the
+    unloading branch from there where it comes out. A state in the backstop begins with that indentation.
+    Where the law of the magnet does not hold, and behind a rigid backstop, there is no state.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    period, rate, waveform, drive, overlap
+        As for `printhammer.strobe`.
+    x, v : tuple, optional
+        Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, the
+        two ends among them; by default the window of `printhammer.run.window` and 128.
+    firings : int, optional
+        Firings of a round, at least 4; the last ones, half of them and at most 128, are judged.
+    rounds : int, optional
+        Rounds that a cell is given, at most.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+    threads : int, optional
+        By default as many as there are cores; the result does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of rounds of cells done and of all that are known of so far.
+
+    Returns
+    -------
+    Basins
+        With a label for each cell; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above.
+    """
+    regime = Regime.of(hammer, period=period, rate=rate, waveform=waveform, drive=drive, overlap=overlap)
+    check_tolerance(tolerance)
+    count, most = read_count(firings, "firings"), read_count(rounds, "rounds")
+    if count < _FEWEST:
+        raise InputError(f"firings = {firings!r}, expected at least {_FEWEST}")
+    window = regime.window
+    across, up = (
+        _axis(given, name, unit, ends)
+        for given, name, unit, ends in ((x, "x", "m", window.x), (v, "v", "m/s", window.v))
+    )
+    if across.size * up.size > MOST_CELLS:
+        raise InputError(f"{across.size} x {up.size} cells, expected at most {MOST_CELLS}")
+    cells = np.zeros((up.size, across.size, 4))
+    cells[..., 0], cells[..., 1] = across, up[:, np.newaxis]
+    cells[..., 2] = -1.0
+    labels, used, status, found = _decided(
+        regime, cells.reshape(-1, 4), (count, most, tolerance), threads, progress
+    )
+    shape = up.size, across.size
+    order = sorted(range(len(found)), key=lambda place: _key(found[place]))
+    number = np.zeros(len(found) + 1, np.int64)
+    number[np.array(order, np.int64)] = np.arange(1, len(found) + 1)
+    known = labels >= 0
+    labels[known] = number[labels[known]]
+    labels[~known] += 1
+    return Basins(
+        regime=regime,
+        x=across,
+        v=up,
+        labels=labels.reshape(shape),
+        attractors=tuple(found[place] for place in order),
+        firings=used.reshape(shape),
+        status=status.reshape(shape),
+        tolerance=tolerance,
+    )
+
+
+def _decided(
+    regime: Regime,
+    cells: FloatArray,
+    counts: tuple[int, int, float],
+    threads: int | None,
+    progress: Progress | None,
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.str_], list[Attractor]]:
+    """Return places of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings, statuses, attractors."""
+    firings, most, tolerance = counts
+    (scales,) = scales_of_columns([regime])
+    attractors = Attractors(regime, scales, tolerance, threads)
+    places = np.full(len(cells), UNDECIDED - 1, np.int64)
+    used = np.zeros(len(cells), np.int64)
+    status = np.full(len(cells), OK, "U16")
+    possible = {x: _possible(regime.hammer, x) for x in np.unique(cells[:, 0]).tolist()}
+    absent = np.array([not possible[x] for x in cells[:, 0].tolist()])
+    places[absent], status[absent] = NO_STATE - 1, NO_STATE_STATUS
+    states = cells.copy()
+    done, known = 0, int((~absent).sum())
+    transient = firings - min(2 * LARGEST_PERIOD, firings // 2)
+    for _round in range(most):
+        left = np.flatnonzero((places == UNDECIDED - 1) & np.isfinite(states[:, 0]))
+        for first in range(0, len(left), _PIECE):
+            rows = left[first : first + _PIECE]
+            begun = done
+
+            def tell(part: int, _all: int, begun: int = begun, known: int = known) -> None:
+                if progress is not None:
+                    progress(begun + part, known)
+
+            found = run_columns(
+                [regime] * len(rows),
+                states[rows],
+                firings,
+                transient,
+                0.0,
+                tolerance,
+                threads=threads,
+                progress=tell,
+            )
+            judged = attractors.judge(found)
+            failed = found.status != OK
+            places[rows] = np.where(failed, FAILED - 1, judged)
+            status[rows], states[rows] = found.status, found.last
+            used[rows] += firings
+            done += len(rows)
+        known = done + int((places == UNDECIDED - 1).sum())
+    return places, used, status, attractors.found
+
+
+def _possible(hammer: Hammer, x: float) -> bool:
+    try:
+        initial_state(hammer, (x, 0.0))
+    except InputError:
+        return False
+    return True
+
+
+def _key(attractor: Attractor) -> tuple[int, float, float]:
+    lowest = int(np.argmin(attractor.states[:, 0]))
+    x, v = attractor.states[lowest].tolist()
+    return LARGEST_PERIOD + 1 if attractor.period is None else attractor.period, x, v
+
+
+def _axis(given: Any, name: str, unit: str, window: tuple[float, float]) -> FloatArray:
+    if given is None:
+        return np.linspace(*window, CELLS)
+    if not isinstance(given, tuple | list) or len(given) != 3:
+        raise InputError(f"{name} = {given!r}, expected least and largest value and their number")
+    low, high = (read_number(end, unit, name) for end in given[:2])
+    count = read_count(given[2], f"{name}: number of values")
+    if not low < high or count < 2:
+        raise InputError(f"{name} = {given!r}, expected two ends, the second the larger one, and 2 or more")
+    return np.linspace(low, high, count)

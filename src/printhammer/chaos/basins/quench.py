@@ -1,0 +1,372 @@
+"""The quench map: what a second pulse does, against its time and its width.
+
+Fig. 6 of F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), shows two cases: fired
+again after 660 µs the hammer is braked, and there is no second dot; after 700 µs it makes a complete
+excursion. Here this is a plane: the time between two firings against the width of the second pulse, that of
+the first one staying as it is. Where pulses overlap, their currents add.
+
+A drive fires one waveform. For two different pulses without a kernel of their own, the waveform here holds
+both of them, so far apart that of its four firings only two do anything during the run: one whose first pulse
+comes at the beginning, one whose second pulse comes at the second firing, and two without a pulse by which
+the dots are told apart.
+"""
+
+from __future__ import annotations
+
+import math
+from copy import copy
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, SupportsIndex
+
+import numpy as np
+
+from printhammer.drive.input import read_count, read_number, read_positive
+from printhammer.drive.segments import table
+from printhammer.drive.trains import Drive, PulseTrain
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.errors import InputError
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.run.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+TAIL: Final = 1e-3
+"""Time after the second firing, s, within which a second dot is waited for unless told otherwise."""
+
+MOST_CELLS: Final = 10_000_000
+"""Number of cells above which a map is refused."""
+
+_PIECE: Final = 8192
+_SPACING: Final = 5e-6
+_FIRST, _SECOND = 2, 3
+
+Range = tuple[float | str, float | str, SupportsIndex]
+
+
+@dataclass(frozen=True)
+class QuenchMap:
+    """What a second pulse does: arrays of shape (G, W), times between the firings by widths.
+
+    Attributes
+    ----------
+    hammer : Hammer
+        The hammer.
+    waveform : Waveform
+        The first pulse; the second has another width.
+    gaps : array, shape (G,)
+        Times between the two firings, s.
+    widths : array, shape (W,)
+        Widths of the second pulse, s.
+    struck : bool array
+        Whether the second firing made a dot; False for a lost one.
+    peak : array
+        Largest local maximum of the displacement after the second firing, m; NaN where there is none. Of a
+        lost dot it is read from samples, good to 1e-5 of the way to the pack.
+    force : array
+        Largest pack force of the second dot, N; NaN for a lost one.
+    flight_time : array
+        Of the second dot, from the second firing to touch, s; NaN likewise.
+    status : str array
+        How the runs ended.
+    single_force, single_flight_time : float
+        Of the first pulse alone, N and s; NaN where it makes no dot.
+    tail : float
+        Time after the second firing, s, within which a second dot was waited for.
+    tolerance : float
+        Of the integration.
+    """
+
+    hammer: Hammer
+    waveform: Waveform
+    gaps: FloatArray = field(repr=False)
+    widths: FloatArray = field(repr=False)
+    struck: npt.NDArray[np.bool_] = field(repr=False)
+    peak: FloatArray = field(repr=False)
+    force: FloatArray = field(repr=False)
+    flight_time: FloatArray = field(repr=False)
+    status: npt.NDArray[np.str_] = field(repr=False)
+    single_force: float
+    single_flight_time: float
+    tail: float
+    tolerance: float
+
+    @property
+    def lost(self) -> npt.NDArray[np.bool_]:
+        """Where the second dot is lost; False where the run ended early."""
+        return np.asarray(~self.struck & (self.status == "ok"))
+
+    @property
+    def peak_share(self) -> FloatArray:
+        """Second peak in parts of the way to the pack: 0 at the backstop, 1 at the front of the pack."""
+        front = self.hammer.front
+        assert front is not None
+        return (self.peak - self.hammer.origin) / (front - self.hammer.origin)
+
+    @property
+    def force_ratio(self) -> FloatArray:
+        """Force of the second dot over that of the first pulse alone."""
+        return self.force / self.single_force
+
+    @property
+    def flight_gain(self) -> FloatArray:
+        """By how much the second dot flies shorter than that of the first pulse alone, s."""
+        return self.single_flight_time - self.flight_time
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the map as a Dataset over `gap` and `width`, with units and provenance in the attributes."""
+        from printhammer.chaos.basins.quench_tables import quench_dataset
+
+        return quench_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the map; returns a matplotlib figure, see `printhammer.figures.chaos.quench`."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.quench").plot(self, **options)
+
+
+class TwoPulses(Waveform):
+    """A waveform of two pulses far apart, from which drives of two different pulses are made."""
+
+    shape: ClassVar[str] = "two pulses"
+    first: Waveform
+    second: Waveform
+    apart: float
+    largest: float
+
+    def segments(self) -> FloatArray:
+        """Return the segment table: nothing, the first pulse at `apart`, the second at twice that."""
+        rows = [
+            (number * self.apart + row[0], *row[1:])
+            for number, pulse in enumerate((self.first, self.second), 1)
+            for row in pulse.segments().tolist()
+        ]
+        return table(rows[:-1], rows[-1][0])
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same with every value multiplied by a factor."""
+        scaled = {"first": self.first.scaled(factor), "second": self.second.scaled(factor)}
+        return self.model_copy(update={**scaled, "largest": abs(factor) * self.largest})
+
+    @property
+    def peak(self) -> float:
+        """Largest absolute value; one for all widths of a map, so that all runs have the same scales."""
+        return self.largest
+
+
+class TwoPulseDrive(Drive):
+    """A drive of two different pulses; its run begins at `begin`, with the firing of the first."""
+
+    def __init__(self, waveform: TwoPulses, gap: float) -> None:
+        super().__init__(waveform, self.firings(waveform.apart, gap))
+
+    @staticmethod
+    def firings(apart: float, gap: float) -> FloatArray:
+        """Return the firing times, s: two before the run, and the two from which dots are counted."""
+        return np.array([gap, apart, 2.0 * apart, 2.0 * apart + gap])
+
+    @property
+    def begin(self) -> float:
+        """Time of the first firing in the run, s."""
+        return float(self._times[_FIRST])
+
+    def with_firings(self, times: FloatArray) -> Self:
+        """Return the same drive with other firing times, made by `firings`."""
+        result = copy(self)
+        result._times = times
+        return result
+
+
+def quench_map(
+    hammer: Hammer,
+    *,
+    gaps: Range = ("0.5 ms", "0.9 ms", 128),
+    widths: Range | None = None,
+    waveform: Waveform | None = None,
+    tail: float | str = TAIL,
+    tolerance: float = DISPLAY_TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> QuenchMap:
+    """Fire twice from rest, and see what becomes of the second dot.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        A hammer with a pack.
+    gaps : tuple, optional
+        Least and largest time between the two firings, s, or text with a unit, and number of times, the two
+        ends among them.
+    widths : tuple, optional
+        Likewise for the width of the second pulse; by default 128 from half to one and a half times that of
+        the first.
+    waveform : Waveform, optional
+        The first pulse; by default the waveform of the hammer. It needs a width.
+    tail : float or str, optional
+        Time after the second firing within which a dot counts as the second one, s, or text with a unit.
+    tolerance : float, optional
+        As for `printhammer.simulate`; by default that for pictures.
+    threads : int, optional
+        By default as many as there are cores; the map does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of cells done and of all.
+
+    Returns
+    -------
+    QuenchMap
+        With a status for each cell; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; a hammer without a pack or a rest state; a waveform
+        without a width.
+    """
+    pulse = hammer.waveform if waveform is None else waveform
+    if pulse is None:
+        raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+    width = getattr(pulse, "width", None)
+    if not isinstance(width, float):
+        raise InputError(f"waveform: a {pulse.shape} has no width, expected a pulse that has one")
+    if hammer.front is None:
+        raise InputError(f"the hammer {hammer.name!r} has no pack, expected one that a dot is made on")
+    times = _axis(gaps, "gaps")
+    wide = _axis((0.5 * width, 1.5 * width, 128) if widths is None else widths, "widths")
+    wait = read_positive(tail, "s", "tail")
+    if times.size * wide.size > MOST_CELLS:
+        raise InputError(f"{times.size} x {wide.size} cells, expected at most {MOST_CELLS}")
+    alone = simulate(hammer, PulseTrain(pulse), duration=pulse.support + wait, tolerance=tolerance).dots[0]
+    drives = _drives(pulse, wide, float(times[-1]) + max(wait, pulse.support))
+    shape = times.size, wide.size
+    struck, status = np.zeros(shape, np.bool_), np.full(shape, "ok", "U16")
+    peak, force, flight = (np.full(shape, np.nan) for _ in range(3))
+    rows = max(1, _PIECE // wide.size)
+    for first in range(0, times.size, rows):
+        part = slice(first, min(first + rows, times.size))
+
+        def tell(done: int, _all: int, begun: int = first * wide.size) -> None:
+            if progress is not None:
+                progress(begun + done, times.size * wide.size)
+
+        found = _piece(hammer, drives, times[part], wait, tolerance, threads, tell)
+        for whole, piece in zip((struck, status, peak, force, flight), found, strict=True):
+            whole[part] = piece.reshape(whole[part].shape)
+    return QuenchMap(
+        hammer=hammer,
+        waveform=pulse,
+        gaps=times,
+        widths=wide,
+        struck=struck,
+        peak=peak,
+        force=force,
+        flight_time=flight,
+        status=status,
+        single_force=math.nan if alone.peak_force is None else alone.peak_force,
+        single_flight_time=math.nan if alone.flight_time is None else alone.flight_time,
+        tail=wait,
+        tolerance=tolerance,
+    )
+
+
+def two_pulse_drive(first: Waveform, second: Waveform, gap: float, last: float) -> TwoPulseDrive:
+    """Return a drive that fires one pulse, and another one `gap` later, for runs of `last` seconds at most.
+
+    The run has to begin at the time `begin` of the drive, with the rest state; times, s, count from there.
+    """
+    # A power of two, so that sums of it with other times are rounded the same way everywhere.
+    apart = 2.0 ** math.ceil(math.log2(max(last, gap + first.support)))
+    largest = max(first.peak, second.peak)
+    pair = TwoPulses(first=first, second=second, apart=apart, largest=largest, quantity=first.quantity)
+    return TwoPulseDrive(pair, gap)
+
+
+def _drives(pulse: Waveform, widths: FloatArray, last: float) -> list[TwoPulseDrive]:
+    """Return a drive for each width; the times are put in later."""
+    seconds = [type(pulse)(**{**dict(pulse), "width": width}) for width in widths.tolist()]
+    largest = max(pulse.peak, *(second.peak for second in seconds))
+    apart = 2.0 ** math.ceil(math.log2(last + pulse.support))
+    return [
+        TwoPulseDrive(
+            TwoPulses(first=pulse, second=second, apart=apart, largest=largest, quantity=pulse.quantity),
+            0.5 * last,
+        )
+        for second in seconds
+    ]
+
+
+def _piece(
+    hammer: Hammer,
+    drives: Sequence[TwoPulseDrive],
+    gaps: FloatArray,
+    tail: float,
+    tolerance: float,
+    threads: int | None,
+    progress: Progress,
+) -> tuple[npt.NDArray[Any], ...]:
+    """Return second dot, status, peak, force and flight time of some gaps, each for all widths."""
+    begin = drives[0].begin
+    firings = [TwoPulseDrive.firings(0.5 * begin, gap) for gap in gaps.tolist()]
+    every = [drive.with_firings(times) for times in firings for drive in drives]
+    ends = np.repeat(begin + gaps + tail, len(drives))
+    span = float(gaps[-1] - gaps[0]) + tail
+    grid = begin + float(gaps[0]) + np.linspace(0.0, span, max(4, math.ceil(span / _SPACING) + 1))
+    result = Ensemble(hammer, every, ends, starts=begin, tolerance=tolerance).run(
+        dots=True, times=grid, threads=threads, progress=progress
+    )
+    dots, x = result.dots, result.x
+    assert dots is not None
+    assert x is not None
+    assert hammer.front is not None
+    second = dots.struck[:, _SECOND]
+    after = np.repeat(begin + gaps, len(drives))
+    turned = _highest(grid, x.astype(np.float64), after)
+    peak = np.where(second, np.fmax(hammer.front + dots.indentation[:, _SECOND], turned), turned)
+    return (
+        second,
+        np.array(result.status_names, "U16"),
+        np.where(result.ok, peak, np.nan),
+        dots.peak_force[:, _SECOND],
+        dots.flight_time[:, _SECOND],
+    )
+
+
+def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> FloatArray:
+    """Return the largest local maximum after some times, from samples; NaN where there is none.
+
+    Parameters
+    ----------
+    grid : array, shape (T,)
+        Times of the samples, evenly spaced.
+    x : array, shape (M, T)
+        The samples, NaN where there is none.
+    after : array, shape (M,)
+        Times, one for each row.
+    """
+    before, here, following = x[:, :-2], x[:, 1:-1], x[:, 2:]
+    bend = before - 2.0 * here + following
+    slope = 0.5 * (following - before)
+    top = (here > before) & (here >= following) & (bend < 0.0)
+    shift = np.divide(-slope, bend, out=np.zeros_like(here), where=top)
+    late = grid[1:-1] + shift * (grid[1] - grid[0]) > after[:, np.newaxis]
+    heights = np.where(top & late, here + 0.5 * slope * shift, -np.inf).max(axis=1)
+    return np.where(np.isfinite(heights), heights, np.nan)
+
+
+def _axis(given: Any, name: str) -> FloatArray:
+    if not isinstance(given, tuple | list) or len(given) != 3:
+        raise InputError(f"{name} = {given!r}, expected least and largest time and their number")
+    low, high = (read_number(end, "s", name) for end in given[:2])
+    count = read_count(given[2], f"{name}: number of values")
+    if not 0.0 < low < high or count < 2:
+        raise InputError(
+            f"{name} = {given!r}, expected two times above 0 s, the second longer, and 2 or more"
+        )
+    return np.linspace(low, high, count)

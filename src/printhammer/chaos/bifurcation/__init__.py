@@ -1,0 +1,1 @@
+"""Bifurcation diagrams: states at the firings against a constant."""

@@ -1,0 +1,211 @@
+"""A bifurcation diagram under way: the trains at the given values, refinement between them, exponents."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.bifurcation.carry import Strand, Table, carry, strands_of
+from printhammer.chaos.bifurcation.columns import (
+    OK,
+    blank_columns,
+    cycles_of,
+    orbit_distance,
+    put,
+    run_columns,
+    scales_of_columns,
+    usable,
+)
+from printhammer.chaos.strobe.train import Train, exponents_of
+from printhammer.drive.trains import PulseTrain
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.chaos.bifurcation.columns import State
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+JUMP: Final = 0.2
+"""Distance of neighbouring orbits of the same period, in half-widths of the window, that is refined."""
+
+_BEFORE: Final = 100
+"""Firings before an exponent counts."""
+
+
+def window_of_exponent(points: int) -> tuple[int, int]:
+    """Return the first and last firing over which the exponent of a train with so many points is taken."""
+    return _BEFORE + 1, _BEFORE + points
+
+
+def train_from(regime: Regime, state: tuple[float, float], points: int) -> Train:
+    """Return a train that goes on from a state at a firing, for its exponent."""
+    _first, last = window_of_exponent(points)
+    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
+    drive = regime.drive or PulseTrain(
+        regime.fired, period=regime.period, pulses=last + 2, overlap=regime.overlap
+    )
+    return Train(regime.hammer, drive, regime.period, state)
+
+
+class DiagramBuilder:
+    """A diagram under way. Trains are numbered as they come, those of all directions at a value in a row."""
+
+    def __init__(
+        self,
+        regime: Regime,
+        name: str,
+        ways: tuple[str, ...],
+        counts: tuple[int, int, float, float],
+        begin: State,
+        threads: int | None,
+        progress: Progress | None,
+    ) -> None:
+        self.regime, self.name, self.ways, self.counts, self.begin = regime, name, ways, counts, begin
+        self.threads, self.progress = threads, progress
+        self.points = counts[0] - counts[1]
+        self.values = np.zeros(0)
+        self.levels = np.zeros(0, np.int64)
+        none = np.zeros(0)
+        self.table = Table([], blank_columns(0, self.points), np.zeros(0, np.int64), none, np.zeros((0, 3)))
+        self.exponents, self.errors = none.copy(), none.copy()
+        self.done = 0
+        self.known = 0
+
+    def add(self, values: FloatArray, level: int) -> list[int]:
+        """Make room for trains at new values; return the places of the values."""
+        first = len(self.values)
+        regimes = [self.regime.with_(self.name, value) for value in values.tolist()]
+        every = [regime for regime in regimes for _way in self.ways]
+        table = self.table
+        longer = blank_columns(len(table.regimes) + len(every), self.points)
+        put(longer, np.arange(len(table.regimes)), table.columns)
+        scales = np.repeat(scales_of_columns(regimes), len(self.ways), axis=0)
+        nothing = np.full(len(every), np.nan)
+        self.table = Table(
+            [*table.regimes, *every],
+            longer,
+            np.concatenate([table.cycles, np.zeros(len(every), np.int64)]),
+            np.concatenate([table.distances, nothing]),
+            np.concatenate([table.scales, scales]),
+            table.carried,
+        )
+        self.exponents = np.concatenate([self.exponents, nothing])
+        self.errors = np.concatenate([self.errors, nothing])
+        self.values = np.concatenate([self.values, values])
+        self.levels = np.concatenate([self.levels, np.full(len(values), level)])
+        self.known += len(every)
+        return list(range(first, len(self.values)))
+
+    def rows(self, places: Sequence[int], way: int) -> list[int]:
+        """Return the rows of the trains at some values in one direction."""
+        return [len(self.ways) * place + way for place in places]
+
+    def base(self, grid: FloatArray) -> None:
+        """Run the trains at the values that were given."""
+        places = self.add(grid, 0)
+        if self.ways == ("from rest",):
+            self.run(places, np.array([usable(self.table.regimes[row], self.begin) for row in places]))
+            return
+        strands: list[Strand] = []
+        for way, name in enumerate(self.ways):
+            order = places if name == "up" else places[::-1]
+            strands += strands_of(self.rows(order, way), len(strands))
+        carry(self.table, strands, self.begin, self.run, self.trial)
+
+    def refine(self, level: int) -> None:
+        """Run trains between neighbours that differ; the state comes from the neighbour before."""
+        order = np.argsort(self.values, kind="stable").tolist()
+        pairs = [pair for pair in itertools.pairwise(order) if self.differ(*pair)]
+        middles = np.array([0.5 * (self.values[one] + self.values[other]) for one, other in pairs])
+        new = [
+            k for k, (one, other) in enumerate(pairs) if self.values[one] < middles[k] < self.values[other]
+        ]
+        if not new:
+            return
+        places = self.add(middles[new], level)
+        rows: list[int] = []
+        states: list[State] = []
+        for way, name in enumerate(self.ways):
+            for place, k in zip(places, new, strict=True):
+                (row,) = self.rows([place], way)
+                begin = self.begin
+                if name != "from rest":
+                    (before,) = self.rows([pairs[k][0 if name == "up" else 1]], way)
+                    x, v, branch, memory = self.table.columns.last[before].tolist()
+                    begin = (x, v, branch, memory)
+                rows.append(row)
+                states.append(usable(self.table.regimes[row], begin))
+        self.run(rows, np.array(states))
+
+    def differ(self, one: int, other: int) -> bool:
+        """Tell whether the trains at two values differ: in period, or by a jump of the orbit."""
+        table = self.table
+        for way in range(len(self.ways)):
+            a, b = self.rows([one, other], way)
+            q = int(table.cycles[a])
+            if q != table.cycles[b] or table.columns.status[a] != table.columns.status[b]:
+                return True
+            if q:
+                orbits = [
+                    np.column_stack([table.columns.x[row, -q:], table.columns.v[row, -q:]])
+                    / table.scales[row, :2]
+                    for row in (a, b)
+                ]
+                if orbit_distance(*orbits) > JUMP:
+                    return True
+        return False
+
+    def trial(self, rows: Sequence[int], states: FloatArray) -> tuple[Any, Any, Any]:
+        """Run trains from states; return their states, periods and distances."""
+        regimes = [self.table.regimes[row] for row in rows]
+        begin = self.done
+
+        def tell(part: int, _all: int) -> None:
+            self.tell(begin + part)
+
+        found = run_columns(regimes, states, *self.counts, threads=self.threads, progress=tell)
+        fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
+        cycles, distances = cycles_of(found, fronts, self.table.scales[list(rows)])
+        return found, cycles, distances
+
+    def run(self, rows: Sequence[int], states: FloatArray) -> None:
+        """Run trains from states and keep what is found."""
+        found, cycles, distances = self.trial(rows, states)
+        put(self.table.columns, rows, found)
+        self.table.cycles[list(rows)] = cycles
+        self.table.distances[list(rows)] = distances
+        self.done += len(rows)
+
+    def tell(self, done: int) -> None:
+        """Tell how many trains are done; those that are run again to close joints do not count."""
+        if self.progress is not None:
+            self.progress(min(done, self.known), self.known)
+
+    def measure(self) -> None:
+        """Compute the exponents of the trains without a period, over as many firings as there are points."""
+        columns, table = self.table.columns, self.table
+        trains = []
+        for row, regime in enumerate(table.regimes):
+            x, v, branch, _memory = columns.last[row].tolist()
+            # A start inside the pack would need its memory; such a train stays undecided.
+            if columns.status[row] != OK or table.cycles[row] or branch >= 0.0 or math.isnan(x):
+                continue
+            trains.append((row, train_from(regime, (x, v), self.points)))
+        self.known += len(trains)
+        begun = self.done
+        found = exponents_of(
+            [train for _row, train in trains],
+            window_of_exponent(self.points),
+            self.counts[3],
+            threads=self.threads,
+            progress=lambda done, _all: self.tell(begun + done),
+        )
+        for (row, _train), exponent in zip(trains, found, strict=True):
+            if exponent.ok and exponent.smooth:
+                self.exponents[row], self.errors[row] = exponent.value, exponent.standard_error
+        self.done += len(trains)

@@ -1,0 +1,177 @@
+"""Carrying the state from one value of a parameter to the next, on all cores.
+
+Strictly, each train begins where the one before it ended, so that they cannot be run side by side. Here the
+values are cut into strands of `STRAND` successive values. Every strand is begun from rest, and within it the
+state is carried; all strands run side by side. Then the joints are closed: the first train of a strand is run
+again from the state at which the strand before it ended. Where it comes to the same attractor, the rest of
+the strand stands as it is; where it does not, it replaces what was there, and the state is carried on from
+it, until the same attractor is met or the strand ends, in which case the next joint is closed anew.
+
+So every train lies on the attractor to which a strict carrying leads, up to what an attractor is known by
+(`same_attractor`). The strands depend on the values alone, and so does the result: not on threads or chunks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.bifurcation.columns import OK, orbit_distance, put, usable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from printhammer.chaos.bifurcation.columns import Columns, State
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+
+STRAND: Final = 16
+"""Values in a strand."""
+
+SAME: Final = 1e-3
+"""Distance, in half-widths of the window, up to which periodic orbits count as the same."""
+
+_SHIFTED: Final = 0.5
+"""Difference of the means of two clouds, in their standard deviations, up to which they count as the same."""
+
+
+@dataclass
+class Strand:
+    """Successive trains, the state being carried from each to the next.
+
+    Attributes
+    ----------
+    rows : list of int
+        Their rows in the table of all trains, in the order in which the state is carried.
+    before : int or None
+        Number of the strand that ends where this one begins; None for the first one.
+    """
+
+    rows: list[int]
+    before: int | None = None
+
+
+@dataclass
+class Table:
+    """All trains of a diagram: what is run, and what is found.
+
+    Attributes
+    ----------
+    regimes : list of Regime
+        One for each train.
+    columns : Columns
+        Their states.
+    cycles : int array
+        Their periods, 0 for none.
+    scales : array, shape (M, 3)
+        By which differences of displacement, velocity and memory are divided.
+    carried : int
+        Number of trains that were run again to close the joints.
+    """
+
+    regimes: list[Regime]
+    columns: Columns
+    cycles: Any
+    distances: Any
+    scales: FloatArray
+    carried: int = field(default=0)
+
+
+def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
+    """Cut trains, in the order in which the state is carried, into strands numbered from `first` on."""
+    cut = [list(rows[k : k + STRAND]) for k in range(0, len(rows), STRAND)]
+    return [Strand(part, first + k - 1 if k else None) for k, part in enumerate(cut)]
+
+
+def carry(
+    table: Table,
+    strands: Sequence[Strand],
+    start: State,
+    run: Callable[[list[int], FloatArray], None],
+    trial: Callable[[list[int], FloatArray], tuple[Columns, Any, Any]],
+) -> None:
+    """Run the trains of some strands and close their joints.
+
+    Parameters
+    ----------
+    table : Table
+        Where the results go.
+    strands : sequence of Strand
+        Those of one or several directions.
+    start : tuple
+        State with which a strand begins.
+    run : callable
+        Runs some rows from states and puts what it finds into the table.
+    trial : callable
+        Runs some rows from states and returns what it finds: columns, periods, distances.
+    """
+    for k in range(max(len(strand.rows) for strand in strands)):
+        long = [strand.rows for strand in strands if k < len(strand.rows)]
+        begun = [
+            _from(table, rows[k - 1], rows[k]) if k else usable(table.regimes[rows[k]], start)
+            for rows in long
+        ]
+        run([rows[k] for rows in long], np.array(begun))
+    open_ = {(number, 0) for number, strand in enumerate(strands) if strand.before is not None}
+    while open_:
+        # Every open joint is taken one train further, all of them side by side.
+        order = sorted(open_)
+        rows = [strands[number].rows[place] for number, place in order]
+        last = [_row_before(strands, number, place) for number, place in order]
+        states = [_from(table, one, row) for one, row in zip(last, rows, strict=True)]
+        columns, cycles, distances = trial(rows, np.array(states))
+        table.carried += len(rows)
+        open_ = set()
+        for i, ((number, place), row) in enumerate(zip(order, rows, strict=True)):
+            if same_attractor(table, row, columns, i, int(cycles[i])):
+                continue
+            put(table.columns, [row], one_of(columns, i))
+            table.cycles[row], table.distances[row] = cycles[i], distances[i]
+            if place + 1 < len(strands[number].rows):
+                open_.add((number, place + 1))
+            else:
+                open_ |= {(n, 0) for n, other in enumerate(strands) if other.before == number}
+
+
+def one_of(columns: Columns, place: int) -> Columns:
+    """Return one of several columns."""
+    part = slice(place, place + 1)
+    names = ("x", "v", "branch", "memory", "status", "last")
+    return type(columns)(**{name: getattr(columns, name)[part] for name in names})
+
+
+def _row_before(strands: Sequence[Strand], number: int, place: int) -> int:
+    strand = strands[number]
+    if place:
+        return strand.rows[place - 1]
+    assert strand.before is not None
+    return strands[strand.before].rows[-1]
+
+
+def _from(table: Table, before: int, row: int) -> State:
+    x, v, branch, memory = table.columns.last[before].tolist()
+    return usable(table.regimes[row], (x, v, branch, memory))
+
+
+def same_attractor(table: Table, row: int, columns: Columns, place: int, cycle: int) -> bool:
+    """Tell whether a train that was run again came to the attractor on which it was before.
+
+    Periodic trains did if their orbits agree within `SAME`. Of trains without a period it is asked that the
+    means of their points differ by less than half of their standard deviations; trains whose run ended early
+    must have ended the same way.
+    """
+    was = table.columns
+    if columns.status[place] != OK or was.status[row] != OK:
+        return bool(columns.status[place] == was.status[row])
+    if cycle != table.cycles[row]:
+        return False
+    one, other = (
+        np.column_stack([found.x[at], found.v[at]]) / table.scales[row, :2]
+        for found, at in ((columns, place), (was, row))
+    )
+    if cycle:
+        return orbit_distance(one[-cycle:], other[-cycle:]) <= SAME
+    spread = np.maximum(one.std(axis=0), other.std(axis=0))
+    return bool((np.abs(one.mean(axis=0) - other.mean(axis=0)) <= _SHIFTED * spread).all())

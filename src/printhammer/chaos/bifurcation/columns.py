@@ -1,0 +1,338 @@
+"""Columns of a bifurcation diagram: the states of many trains at successive firings, and their periods."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.chaos.strobe.train import HELD_BRANCHES
+from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.run.ensemble import MODE_NAMES, Ensemble
+from printhammer.run.start import check_branch, initial_state
+from printhammer.run.window import window_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+State = tuple[float, float, float, float]
+"""Displacement, m, velocity, m/s, branch of the pack or -1, and memory of the pack, m."""
+
+FROM_REST: Final[State] = (math.nan, math.nan, -1.0, 0.0)
+"""Row of a state that stands for a train that begins at rest, with nothing fired before."""
+
+TOLERANCE: Final = 1e-9
+"""Tolerance of diagrams and basins unless told otherwise: noise far below what a period is judged by.
+
+With `DISPLAY_TOLERANCE` of `printhammer.run.ensemble` weakly stable orbits never settle to within 1e-6 of the
+window.
+"""
+
+OK: Final = "ok"
+NOT_RUN: Final = "not run"
+_STATUS: Final = "U16"
+
+MOST_STATES: Final = 1 << 19
+"""States that are integrated in one piece; with it memory is bounded."""
+
+_PACK_BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
+_PACK_RELEASED: Final = MODE_NAMES.index("pack released")
+
+
+@dataclass(frozen=True)
+class Columns:
+    """States of many trains at successive sections.
+
+    Attributes
+    ----------
+    x, v : array, shape (M, P)
+        Displacement, m, and velocity, m/s; NaN where a run did not get.
+    branch : int8 array, shape (M, P)
+        Code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where a run did not get.
+    memory : array, shape (M, P)
+        Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0.
+    status : str array, shape (M,)
+        How the runs ended; `NOT_RUN` before.
+    last : array, shape (M, 4)
+        Displacement, velocity, branch of the pack or -1, and memory at the firing after all that are asked
+        for, where the next train can go on; `FROM_REST` where it cannot.
+    """
+
+    x: FloatArray
+    v: FloatArray
+    branch: npt.NDArray[np.int8]
+    memory: FloatArray
+    status: npt.NDArray[np.str_]
+    last: FloatArray
+
+    def __len__(self) -> int:
+        """Return the number of trains."""
+        return len(self.x)
+
+
+def blank_columns(count: int, points: int) -> Columns:
+    """Return columns of trains that have not been run."""
+    return Columns(
+        x=np.full((count, points), np.nan),
+        v=np.full((count, points), np.nan),
+        branch=np.full((count, points), -1, np.int8),
+        memory=np.full((count, points), np.nan),
+        status=np.full(count, NOT_RUN, _STATUS),
+        last=np.tile(np.array(FROM_REST), (count, 1)),
+    )
+
+
+def put(columns: Columns, rows: Sequence[int] | npt.NDArray[np.int64], found: Columns) -> None:
+    """Write some columns into rows of others."""
+    where = np.asarray(rows, dtype=np.int64)
+    for name in ("x", "v", "branch", "memory", "status", "last"):
+        getattr(columns, name)[where] = getattr(found, name)
+
+
+def run_columns(
+    regimes: Sequence[Regime],
+    states: FloatArray,
+    firings: int,
+    transient: int,
+    phase: float,
+    tolerance: float,
+    *,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Columns:
+    """Fire many trains and keep their states at the last firings.
+
+    Parameters
+    ----------
+    regimes : sequence of Regime
+        Hammers and periodic drives, one for each train.
+    states : array, shape (M, 4)
+        Displacement, velocity, branch of the pack (negative: as follows from the state) and memory at the
+        first firing, with the pulses before it under way; a row of NaN is a train from rest with nothing
+        fired before (`FROM_REST`).
+    firings, transient : int
+        Number of firings, and of those at the beginning that are left out.
+    phase : float
+        Part of the period between a firing and its state.
+    tolerance, threads, progress
+        As for `printhammer.Ensemble`.
+
+    Returns
+    -------
+    Columns
+        Of `firings` - `transient` points each.
+    """
+    points = firings - transient
+    found = blank_columns(len(regimes), points)
+    at_rest = np.isnan(states[:, 0])
+    in_pack = ~at_rest & (states[:, 2] >= 0.0)
+    piece = max(1, MOST_STATES // (points + 1))
+    done = 0
+    for kind in (at_rest, in_pack, ~at_rest & ~in_pack):
+        rows = np.flatnonzero(kind)
+        for first in range(0, len(rows), piece):
+            some = rows[first : first + piece]
+            begin = done
+
+            def tell(part: int, _all: int, begin: int = begin) -> None:
+                if progress is not None:
+                    progress(begin + part, len(regimes))
+
+            part = _run(
+                [regimes[row] for row in some],
+                states[some],
+                (firings, transient, phase, tolerance),
+                threads,
+                tell,
+            )
+            put(found, some, part)
+            done += len(some)
+    return found
+
+
+def _run(
+    regimes: Sequence[Regime],
+    states: FloatArray,
+    counts: tuple[int, int, float, float],
+    threads: int | None,
+    progress: Progress,
+) -> Columns:
+    """Run trains that begin alike: all from rest, all inside the pack, or all elsewhere."""
+    firings, transient, phase, tolerance = counts
+    rest = bool(np.isnan(states[0, 0]))
+    # Cells of a basin share one regime, columns of a diagram have one each.
+    known = {id(regime): regime for regime in regimes}
+    made = {key: _train(regime, firings, rest) for key, regime in known.items()}
+    trains = [made[id(regime)] for regime in regimes]
+    moments = [
+        np.append(times[transient:-1] + phase * regime.period, times[-1])
+        for regime, (_drive, times) in zip(regimes, trains, strict=True)
+    ]
+    width = 4 if states[0, 2] >= 0.0 else 2
+    ensemble = Ensemble(
+        [regime.hammer for regime in regimes],
+        [drive for drive, _times in trains],
+        # One more period, so that no state depends on where the run ends.
+        [float(times[-1]) + regime.period for regime, (_drive, times) in zip(regimes, trains, strict=True)],
+        states=None if rest else states[:, :width],
+        starts=[float(times[0]) for _drive, times in trains],
+        tolerance=tolerance,
+    )
+    result = ensemble.run(strobes=moments, threads=threads, progress=progress)
+    table = result.strobes
+    assert table is not None
+    reached = np.isfinite(table.x[:, -1])
+    status = np.where(reached, OK, np.array(result.status_names)).astype(_STATUS)
+    last = [
+        handed_on(regime.hammer, x, v, int(branch), memory) if ok else FROM_REST
+        for regime, x, v, branch, memory, ok in zip(
+            regimes,
+            table.x[:, -1].tolist(),
+            table.v[:, -1].tolist(),
+            table.branch[:, -1],
+            table.memory[:, -1].tolist(),
+            reached,
+            strict=True,
+        )
+    ]
+    return Columns(
+        table.x[:, :-1],
+        table.v[:, :-1],
+        table.branch[:, :-1].astype(np.int8),
+        table.memory[:, :-1],
+        status,
+        np.array(last),
+    )
+
+
+def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
+    """Return a drive, and the times of its firings from the first to the one after all that are asked for."""
+    if rest and regime.drive is None:
+        drive: Drive = PulseTrain(
+            regime.fired, period=regime.period, pulses=firings + 2, overlap=regime.overlap
+        )
+        return drive, drive.times[: firings + 1]
+    drive, _ = regime.train(firings)
+    return drive, regime.moments(drive, firings, 0.0)
+
+
+def handed_on(hammer: Hammer, x: float, v: float, mode: int, memory: float) -> State:
+    """Return the state with which another train goes on; `FROM_REST` where none can."""
+    branch = HELD_BRANCHES.get(mode, mode)
+    if mode == _PACK_RELEASED:
+        return FROM_REST
+    rigid = hammer.backstop is not None and hammer.backstop.law == "rigid"
+    if rigid and hammer.position is not None:
+        x = max(x, hammer.position)
+    if branch not in _PACK_BRANCHES:
+        return x, v, -1.0, 0.0
+    return x, v, float(branch), memory
+
+
+def usable(regime: Regime, state: State) -> State:
+    """Return a state that was handed on, or `FROM_REST` where this hammer cannot begin with it."""
+    if math.isnan(state[0]):
+        return FROM_REST
+    try:
+        initial_state(regime.hammer, state[:2])
+        if state[2] >= 0.0:
+            check_branch(regime.hammer, state)
+    except InputError:
+        return FROM_REST
+    return state
+
+
+def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
+    """Return by what differences of displacement, velocity and memory are divided, shape (M, 3).
+
+    The half-widths of the window of each train, see `printhammer.run.window`.
+    """
+    known: dict[tuple[int, float], tuple[float, float, float]] = {}
+    rows = []
+    for regime in regimes:
+        drive = regime.train(1)[0] if regime.hammer.front is None or regime.hammer.position is None else None
+        key = (id(regime.hammer), 0.0 if drive is None else regime.period)
+        if key not in known or regime.drive is not None:
+            found = window_of(regime.hammer, drive if drive is not None else regime.train(1)[0])
+            way, speed = found.half_widths.tolist()
+            known[key] = (way, speed, way)
+        rows.append(known[key])
+    return np.array(rows)
+
+
+def cycles_of(
+    columns: Columns, fronts: FloatArray, scales: FloatArray
+) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Return the periods of trains, in firings, by the rule of `printhammer.chaos.strobe.verdict`.
+
+    Parameters
+    ----------
+    columns : Columns
+        The states.
+    fronts : array, shape (M,)
+        Front of the pack of each hammer, m; infinity where there is none.
+    scales : array, shape (M, 3)
+        From `scales_of_columns`.
+
+    Returns
+    -------
+    cycles : int array, shape (M,)
+        Smallest q, at most 64 and half of the points, whose states q firings apart agree; 0 where there is
+        none.
+    distances : array, shape (M,)
+        How far these are from each other at most, in half-widths of the window; NaN where there is no q.
+    """
+    branch = pack_branches(columns, fronts)
+    states = np.stack([columns.x, columns.v, columns.memory], axis=2) / scales[:, np.newaxis]
+    cycles = np.zeros(len(states), np.int64)
+    distances = np.full(len(states), np.nan)
+    left = np.flatnonzero(np.isfinite(states).all(axis=(1, 2)))
+    for q in range(1, min(LARGEST_PERIOD, states.shape[1] // 2) + 1):
+        # States that all agree agree at the end too, which is soon seen.
+        near = left[(np.abs(states[left, -1] - states[left, -1 - q]) <= AGREEMENT).all(axis=1)]
+        if not near.size:
+            continue
+        apart = np.abs(states[near, q:] - states[near, :-q]).max(axis=(1, 2))
+        agree = (apart <= AGREEMENT) & (branch[near, q:] == branch[near, :-q]).all(axis=1)
+        cycles[near[agree]] = q
+        distances[near[agree]] = apart[agree]
+        left = left[cycles[left] == 0]
+    return cycles, distances
+
+
+def pack_branches(columns: Columns, fronts: FloatArray) -> npt.NDArray[np.int8]:
+    """Return the branches of the pack on which the states lie, 0 outside of it."""
+    branch = np.where(columns.x > fronts[:, np.newaxis], columns.branch, 0).astype(np.int8)
+    for held, part_of in HELD_BRANCHES.items():
+        branch[branch == held] = part_of
+    return branch
+
+
+def orbit_distance(one: FloatArray, other: FloatArray) -> float:
+    """Return how far two periodic orbits of the same period lie apart, whatever their phase.
+
+    Parameters
+    ----------
+    one, other : array, shape (q, 2)
+        Their states in units of the scales, in the order of the firings.
+
+    Returns
+    -------
+    float
+        Largest difference of a component over the orbit, for that shift of firings with which it is least.
+    """
+    count = len(one)
+    shifted = other[(np.arange(count) + np.arange(count)[:, np.newaxis]) % count]
+    return float(np.abs(shifted - one).max(axis=(1, 2)).min())

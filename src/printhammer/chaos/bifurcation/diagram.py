@@ -1,0 +1,341 @@
+"""Bifurcation diagrams by brute force: the states at the firings, against a parameter.
+
+For each value of a parameter a train is fired, the first firings are left out, and the states at the others
+are the column of the diagram above that value: one point for a train that repeats itself at every firing, two
+where it does at every second one, and many for a strange one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
+
+import numpy as np
+
+from printhammer.chaos.bifurcation.builder import DiagramBuilder
+from printhammer.chaos.bifurcation.columns import FROM_REST, TOLERANCE
+from printhammer.chaos.strobe.map import check_phase
+from printhammer.chaos.strobe.verdict import SIGNIFICANT
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+from printhammer.run.problem import check_tolerance
+from printhammer.run.regime import PERIOD, RATE, Regime
+from printhammer.run.start import initial_state
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.chaos.bifurcation.windows import Route, Window
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+FIRINGS: Final = 300
+"""Firings of a train unless told otherwise."""
+
+TRANSIENT: Final = 100
+"""Of these, firings that are left out at the beginning."""
+
+REFINE: Final = 2
+"""Times that the steps between neighbours that differ are halved, unless told otherwise."""
+
+MOST_STATES: Final = 100_000_000
+"""Number of states above which a diagram is refused."""
+
+Direction = Literal["from rest", "up", "down", "both"]
+DIRECTIONS: Final = get_args(Direction)
+
+
+class InterruptedDiagram(KeyboardInterrupt):
+    """A diagram was interrupted.
+
+    Attributes
+    ----------
+    diagram : Bifurcation
+        What is done; the status of the others is "not run".
+    """
+
+    def __init__(self, diagram: Bifurcation) -> None:
+        super().__init__("interrupted")
+        self.diagram = diagram
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """States at the firings against a parameter: D directions, C values, P points each.
+
+    Attributes
+    ----------
+    regime : Regime
+        Hammer and periodic drive; the parameter has other values in each column.
+    parameter : str
+        What is changed, see `printhammer.run.regime.Regime.with_`.
+    values : array, shape (C,)
+        Its values, ascending, SI.
+    directions : tuple of str
+        Of "from rest", "up" and "down": how the state at the start came about.
+    firing : int array, shape (P,)
+        Numbers of the firings of the points; the first of a train is number 1.
+    phase : float
+        Part of the period between a firing and its point.
+    x, v : array, shape (D, C, P)
+        Displacement, m, and velocity, m/s; NaN where a run did not get.
+    branch : int8 array, shape (D, C, P)
+        Code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where a run did not get.
+    status : str array, shape (D, C)
+        How the runs ended.
+    cycles : int array, shape (D, C)
+        Smallest number of firings, up to 64, after which the states repeat; 0 where there is none.
+    distances : array, shape (D, C)
+        Largest distance of states so many firings apart, in half-widths of the window; NaN where there is no
+        such number.
+    exponents, standard_errors : array, shape (D, C)
+        Largest exponent of the strobe map, per firing, of trains without a period; NaN where it was not
+        computed.
+    levels : int array, shape (C,)
+        0 for the values that were given, k for those put between them at the k-th refinement.
+    carried : int
+        Number of trains that were run again to close the joints of strands.
+    tolerance : float
+        Of the integration.
+    """
+
+    regime: Regime
+    parameter: str
+    values: FloatArray = field(repr=False)
+    directions: tuple[str, ...]
+    firing: npt.NDArray[np.int64] = field(repr=False)
+    phase: float
+    x: FloatArray = field(repr=False)
+    v: FloatArray = field(repr=False)
+    branch: npt.NDArray[np.int8] = field(repr=False)
+    status: npt.NDArray[np.str_] = field(repr=False)
+    cycles: npt.NDArray[np.int64] = field(repr=False)
+    distances: FloatArray = field(repr=False)
+    exponents: FloatArray = field(repr=False)
+    standard_errors: FloatArray = field(repr=False)
+    levels: npt.NDArray[np.int64] = field(repr=False)
+    carried: int
+    tolerance: float
+
+    @property
+    def verdicts(self) -> npt.NDArray[np.str_]:
+        """Verdicts, shape (D, C): "period-q", "strange" or "undecided": `printhammer.chaos.strobe.verdict`.
+
+        Undecided are trains without a period whose exponent was not computed, or is not positive by three
+        standard errors, and those whose run ended early.
+        """
+        names = np.full(self.cycles.shape, "undecided", "U16")
+        for q in np.unique(self.cycles[self.cycles > 0]).tolist():
+            names[self.cycles == q] = f"period-{q}"
+        names[(self.cycles == 0) & (self.exponents > SIGNIFICANT * self.standard_errors)] = "strange"
+        return names
+
+    def windows(self, direction: str | None = None) -> list[Window]:
+        """Return the intervals of the parameter with one verdict, of one direction."""
+        from printhammer.chaos.bifurcation.windows import windows_of
+
+        return windows_of(self, direction)
+
+    def routes(self, direction: str | None = None) -> tuple[Route, Route]:
+        """Return what comes before the first strange train, with the parameter rising and falling."""
+        from printhammer.chaos.bifurcation.windows import routes_of
+
+        return routes_of(self, direction)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the diagram as a Dataset over `direction`, `column` and `firing`."""
+        from printhammer.chaos.bifurcation.tables import bifurcation_dataset
+
+        return bifurcation_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the diagram; returns a matplotlib figure, see `printhammer.figures.chaos.bifurcation`."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.bifurcation").plot(self, **options)
+
+
+def bifurcation(
+    hammer: Hammer,
+    *,
+    periods: npt.ArrayLike | None = None,
+    rates: npt.ArrayLike | None = None,
+    parameter: str | None = None,
+    values: npt.ArrayLike | None = None,
+    period: float | str | None = None,
+    rate: float | str | None = None,
+    waveform: Waveform | None = None,
+    drive: Drive | None = None,
+    overlap: Overlap = "add",
+    firings: SupportsIndex = FIRINGS,
+    transient: SupportsIndex = TRANSIENT,
+    phase: float = 0.0,
+    direction: Direction = "from rest",
+    state: tuple[float, float] | None = None,
+    refine: SupportsIndex = REFINE,
+    exponents: bool = False,
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Bifurcation:
+    """Compute a bifurcation diagram of a hammer under a periodic drive.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    periods, rates : array, optional
+        Times between firings, s, or firings per second, Hz, ascending.
+    parameter, values : str and array, optional
+        Instead: the name of any constant, such as "backstop.damping" or "waveform.amplitude", and its
+        values, SI, ascending; see `printhammer.run.regime.Regime.with_`.
+    period, rate : float or str, optional
+        With a parameter: the time between firings, s, or its inverse, Hz.
+    waveform, drive, overlap
+        As for `printhammer.strobe`; a drive is an endless force.
+    firings, transient : int, optional
+        Firings at each value, and how many of these are left out at the beginning.
+    phase : float, optional
+        Part of the period between a firing and its point, from 0 up to but not including 1.
+    direction : str, optional
+        "from rest": every train begins at rest, with nothing fired before. "up", "down": it begins where the
+        train at the value before, or after, ended, with the pulses before under way; the first begins at
+        rest. "both": up and down. See `printhammer.chaos.bifurcation.carry`.
+    state : tuple of float, optional
+        Displacement, m, and velocity, m/s, that takes the place of rest, with the pulses before under way.
+    refine : int, optional
+        How often the step between neighbours whose periods differ, or whose orbits lie apart, is halved.
+    exponents : bool, optional
+        Compute the exponents of trains without a period, which tell strange ones from undecided ones; takes
+        many times as long.
+    tolerance : float, optional
+        As for `printhammer.simulate`; with one for pictures, trains that settle slowly pass for undecided.
+    threads : int, optional
+        By default as many as there are cores; the diagram does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of trains done and of all that are known of so far.
+
+    Returns
+    -------
+    Bifurcation
+        With a status for each train; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; a value that the parameter cannot have; a hammer without
+        a rest state where no state is given.
+    InterruptedDiagram
+        A KeyboardInterrupt, with what was done.
+    """
+    name, grid, regime = _parameter(
+        hammer,
+        (periods, rates, parameter, values),
+        (period, rate),
+        {"waveform": waveform, "drive": drive, "overlap": overlap},
+    )
+    count, skipped = read_count(firings, "firings"), _whole(transient, "transient")
+    if count - skipped < 2:
+        raise InputError(f"transient = {transient!r}, expected at least 2 fewer than the {count} firings")
+    if direction not in DIRECTIONS:
+        raise InputError(f"direction = {direction!r}, expected one of {', '.join(DIRECTIONS)}")
+    part, halvings = check_phase(phase), _whole(refine, "refine")
+    check_tolerance(tolerance)
+    ways = ("up", "down") if direction == "both" else (direction,)
+    if len(grid) * len(ways) * (count - skipped) > MOST_STATES:
+        raise InputError(f"{len(grid)} values, expected at most {MOST_STATES} states in a diagram")
+    begin = FROM_REST
+    if state is not None:
+        begin = (*initial_state(hammer, state), -1.0, 0.0)
+    work = DiagramBuilder(regime, name, ways, (count, skipped, part, tolerance), begin, threads, progress)
+    try:
+        work.base(grid)
+        for level in range(1, halvings + 1):
+            work.refine(level)
+        if exponents:
+            work.measure()
+    except KeyboardInterrupt:
+        raise InterruptedDiagram(_result(work)) from None
+    return _result(work)
+
+
+def _result(work: DiagramBuilder) -> Bifurcation:
+    """Return the diagram as far as it is."""
+    order = np.argsort(work.values, kind="stable")
+    rows = (len(work.ways) * order + np.arange(len(work.ways))[:, np.newaxis]).astype(np.int64)
+    table = work.table
+    firings, transient, phase, tolerance = work.counts
+    return Bifurcation(
+        regime=work.regime,
+        parameter=work.name,
+        values=work.values[order],
+        directions=work.ways,
+        firing=np.arange(transient + 1, firings + 1),
+        phase=phase,
+        x=table.columns.x[rows],
+        v=table.columns.v[rows],
+        branch=table.columns.branch[rows],
+        status=table.columns.status[rows],
+        cycles=table.cycles[rows],
+        distances=table.distances[rows],
+        exponents=work.exponents[rows],
+        standard_errors=work.errors[rows],
+        levels=work.levels[order],
+        carried=table.carried,
+        tolerance=tolerance,
+    )
+
+
+def _parameter(
+    hammer: Hammer,
+    given: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
+    timing: tuple[float | str | None, float | str | None],
+    options: dict[str, Any],
+) -> tuple[str, FloatArray, Regime]:
+    """Return the name of the parameter, its values, and the regime in which it is changed."""
+    periods, rates, parameter, values = given
+    if sum(entry is not None for entry in (periods, rates, parameter)) != 1:
+        raise InputError("periods, rates and parameter: expected one of them")
+    if (parameter is None) != (values is None):
+        raise InputError("parameter and values: expected both of them, or neither")
+    name = parameter or (PERIOD if periods is not None else RATE)
+    grid = _ascending(values if values is not None else periods if periods is not None else rates, name)
+    timed = name in (PERIOD, RATE)
+    if timed and timing != (None, None):
+        raise InputError(f"period and rate: expected none of them beside the values of {name!r}")
+    if timed and options["drive"] is None:
+        options = {**options, name: float(grid[0])}
+    else:
+        options = {**options, "period": timing[0], "rate": timing[1]}
+    regime = Regime.of(hammer, **options)
+    regime.value(name)
+    return name, grid, regime
+
+
+def _ascending(values: npt.ArrayLike | None, name: str) -> FloatArray:
+    try:
+        found = np.atleast_1d(np.array(values, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected numbers in SI") from None
+    if found.ndim != 1 or found.size == 0 or not np.isfinite(found).all():
+        raise InputError(f"{name}: expected a list of at least one finite number in SI")
+    falling = np.flatnonzero(np.diff(found) <= 0.0)
+    if falling.size:
+        before, after = found[falling[0] : falling[0] + 2].tolist()
+        raise InputError(f"{name}: {after:.9g} follows {before:.9g}, expected ascending values")
+    return found
+
+
+def _whole(value: SupportsIndex, name: str) -> int:
+    try:
+        count = -1 if isinstance(value, bool) else value.__index__()
+    except AttributeError:
+        count = -1
+    if count < 0:
+        raise InputError(f"{name} = {value!r}, expected a whole number, not negative")
+    return count

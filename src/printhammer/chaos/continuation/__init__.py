@@ -1,0 +1,1 @@
+"""Continuation: periodic orbits followed along a constant, with their bifurcations."""

@@ -1,0 +1,343 @@
+"""Curves of fixed points of a map with a parameter, by pseudo-arclength continuation.
+
+A fixed point G(u, p) = u of a map of the plane, or of any number of variables, lies on a curve in the space
+of state and parameter z = (u, p). The curve is followed by predictor and corrector: a step ds along the
+tangent, then Newton's method on
+
+    G(u, p) - u = 0,   t . z = t . z_0 + ds
+
+with the tangent t at z_0 as last row (H. B. Keller, in P. H. Rabinowitz (ed.), *Applications of Bifurcation
+Theory*, Academic Press 1977, 359; E. L. Allgower and K. Georg, *Introduction to Numerical Continuation
+Methods*, SIAM 2003). The system is regular at folds, where the parameter turns back. Lengths are measured in
+scaled variables, u and p each divided by a scale of its own.
+
+What happens on the way, folds, period doublings and the like, is the business of
+`printhammer.chaos.continuation.branch_points`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from printhammer.chaos.continuation.fixed_points import Follower, MapFamily, MapValue, Node, between
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.support.arrays import FloatArray
+
+__all__ = [
+    "Curve",
+    "Follower",
+    "MapFamily",
+    "MapValue",
+    "Node",
+    "Steps",
+    "Stop",
+    "Watch",
+    "between",
+    "follow",
+]
+
+_GROWTH: Final = 1.5
+_LEAST_COSINE: Final = 0.97
+"""Of the angle between successive tangents, below which a step is taken again with half its length."""
+_FARTHEST: Final = 0.4
+"""Distance of a corrected point from its prediction, in steps, beyond which it may lie on another curve."""
+_SAME: Final = 1e-6
+"""Scaled distance below which two points are one."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Where a curve ends, and why.
+
+    Attributes
+    ----------
+    reason : str
+        "bound"; "closed"; "no value": the map has none beyond; "lost": Newton's method does not converge
+        beyond; "length": the number of steps is used up; "not asked"; or what the caller's watch says.
+    parameter : float
+        Where.
+    state : array
+        Where.
+    sentence : str
+        The same in words.
+    node : Node or None
+        Where the caller's watch stops between two nodes: the last node of the curve.
+    """
+
+    reason: str
+    parameter: float
+    state: FloatArray
+    sentence: str
+    node: Node | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve of fixed points.
+
+    Attributes
+    ----------
+    nodes : list of Node
+        In order along the curve; `arc` increases.
+    stops : tuple of Stop
+        What ended it before the first and after the last.
+    """
+
+    nodes: list[Node]
+    stops: tuple[Stop, Stop]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the curve returns to its start; its first and last nodes are then the same point."""
+        return self.stops[1].reason == "closed"
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How a curve is followed; lengths in scaled variables.
+
+    Attributes
+    ----------
+    first, smallest, largest : float
+        Lengths of the steps.
+    most : int
+        Number of steps in either direction.
+    precision : float
+        Scaled correction of Newton's method below which a point is on the curve.
+    """
+
+    first: float = 0.02
+    smallest: float = 1e-7
+    largest: float = 0.1
+    most: int = 1000
+    precision: float = 1e-11
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.smallest <= self.first <= self.largest < math.inf:
+            raise InputError(
+                f"steps of {self.smallest:g}, {self.first:g} and {self.largest:g},"
+                " expected the smallest, the first and the largest, ascending"
+            )
+        if self.most < 1:
+            raise InputError(f"most = {self.most}, expected a number of steps from 1 on")
+
+
+Watch = Callable[[Node, Node], Stop | None]
+"""Called with each node and the next; a `Stop` ends the curve there."""
+
+
+def follow(
+    family: MapFamily,
+    state: npt.ArrayLike,
+    parameter: float,
+    *,
+    scales: npt.ArrayLike,
+    bounds: tuple[float, float],
+    steps: Steps | None = None,
+    directions: Literal["both", "up", "down"] = "both",
+    row: npt.ArrayLike | None = None,
+    watch: Watch | None = None,
+) -> Curve:
+    """Follow the curve of fixed points through a point.
+
+    Parameters
+    ----------
+    family : callable
+        The map.
+    state : array, shape (n,)
+        Near a fixed point.
+    parameter : float
+        Its parameter, which is kept for the first point.
+    scales : array, shape (n + 1,)
+        By which the components of the state, and last the parameter, are divided.
+    bounds : tuple of float
+        Least and largest parameter; the curve ends there.
+    steps : Steps, optional
+        Lengths and number of steps.
+    directions : str, optional
+        From the first point, "up", toward larger parameters at first, "down", or "both".
+    row : array, shape (n + 1,), optional
+        Scaled direction in which the curve leaves the first point upward, where that is known: that of a
+        branch that begins there. The component of the first point along it is kept instead of the parameter.
+    watch : callable, optional
+        Called with each node and the next, in the direction of travel; may end the curve.
+
+    Returns
+    -------
+    Curve
+        From its lower to its upper end; both ends have a reason and a place.
+
+    Raises
+    ------
+    InputError
+        The parameter is out of bounds, or there is no fixed point near the first point.
+    """
+    chosen = Steps() if steps is None else steps
+    low, high = (float(bound) for bound in bounds)
+    if not (math.isfinite(low) and math.isfinite(high) and low <= parameter <= high and low < high):
+        raise InputError(f"parameter = {parameter:g}, expected one within the bounds {low:g} to {high:g}")
+    follower = Follower(family, scales, chosen.precision)
+    z = follower.scaled(state, parameter)
+    given = None if row is None else np.asarray(row, dtype=np.float64)
+    start = follower.onto(z) if given is None else follower.correct(z, given)
+    if start is None:
+        why = f": {follower.trouble}" if follower.trouble else ""
+        raise InputError(f"there is no fixed point near the parameter {parameter:.9g}{why}")
+    upward = start.tangent if given is not None or start.tangent[-1] >= 0.0 else -start.tangent
+    halves: list[tuple[list[Node], Stop]] = []
+    for sign in (-1.0, 1.0):
+        if directions != "both" and (directions == "up") != (sign > 0.0):
+            told = f"the curve was not followed beyond the parameter {start.parameter:.9g}"
+            halves.append(([], Stop("not asked", start.parameter, start.state, told)))
+            continue
+        begin = _turned(start, sign * upward)
+        nodes, stop = _half(follower, begin, (low, high), chosen, watch)
+        halves.append((nodes, stop))
+        if stop.reason == "closed":
+            if sign < 0.0:
+                # The way back round is the same curve.
+                whole = _reversed([begin, *nodes])
+                return Curve(whole, (stop, stop))
+            return Curve([begin, *nodes], (stop, stop))
+    (before, first), (after, last) = halves
+    middle = _turned(start, upward)
+    return Curve([*_reversed(before), middle, *after], (first, last))
+
+
+def _turned(node: Node, tangent: FloatArray, arc: float = 0.0) -> Node:
+    return Node(node.state, node.parameter, tangent, arc, node.value, node.residual)
+
+
+def _reversed(nodes: list[Node]) -> list[Node]:
+    return [_turned(node, -node.tangent, -node.arc) for node in reversed(nodes)]
+
+
+def _half(
+    follower: Follower, start: Node, bounds: tuple[float, float], steps: Steps, watch: Watch | None
+) -> tuple[list[Node], Stop]:
+    """Follow a curve along the tangent of its start; nodes after it."""
+    nodes: list[Node] = []
+    here, length = start, steps.first
+    home = follower.scaled(start.state, start.parameter)
+    outside = _beyond(start, bounds)
+    if outside is not None:
+        return nodes, _bound_stop(start, outside)
+    while len(nodes) < steps.most:
+        z = follower.scaled(here.state, here.parameter)
+        ahead = follower.correct(z + length * here.tangent, here.tangent, arc=here.arc + length)
+        trouble = follower.trouble
+        if ahead is None or not _joined(follower, here, ahead, length):
+            length *= 0.5
+            if length < steps.smallest:
+                return nodes, _lost(here, trouble)
+            continue
+        moved = float(np.linalg.norm(follower.scaled(ahead.state, ahead.parameter) - z))
+        ahead = _turned(ahead, ahead.tangent, here.arc + moved)
+        reached = _beyond_between(here, ahead, bounds)
+        if reached is not None:
+            end = _at_parameter(follower, here, ahead, reached)
+            if end is None:
+                length *= 0.5
+                if length < steps.smallest:
+                    return nodes, _lost(here, trouble)
+                continue
+            stop = watch(here, end) if watch is not None else None
+            nodes.append(end if stop is None or stop.node is None else stop.node)
+            return nodes, stop or _bound_stop(end, reached)
+        if len(nodes) > 2 and _passes(follower, here, ahead, home, start):
+            end = _turned(start, start.tangent, here.arc + float(np.linalg.norm(home - z)))
+            nodes.append(end)
+            told = f"the curve closes upon itself at the parameter {start.parameter:.9g}"
+            return nodes, Stop("closed", start.parameter, start.state, told)
+        stop = watch(here, ahead) if watch is not None else None
+        if stop is not None:
+            nodes.append(ahead if stop.node is None else stop.node)
+            return nodes, stop
+        nodes.append(ahead)
+        if float(here.tangent @ ahead.tangent) > 0.5 * (1.0 + _LEAST_COSINE):
+            length = min(length * _GROWTH, steps.largest)
+        here = ahead
+    told = f"{steps.most} steps were taken, and the curve goes on at the parameter {here.parameter:.9g}"
+    return nodes, Stop("length", here.parameter, here.state, told)
+
+
+def _joined(follower: Follower, here: Node, ahead: Node, length: float) -> bool:
+    """Return whether a corrected point lies on the same curve, as far as its distance and tangent tell."""
+    z = follower.scaled(ahead.state, ahead.parameter)
+    predicted = follower.scaled(here.state, here.parameter) + length * here.tangent
+    near = float(np.linalg.norm(z - predicted)) <= _FARTHEST * length
+    return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE
+
+
+def _lost(node: Node, trouble: str) -> Stop:
+    if trouble:
+        told = f"the map has no value beyond the parameter {node.parameter:.9g}: {trouble}"
+        return Stop("no value", node.parameter, node.state, told)
+    told = (
+        f"the curve was lost at the parameter {node.parameter:.9g}: Newton's method does not converge beyond"
+    )
+    return Stop("lost", node.parameter, node.state, told)
+
+
+def _beyond(node: Node, bounds: tuple[float, float]) -> float | None:
+    """Return the bound on which a node lies if its tangent leads out."""
+    if node.parameter <= bounds[0] and node.tangent[-1] < 0.0:
+        return bounds[0]
+    if node.parameter >= bounds[1] and node.tangent[-1] > 0.0:
+        return bounds[1]
+    return None
+
+
+def _beyond_between(here: Node, ahead: Node, bounds: tuple[float, float]) -> float | None:
+    if ahead.parameter < bounds[0] <= here.parameter:
+        return bounds[0]
+    if ahead.parameter > bounds[1] >= here.parameter:
+        return bounds[1]
+    return None
+
+
+def _bound_stop(node: Node, bound: float) -> Stop:
+    return Stop("bound", bound, node.state, f"the bound {bound:.9g} of the parameter is reached")
+
+
+def _at_parameter(follower: Follower, here: Node, ahead: Node, parameter: float) -> Node | None:
+    """Return the point between two nodes at a parameter, its tangent in the direction of travel."""
+    share = (parameter - here.parameter) / (ahead.parameter - here.parameter)
+    one, other = (follower.scaled(node.state, node.parameter) for node in (here, ahead))
+    z = one + share * (other - one)
+    z[-1] = parameter / follower.scales[-1]
+    row = np.zeros(len(z))
+    row[-1] = 1.0
+    found = follower.correct(z, row)
+    if found is None:
+        return None
+    tangent = found.tangent if found.tangent @ ahead.tangent > 0.0 else -found.tangent
+    where = follower.scaled(found.state, parameter)
+    where[-1] = z[-1]
+    exact = Node(found.state, parameter, tangent, here.arc, found.value, found.residual)
+    return _turned(exact, tangent, here.arc + float(np.linalg.norm(where - one)))
+
+
+def _passes(follower: Follower, here: Node, ahead: Node, home: FloatArray, start: Node) -> bool:
+    """Return whether the curve goes through its start between two nodes."""
+    one, other = (follower.scaled(node.state, node.parameter) for node in (here, ahead))
+    along = other - one
+    share = float((home - one) @ along) / float(along @ along)
+    if not 0.0 < share <= 1.0 or float(start.tangent @ ahead.tangent) < 0.5:
+        return False
+    if float(np.linalg.norm(one + share * along - home)) > _FARTHEST * float(np.linalg.norm(along)):
+        return False
+    level = float(start.tangent @ (home - one - share * along))
+    found = follower.correct(one + share * along + level * start.tangent, start.tangent)
+    if found is None:
+        return False
+    return float(np.linalg.norm(follower.scaled(found.state, found.parameter) - home)) < _SAME

@@ -1,0 +1,469 @@
+"""What happens along a curve of fixed points: folds, period doublings, tori, branchings, changes of motion.
+
+Each kind has a test function that changes sign there (W. J. F. Govaerts, *Numerical Methods for Bifurcations
+of Dynamical Equilibria*, SIAM 2000; Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer
+2004, section 10.2). With J = dG/du, its eigenvalues mu_i, the multipliers, and the tangent t of the curve:
+
+| kind | test function |
+|---|---|
+| fold | component of t along the parameter |
+| period doubling | det(J + I): a multiplier is -1 |
+| Neimark-Sacker | product over pairs of mu_i mu_j - 1: a complex pair crosses the unit circle |
+| branching | determinant of the corrector's matrix, the tangent its last row: two curves cross |
+| change | none; the label of the motion differs |
+
+A product mu_i mu_j = 1 of two real multipliers, a neutral saddle, is no bifurcation and is left out. A sign
+that changes twice within one step is not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from printhammer.chaos.continuation.arclength import Follower, MapValue, Stop, between, follow
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable
+
+    import numpy.typing as npt
+
+    from printhammer.chaos.continuation.arclength import Curve, MapFamily, Node, Steps, Watch
+    from printhammer.support.arrays import FloatArray
+
+Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change"]
+
+BIRTH: Final = "period doubling"
+"""Reason of the stop of an orbit of even period where it comes from a doubling."""
+
+_ROUNDS: Final = 60
+_SHARE: Final = 1e-13
+"""Share of a step to which a point is located."""
+_REAL: Final = 1e-9
+_ROUNDING: Final = 1e-8
+"""Imaginary part of a real multiplier, and test function of nothing, but for rounding."""
+_SHARE_OF_CHANGE: Final = 1e-10
+_SMALL_MARGIN: Final = 0.05
+_CLOSE_MARGIN: Final = 1e-7
+"""Share of a step to which a change is bisected; margins from which and to which it is met by them."""
+_NEAR: Final = 1e-4
+"""Shares of a step within which a fold and a branching are one point."""
+_BRACKET: Final = 1e-5
+"""Share of a step within which a branching is not bracketed any closer."""
+_AMPLITUDE: Final = 1e-2
+_HALF_NEAR: Final = 0.05
+"""Scaled distance within which an orbit is close to one of half its period."""
+_HALF_DOUBLES: Final = 0.5
+"""Distance of a multiplier of that one from -1 within which it may be about to double."""
+
+
+@dataclass(frozen=True)
+class BranchPoint:
+    """A point at which something happens to a curve of fixed points.
+
+    Attributes
+    ----------
+    kind : str
+        "fold", "period doubling", "Neimark-Sacker", "branching" or "change".
+    node : Node
+        The fixed point there.
+    after : int
+        Number of the node of the curve that it follows.
+    labels : tuple
+        Labels of the motion before and after it.
+    sharp : bool
+        False where it could not be located to the precision of the curve; it is then between two nodes.
+    sides : tuple of Node or None
+        Of a change: fixed points close before and behind it.
+    """
+
+    kind: Kind
+    node: Node
+    after: int
+    labels: tuple[Hashable, Hashable]
+    sharp: bool = True
+    sides: tuple[Node, Node] | None = None
+
+    @property
+    def parameter(self) -> float:
+        """The parameter there."""
+        return self.node.parameter
+
+
+def doubling_test(jacobian: FloatArray) -> float:
+    """Return det(J + I), zero where a multiplier is -1."""
+    return float(np.linalg.det(jacobian + np.eye(len(jacobian))))
+
+
+def torus_test(jacobian: FloatArray) -> float:
+    """Return the product over pairs of multipliers of mu_i mu_j - 1; 1 for a single one."""
+    found = np.linalg.eigvals(jacobian).astype(np.complex128)
+    i, j = np.triu_indices(len(found), 1)
+    return float(np.prod(found[i] * found[j] - 1.0).real)
+
+
+def fold_test(jacobian: FloatArray) -> float:
+    """Return det(J - I), zero where a multiplier is 1."""
+    return float(np.linalg.det(jacobian - np.eye(len(jacobian))))
+
+
+def points_of(
+    family: MapFamily,
+    curve: Curve,
+    scales: npt.ArrayLike,
+    precision: float,
+    margin: Callable[[Node], float] | None = None,
+) -> list[BranchPoint]:
+    """Return what happens along a curve, in order.
+
+    Parameters
+    ----------
+    family : callable
+        The map.
+    curve : Curve
+        Its fixed points, from `printhammer.chaos.continuation.arclength.follow`.
+    scales, precision
+        Those with which the curve was followed.
+    margin : callable, optional
+        Near a change of the label, passes through 0 where it changes. Changes are then met by interpolation,
+        and the map is not evaluated too close to them.
+
+    Returns
+    -------
+    list of BranchPoint
+        Ordered along the curve.
+    """
+    follower = Follower(family, scales, precision)
+
+    def branching_test(node: Node) -> float:
+        return float(np.linalg.det(np.vstack([follower.derivative(node.value), node.tangent])))
+
+    tests: dict[Kind, Callable[[Node], float]] = {
+        "fold": lambda node: float(node.tangent[-1]),
+        "period doubling": lambda node: doubling_test(node.value.jacobian),
+        "Neimark-Sacker": lambda node: torus_test(node.value.jacobian),
+        "branching": branching_test,
+    }
+    found: list[BranchPoint] = []
+    last = len(curve.nodes) - 2
+    for after, (here, ahead) in enumerate(zip(curve.nodes[:-1], curve.nodes[1:], strict=True)):
+        kinds = [kind for kind, test in tests.items() if _changes_sign(test(here), test(ahead))]
+        # At the period doubling from which an orbit comes its curve turns back; that is no fold.
+        ends = (
+            after == 0 and curve.stops[0].reason == BIRTH,
+            after == last and curve.stops[1].reason == BIRTH,
+        )
+        if any(ends):
+            kinds = [kind for kind in kinds if kind not in ("fold", "branching")]
+        here_found = []
+        for kind in kinds:
+            locate = _branching if kind == "branching" else _crossing
+            share, node = locate(follower, here, ahead, tests[kind])
+            if kind == "Neimark-Sacker" and not _has_pair(node if node is not None else here):
+                continue
+            here_found.append((share, kind, _point(kind, here, ahead, after, share, node)))
+        if {"fold", "branching"} <= set(kinds):
+            places = {kind: share for share, kind, _ in here_found}
+            if abs(places["fold"] - places["branching"]) < _NEAR:
+                here_found = [entry for entry in here_found if entry[1] != "fold"]
+        here_found += _changes(follower, here, ahead, after, margin)
+        found += [point for *_, point in sorted(here_found, key=lambda entry: entry[0])]
+    return found
+
+
+def _changes_sign(before: float, after: float) -> bool:
+    """Return whether a test function changes sign by more than rounding, as where areas are preserved."""
+    return before * after < 0.0 and max(abs(before), abs(after)) > _ROUNDING
+
+
+def _point(kind: Kind, here: Node, ahead: Node, after: int, share: float, node: Node | None) -> BranchPoint:
+    labels = (here.value.label, ahead.value.label)
+    if node is not None:
+        return BranchPoint(kind, node, after, labels)
+    middle = replace(
+        here,
+        state=here.state + share * (ahead.state - here.state),
+        parameter=here.parameter + share * (ahead.parameter - here.parameter),
+        arc=here.arc + share * (ahead.arc - here.arc),
+    )
+    return BranchPoint(kind, middle, after, labels, sharp=False)
+
+
+def _has_pair(node: Node) -> bool:
+    """Return whether a pair of complex multipliers lies close to the unit circle."""
+    found = node.multipliers
+    pair = np.abs(found.imag) > _REAL
+    return bool((pair & (np.abs(np.abs(found) - 1.0) < 1e-3)).any())
+
+
+def _crossing(
+    follower: Follower, here: Node, ahead: Node, test: Callable[[Node], float]
+) -> tuple[float, Node | None]:
+    """Return where between two nodes a test function is zero, as a share of the way, and the node there.
+
+    Bisection and secant (the Illinois rule) by turns; None where no fixed point was found on the way.
+    """
+    low, high = 0.0, 1.0
+    at_low, at_high = test(here), test(ahead)
+    share, node = at_low / (at_low - at_high), None
+    best: tuple[float, Node | None] = (math.inf, None)
+    for turn in range(_ROUNDS):
+        if high - low <= _SHARE:
+            break
+        middle = turn % 3 == 2
+        share = 0.5 * (low + high) if middle else low + (high - low) * at_low / (at_low - at_high)
+        if not low < share < high:
+            break
+        node = between(follower, here, ahead, share)
+        if node is None:
+            return share, None
+        value = test(node)
+        if abs(value) < best[0]:
+            best = (abs(value), node)
+            place = share
+        if value == 0.0:
+            break
+        if (value > 0.0) == (at_low > 0.0):
+            low, at_low = share, value
+            at_high *= 0.5
+        else:
+            high, at_high = share, value
+            at_low *= 0.5
+    return (share, None) if best[1] is None else (place, best[1])
+
+
+def _branching(
+    follower: Follower, here: Node, ahead: Node, test: Callable[[Node], float]
+) -> tuple[float, Node | None]:
+    """Return where two curves cross, as `_crossing`.
+
+    Newton's method fails at the crossing itself: it is bracketed ever closer and met by interpolation.
+    """
+    low, high, one, other = 0.0, 1.0, here, ahead
+    for _ in range(_ROUNDS):
+        share = low + (high - low) * test(one) / (test(one) - test(other))
+        off = 0.1 * (high - low)
+        if off < _BRACKET:
+            break
+        before = between(follower, here, ahead, max(share - off, low))
+        beyond = between(follower, here, ahead, min(share + off, high))
+        if before is None or beyond is None or test(before) * test(beyond) >= 0.0:
+            break
+        low, high, one, other = max(share - off, low), min(share + off, high), before, beyond
+    if one is here:
+        return share, None
+    part = (share - low) / (high - low)
+    state = one.state + part * (other.state - one.state)
+    parameter = one.parameter + part * (other.parameter - one.parameter)
+    return share, replace(one, state=state, parameter=parameter)
+
+
+def _changes(
+    follower: Follower, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
+) -> list[tuple[float, Kind, BranchPoint]]:
+    """Return the places between two nodes at which the label changes."""
+    found: list[tuple[float, Kind, BranchPoint]] = []
+    begin, first = 0.0, here
+    while first.value.label != ahead.value.label and len(found) < _ROUNDS:
+        share, sides, sharp = _change(follower, here, ahead, (begin, first), margin)
+        middle = replace(
+            sides[0],
+            state=0.5 * (sides[0].state + sides[1].state),
+            parameter=0.5 * (sides[0].parameter + sides[1].parameter),
+        )
+        low, high = sides[0].arc, sides[1].arc
+        if sharp and high > low:
+            place = here.arc + share * (ahead.arc - here.arc)
+            part = min(max((place - low) / (high - low), 0.0), 1.0)
+            middle = replace(
+                middle,
+                state=sides[0].state + part * (sides[1].state - sides[0].state),
+                parameter=sides[0].parameter + part * (sides[1].parameter - sides[0].parameter),
+                arc=place,
+            )
+        labels = (first.value.label, sides[1].value.label)
+        found.append((share, "change", BranchPoint("change", middle, after, labels, sharp, sides)))
+        begin, first = (sides[1].arc - here.arc) / (ahead.arc - here.arc), sides[1]
+    return found
+
+
+def _change(
+    follower: Follower,
+    here: Node,
+    ahead: Node,
+    start: tuple[float, Node],
+    margin: Callable[[Node], float] | None,
+) -> tuple[float, tuple[Node, Node], bool]:
+    """Return the share of the way at which the label first changes, nodes on both sides, and sharpness."""
+    low, inside = start
+    high, beyond = 1.0, ahead
+    m_low = m_high = math.nan
+    if margin is not None:
+        m_low, m_high = margin(inside), margin(beyond)
+    weights = [1.0, 1.0]
+    for turn in range(_ROUNDS):
+        crossing = m_low * m_high < 0.0 and max(abs(m_low), abs(m_high)) < _SMALL_MARGIN
+        if high - low <= (_SHARE_OF_CHANGE if not crossing else _SHARE):
+            break
+        if crossing and min(abs(m_low), abs(m_high)) < _CLOSE_MARGIN:
+            break
+        by_margin = crossing and turn % 3 != 2
+        a, b = m_low * weights[0], m_high * weights[1]
+        share = low + (high - low) * a / (a - b) if by_margin else 0.5 * (low + high)
+        node = between(follower, here, ahead, share)
+        if node is None:
+            return 0.5 * (low + high), (inside, beyond), False
+        if node.value.label == inside.value.label:
+            low, inside = share, node
+            m_low = margin(node) if margin is not None else math.nan
+            weights = [1.0, 0.5 * weights[1]]
+        else:
+            high, beyond = share, node
+            m_high = margin(node) if margin is not None else math.nan
+            weights = [0.5 * weights[0], 1.0]
+    share = 0.5 * (low + high)
+    if m_low * m_high < 0.0:
+        share = low + (high - low) * m_low / (m_low - m_high)
+    return share, (inside, beyond), True
+
+
+def iterated(family: MapFamily, times: int) -> MapFamily:
+    """Return a map applied so many times, with its derivatives by the chain rule.
+
+    Its labels are the sequences of the labels of the single ones.
+    """
+
+    def repeated(state: FloatArray, parameter: float) -> MapValue:
+        count = len(state)
+        image, jacobian, slope = state, np.eye(count), np.zeros(count)
+        labels: list[Hashable] = []
+        for _ in range(times):
+            value = family(image, parameter)
+            if value.trouble:
+                return MapValue.none(count, value.trouble)
+            image, labels = value.image, [*labels, value.label]
+            jacobian, slope = value.jacobian @ jacobian, value.jacobian @ slope + value.slope
+        return MapValue(image, jacobian, slope, tuple(labels))
+
+    return repeated
+
+
+def follow_doubled(
+    doubled: MapFamily,
+    point: BranchPoint,
+    *,
+    scales: npt.ArrayLike,
+    bounds: tuple[float, float],
+    steps: Steps,
+    amplitude: float = _AMPLITUDE,
+    watch: Watch | None = None,
+) -> Curve:
+    """Follow the orbits of twice the period that are born at a period doubling.
+
+    The first one is sought at a small scaled distance from the doubling point, in the direction of the
+    eigenvector whose multiplier is -1; its parameter is found with it, on whichever side it lies.
+
+    Parameters
+    ----------
+    doubled : callable
+        The map applied twice, such as `iterated(family, 2)`.
+    point : BranchPoint
+        The period doubling of the map itself.
+    scales, bounds, steps, watch
+        As for `printhammer.chaos.continuation.arclength.follow`.
+    amplitude : float, optional
+        The small distance, in scaled variables.
+
+    Returns
+    -------
+    Curve
+        From near the doubling point on.
+
+    Raises
+    ------
+    InputError
+        There is no such orbit near the point.
+    """
+    widths = np.asarray(scales, dtype=np.float64)
+    jacobian = point.node.value.jacobian
+    within = jacobian * widths[:-1] / widths[:-1, np.newaxis]
+    # The last right singular vector of J + I is the eigenvector of the multiplier -1.
+    direction = np.linalg.svd(within + np.eye(len(within)))[2][-1]
+    row = np.append(direction, 0.0)
+    return follow(
+        doubled,
+        point.node.state + amplitude * direction * widths[:-1],
+        point.parameter,
+        scales=widths,
+        bounds=bounds,
+        steps=steps,
+        directions="up",
+        row=row,
+        watch=watch,
+    )
+
+
+def birth_of(half: Follower, here: Node, ahead: Node) -> Stop | None:
+    """Return the period doubling at which an orbit of even period ends, where its curve passes one.
+
+    There the states half a period apart become one, and the curve goes on as its own mirror image, the same
+    orbits half a period later.
+
+    Parameters
+    ----------
+    half : Follower
+        Of the map over half the period.
+    here, ahead : Node
+        Successive nodes of the curve over the whole period.
+
+    Returns
+    -------
+    Stop or None
+        With the doubling on the curve over half the period as the last node; None where there is none.
+    """
+    if here.tangent[-1] * ahead.tangent[-1] >= 0.0:
+        return None
+    share = here.tangent[-1] / (here.tangent[-1] - ahead.tangent[-1])
+    start, end = (half.scaled(node.state, node.parameter) for node in (here, ahead))
+    z = (1.0 - share) * start + share * end
+    row = np.zeros(len(z))
+    row[-1] = 1.0
+    single = half.correct(z, row)
+    if single is None or float(np.linalg.norm(half.scaled(single.state, single.parameter) - z)) > _HALF_NEAR:
+        return None
+    if np.abs(single.multipliers + 1.0).min() > _HALF_DOUBLES:
+        return None
+    node = doubling_near(half, single)
+    if node is None:
+        return None
+    value, twice = node.value, node.value.jacobian @ node.value.jacobian
+    slope = value.jacobian @ value.slope + value.slope
+    whole = MapValue(value.image, twice, slope, here.value.label, extra=value.extra)
+    arc = here.arc + float(np.linalg.norm(half.scaled(node.state, node.parameter) - start))
+    last = replace(node, value=whole, tangent=here.tangent, arc=arc)
+    told = f"the orbit ends at the parameter {node.parameter:.9g}, where one of half its period doubles"
+    return Stop(BIRTH, node.parameter, node.state, told, last)
+
+
+def doubling_near(follower: Follower, node: Node) -> Node | None:
+    """Return the period doubling near a fixed point on its curve, by the secant method; None if not found."""
+    step = 1e-3
+    z = follower.scaled(node.state, node.parameter)
+    before, value = node, doubling_test(node.value.jacobian)
+    offset, at_before = 0.0, value
+    place = step
+    for _ in range(_ROUNDS):
+        here = follower.correct(z + place * node.tangent, node.tangent)
+        if here is None:
+            return None
+        value = doubling_test(here.value.jacobian)
+        if value == at_before or abs(place - offset) < follower.precision:
+            return here if abs(value) <= abs(at_before) else before
+        ahead = place - value * (place - offset) / (value - at_before)
+        before, offset, at_before, place = here, place, value, ahead
+        if abs(place) > 1.0:
+            return None
+    return None

@@ -1,0 +1,164 @@
+"""Continuation: a periodic orbit followed through the values of a constant, stable or not, to where it ends.
+
+A branch is a curve of periodic orbits. Along it the multipliers tell where the orbit loses its stability and
+how; the sequence of contacts tells where one appears or vanishes, a grazing. The contact forces of the
+paper's pack and backstop begin smoothly, with the powers 2.7 and 1.5 of the depth, so that the strobe map has
+a derivative at a grazing and the branch goes on. On a rigid backstop it has none: there a branch ends at its
+first grazing, and the stop says so.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.continuation.arclength import Steps
+from printhammer.chaos.continuation.branch import MOST, Branch
+from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds, unit_of
+from printhammer.chaos.orbits.orbit import Orbit
+from printhammer.chaos.orbits.search import orbits_of
+from printhammer.chaos.strobe.map import MAP_TOLERANCE, check_phase
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+from printhammer.run.problem import check_tolerance
+from printhammer.run.regime import Regime
+
+if TYPE_CHECKING:
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+__all__ = ["Branch", "continuation"]
+
+_SETTLE: Final = 500
+"""Firings after which a train from rest is taken to have settled."""
+
+
+def continuation(
+    start: Hammer | Orbit,
+    parameter: str,
+    bounds: tuple[float | str, float | str],
+    *,
+    period: float | str | None = None,
+    rate: float | str | None = None,
+    firings: SupportsIndex | None = None,
+    state: tuple[float, float] | None = None,
+    phase: float | None = None,
+    waveform: Waveform | None = None,
+    drive: Drive | None = None,
+    overlap: Overlap = "add",
+    most: SupportsIndex = MOST,
+    steps: Steps | None = None,
+    tolerance: float = MAP_TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Branch:
+    """Follow a periodic orbit of a hammer through the values of one constant.
+
+    Parameters
+    ----------
+    start : Hammer or Orbit
+        A periodic orbit from `printhammer.orbits`; or a hammer, whose orbit is that near `state`, or else
+        that to which a train from rest settles, or else the first that a search finds.
+    parameter : str
+        "period", "rate", or the dotted key of a constant of the hammer, such as "backstop.damping", of the
+        waveform or of an endless force, such as "waveform.amplitude" or "drive.amplitude".
+    bounds : tuple
+        Least and largest value, SI or text with a unit.
+    period, rate, waveform, drive, overlap
+        Of a hammer: as for `printhammer.strobe`.
+    firings : int, optional
+        Of a hammer: number of firings after which the orbit repeats; by default that to which the train
+        settles, and 1 where it does not or a state is given.
+    state : tuple of float, optional
+        Of a hammer: displacement, m, and velocity, m/s, at a section, near the orbit.
+    phase : float, optional
+        Part of the period between a firing and the section; by default that of the orbit, or 0. The armature
+        must not be on its way out of the pack there.
+    most : int, optional
+        Number of steps in either direction.
+    steps : Steps, optional
+        Instead: how the curve is followed, in units of half-widths of the strobe window and of a fifth of the
+        range of the constant.
+    tolerance : float, optional
+        Error allowed in one step of the runs.
+    threads : int, optional
+        By default as many as there are cores; the branch does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of steps that are done and the largest that may be.
+
+    Returns
+    -------
+    Branch
+        In both directions from the start to the bounds or to another stop, which is named. Folds are located
+        to about 1e-10 of the range or better, grazings to about 1e-8.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; the start lies out of bounds; there is no orbit to start
+        from.
+    """
+    check_tolerance(tolerance)
+    if isinstance(start, Orbit):
+        if any(given is not None for given in (period, rate, waveform, drive, state, firings)):
+            raise InputError("an orbit is given, expected no period, rate, waveform, drive, firings or state")
+        if not start.ok:
+            raise InputError(f"the orbit to start from is none: {start.status}")
+        regime, point, count = start.regime, np.array(start.section), start.firings
+        part = start.phase
+        if phase is not None and phase != part:
+            raise InputError(f"phase = {phase!r}, expected that of the orbit, {part!r}, or none")
+    else:
+        regime = Regime.of(start, period=period, rate=rate, waveform=waveform, drive=drive, overlap=overlap)
+        part = check_phase(0.0 if phase is None else phase)
+        ends, own = read_bounds(regime, parameter, bounds), regime.value(parameter)
+        if not ends[0] <= own <= ends[1]:
+            raise InputError(
+                f"{parameter} = {own:.9g} {unit_of(regime, parameter)} at the start, expected one within the"
+                f" bounds {ends[0]:.9g} to {ends[1]:.9g}"
+            )
+        given = None if firings is None else read_count(firings, "firings")
+        if state is None:
+            point, count, part = _found(regime, part, given, phase is not None, threads)
+        else:
+            point, count = np.array(state, dtype=np.float64), given or 1
+    work = Tracer(regime, parameter, read_bounds(regime, parameter, bounds), part, tolerance, threads)
+    chosen = steps or Steps(most=read_count(most, "most"), precision=PRECISION)
+    return work.branch(point, count, chosen, progress)
+
+
+def _found(
+    regime: Regime, phase: float, firings: int | None, phase_given: bool, threads: int | None
+) -> tuple[FloatArray, int, float]:
+    """Return a state of the orbit to start from, its number of firings, and the phase of its section."""
+    from printhammer.chaos.strobe.points import strobes
+
+    (seen,) = strobes(
+        regime.hammer,
+        None if regime.drive is not None else [regime.period],
+        points=1,
+        transient=_SETTLE,
+        phase=phase,
+        waveform=regime.waveform,
+        drives=None if regime.drive is None else [regime.drive],
+        overlap=regime.overlap,
+        firings=(_SETTLE // 2, _SETTLE),
+        threads=threads,
+    )
+    judged = None if seen.verdict is None or not seen.ok else seen.verdict.period
+    if judged is not None and firings in (None, judged):
+        return np.array([seen.x[0], seen.v[0]]), judged, phase
+    many = firings or 1
+    search = orbits_of(regime, longest=many, threads=threads)
+    for orbit in search:
+        if orbit.firings == many and (orbit.phase == phase or not phase_given):
+            return np.array(orbit.section), many, orbit.phase
+    raise InputError(
+        f"the train from rest at a period of {regime.period:.9g} s settles to no orbit of {many} firings, and"
+        " a search finds none, expected a state or an orbit to start from"
+    )

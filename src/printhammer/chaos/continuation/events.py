@@ -1,0 +1,150 @@
+"""What happens along a branch of periodic orbits, in the words of a hammer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from printhammer.chaos.continuation.family import Passage
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.chaos.continuation.branch import Branch
+    from printhammer.chaos.continuation.branch_points import BranchPoint
+    from printhammer.chaos.continuation.family import Surface, Touch
+    from printhammer.support.arrays import FloatArray
+
+EventKind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "grazing"]
+KINDS: Final = ("fold", "period doubling", "Neimark-Sacker", "branching", "grazing")
+
+Change = Literal["", "appears", "vanishes", "splits", "merges", "several"]
+
+
+@dataclass(frozen=True, eq=False)
+class BranchEvent:
+    """A point of a branch at which something happens.
+
+    Attributes
+    ----------
+    kind : str
+        "fold": the branch turns back; "period doubling": a multiplier is -1, orbits of twice the period are
+        born; "Neimark-Sacker": a complex pair of multipliers crosses the unit circle, a torus is born;
+        "branching": two branches cross; "grazing": a contact appears or vanishes.
+    value : float
+        Of the constant, SI.
+    state : array, shape (2,)
+        Displacement, m, and velocity, m/s, at the section.
+    multipliers : complex array, shape (2,)
+        There.
+    surface : str
+        Of a grazing: "pack", "backstop" or, where several contacts change at once, "".
+    change : str
+        Of a grazing, as the constant grows: a contact "appears", "vanishes", "splits" in two or two "merge"
+        ("merges"); "several" where more than one changes at once. Else empty.
+    contacts : tuple of str
+        Sequence of contacts before and after it along the branch.
+    after : int
+        Number of the orbit of the branch that it follows.
+    sharp : bool
+        Whether it was located; otherwise it is known between two orbits only.
+    """
+
+    kind: EventKind
+    value: float
+    state: FloatArray
+    multipliers: npt.NDArray[np.complex128]
+    surface: str
+    change: Change
+    contacts: tuple[str, str]
+    after: int
+    sharp: bool
+    point: BranchPoint = field(repr=False)
+
+    @property
+    def told(self) -> str:
+        """What happens, in a few words."""
+        if self.kind != "grazing":
+            return self.kind
+        if self.change == "several":
+            return "grazing: several contacts change"
+        whose = f"{self.surface} contact"
+        return f"grazing: {f'two {whose}s merge' if self.change == 'merges' else f'a {whose} {self.change}'}"
+
+
+def event_of(point: BranchPoint) -> BranchEvent:
+    """Return a point of a curve in the words of a hammer."""
+    surface, change = ("", "") if point.sides is None else _grazing(point)
+    return BranchEvent(
+        kind="grazing" if point.kind == "change" else point.kind,
+        value=point.parameter,
+        state=np.array(point.node.state),
+        multipliers=point.node.multipliers,
+        surface=surface,
+        change=change,  # type: ignore[arg-type]
+        contacts=(str(point.labels[0]), str(point.labels[1])),
+        after=point.after,
+        sharp=point.sharp,
+        point=point,
+    )
+
+
+def _grazing(point: BranchPoint) -> tuple[str, str]:
+    """Return on which surface a contact changes, and how as the constant grows."""
+    assert point.sides is not None
+    ordered = sorted(point.sides, key=lambda node: node.parameter)
+    before, after = (node.value.extra for node in ordered)
+    if not isinstance(before, Passage) or not isinstance(after, Passage):
+        return "", "several"
+    surfaces: tuple[Surface, ...] = ("pack", "backstop")
+    changed = [surface for surface in surfaces if len(before.of(surface)) != len(after.of(surface))]
+    if len(changed) != 1:
+        return "", "several"
+    (surface,) = changed
+    more = len(after.of(surface)) - len(before.of(surface))
+    if abs(more) != 1:
+        return surface, "several"
+    parts = _parted((after if more > 0 else before).of(surface), before.period * before.firings)
+    if parts:
+        return surface, "splits" if more > 0 else "merges"
+    return surface, "appears" if more > 0 else "vanishes"
+
+
+def _parted(touches: list[Touch], length: float) -> bool:
+    """Return whether the shortest gap between contacts is shorter than the shortest contact."""
+    durations = [touch.t_out - touch.t_in for touch in touches]
+    if len(touches) < 2 or min(durations) == 0.0:
+        return False
+    begins = [touch.t_in for touch in touches]
+    gaps = [
+        begin - touch.t_out
+        for touch, begin in zip(touches, [*begins[1:], begins[0] + length], strict=True)
+        if math.isfinite(touch.t_out)
+    ]
+    return bool(gaps) and min(gaps) < min(durations)
+
+
+def stable_ranges(branch: Branch) -> list[tuple[float, float]]:
+    """Return the ranges of the constant over which the orbits of a branch are stable, ascending."""
+    limits = [event for event in branch.events if event.kind != "grazing"]
+    values = [*branch.values.tolist()]
+    stable = branch.stable
+    found: list[tuple[float, float]] = []
+    begin: float | None = None
+    for i, value in enumerate(values):
+        if i and bool(stable[i]) != bool(stable[i - 1]):
+            between = [event.value for event in limits if event.after == i - 1]
+            edge = between[0] if between else 0.5 * (value + values[i - 1])
+            if stable[i]:
+                begin = between[-1] if between else edge
+            elif begin is not None:
+                found.append((begin, edge))
+                begin = None
+        elif not i and stable[0]:
+            begin = value
+    if begin is not None:
+        found.append((begin, values[-1]))
+    return sorted((min(pair), max(pair)) for pair in found)

@@ -1,0 +1,282 @@
+"""The stroboscopic map of a regime as a map with a parameter, to be followed by `arclength`.
+
+Beside its value and derivatives it tells of the contacts on the way; their sequence is the label of motion.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from printhammer.chaos.continuation.arclength import MapValue
+from printhammer.chaos.strobe.map import IN_PACK, image_of, margin_of, usable
+from printhammer.errors import InputError
+from printhammer.run.contacts import contacts_of
+from printhammer.run.ledger import increments_of
+from printhammer.run.problem import Problem
+from printhammer.run.start import initial_state
+
+if TYPE_CHECKING:
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.problem import Record
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+
+_SPACING: Final = 1e-6
+"""Relative change of the parameter by which the slope is taken; it only steers, and need not be exact."""
+_BESIDE: Final = 1e-7
+_GENTLE: Final = 3e-4
+"""Change of a state, and speed of a pack touch, in units of the scales of the run."""
+_IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"
+_MOST_TOUCHES: Final = 100
+_MANY: Final = f"more than {_MOST_TOUCHES} contacts"
+
+Surface = Literal["pack", "backstop"]
+
+
+@dataclass(frozen=True)
+class Touch:
+    """One contact of an orbit that begins within its period.
+
+    Attributes
+    ----------
+    surface : str
+        "pack" or "backstop".
+    t_in, t_out : float
+        Times of touch and leaving, s, since the firing before the section; leaving may be in the next period,
+        and is infinite for a contact without end.
+    v_in : float
+        Velocity at touch, m/s.
+    """
+
+    surface: Surface
+    t_in: float
+    t_out: float
+    v_in: float
+
+
+@dataclass(frozen=True)
+class Passage:
+    """What happens on the way from a section to the last.
+
+    Attributes
+    ----------
+    touches : tuple of Touch
+        In order.
+    period : float
+        Time between firings, s.
+    firings : int
+        Number of firings on the way.
+    """
+
+    touches: tuple[Touch, ...]
+    period: float
+    firings: int
+
+    def of(self, surface: Surface) -> list[Touch]:
+        """Return the touches of one surface."""
+        return [touch for touch in self.touches if touch.surface == surface]
+
+    @property
+    def sequence(self) -> str:
+        """The surfaces touched, P or B each, from where the sequence is first in the alphabet.
+
+        A touch that moves through the section changes nothing: of an orbit, the beginning is arbitrary.
+        """
+        word = "".join("P" if touch.surface == "pack" else "B" for touch in self.touches)
+        if len(word) > _MOST_TOUCHES:
+            return _MANY
+        return min((word[i:] + word[:i] for i in range(len(word))), default="")
+
+    @property
+    def dots(self) -> list[tuple[float, float] | None]:
+        """Flight time, s, and impact speed, m/s, of the dot of each firing; None for a lost one."""
+        found: list[tuple[float, float] | None] = [None] * self.firings
+        for touch in self.of("pack"):
+            fired = math.floor(touch.t_in / self.period)
+            flight = touch.t_in - fired * self.period
+            known = found[fired % self.firings]
+            if known is None or flight < known[0]:
+                found[fired % self.firings] = (flight, touch.v_in)
+        return found
+
+
+@dataclass(frozen=True)
+class Course:
+    """What a periodic orbit does in one period of it.
+
+    Attributes
+    ----------
+    states : array, shape (firings, 2)
+        Displacement, m, and velocity, m/s, at the sections.
+    peak_forces : array, shape (firings,)
+        Largest pack force of the contacts of each firing, N; NaN without one.
+    coil_work, drive_work, pack_loss, backstop_loss : float
+        Energies, J.
+    """
+
+    states: FloatArray
+    peak_forces: FloatArray
+    coil_work: float
+    drive_work: float
+    pack_loss: float
+    backstop_loss: float
+
+
+class RegimeFamily:
+    """The strobe map of a regime, iterated, with one constant as parameter.
+
+    Parameters
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    name : str
+        Of the constant, see `printhammer.run.regime.Regime.with_`.
+    firings : int
+        Number of periods.
+    phase : float
+        Part of the period between a firing and the section.
+    tolerance : float
+        Error allowed in one step of a run.
+    """
+
+    def __init__(self, regime: Regime, name: str, firings: int, phase: float, tolerance: float) -> None:
+        self.regime = regime
+        self.name = name
+        self.firings = firings
+        self.phase = phase
+        self.tolerance = tolerance
+
+    def __call__(self, state: FloatArray, parameter: float) -> MapValue:
+        """Return the map at one state, m and m/s, and one value of the constant, SI."""
+        try:
+            regime = self.regime.with_(self.name, parameter)
+            problem, end = self._problem(regime, state)
+        except InputError as error:
+            return MapValue.none(2, str(error))
+        hammer = regime.hammer
+        if not usable(hammer, float(state[0]), float(state[1])):
+            return MapValue.none(2, _IN_PACK)
+        record = problem.run(end)
+        if record.status_name != "ok":
+            return MapValue.none(2, record.status_name)
+        passage = self._passage(problem, record, end)
+        if any(touch.v_in < _GENTLE * problem.scales[1] for touch in passage.of("pack")):
+            image = np.array(record.nodes[-1, 1:3])
+            jacobian = self._differences(problem, end, state)
+            if not usable(hammer, *image.tolist()):
+                return MapValue.none(2, _IN_PACK)
+        else:
+            found = image_of(regime, state, self.firings, self.phase, self.tolerance, contacts=False)
+            if not found.ok:
+                return MapValue.none(2, _IN_PACK if found.status == IN_PACK else found.status)
+            image, jacobian = found.state, found.jacobian
+        slope = self._slope(state, parameter, image)
+        if slope is None or jacobian is None or not np.isfinite(jacobian).all():
+            return MapValue.none(2, "the runs beside it did not come through")
+        return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
+
+    def margin(self, state: FloatArray, parameter: float) -> float:
+        """Return the signed nearness of a grazing, see `printhammer.chaos.strobe.map.Image`."""
+        problem, end = self._problem(self.regime.with_(self.name, parameter), state)
+        return margin_of(problem, problem.run(end))
+
+    def _differences(self, problem: Problem, end: float, state: FloatArray) -> FloatArray | None:
+        """Return the derivative of the map from runs beside.
+
+        Where a touch is gentle the contact is too shallow for the differences of its law in the tangent flow.
+        """
+        columns = []
+        for move in np.diag(_BESIDE * np.array(problem.scales)):
+            ends = [
+                self._state_after(
+                    Problem(problem.hammer, problem.drive, tuple(moved), problem.start, self.tolerance), end
+                )
+                for moved in (state - move, state + move)
+            ]
+            if ends[0] is None or ends[1] is None:
+                return None
+            columns.append((ends[1] - ends[0]) / (2.0 * move.sum()))
+        return np.column_stack(columns)
+
+    def with_firings(self, firings: int) -> RegimeFamily:
+        """Return the same map with another number of periods."""
+        return RegimeFamily(self.regime, self.name, firings, self.phase, self.tolerance)
+
+    def _slope(self, state: FloatArray, parameter: float, image: FloatArray) -> FloatArray | None:
+        step = _SPACING * (abs(parameter) or 1.0)
+        beside = [self.end_of(state, parameter + sign * step) for sign in (-1.0, 1.0)]
+        if beside[0] is not None and beside[1] is not None:
+            return np.asarray((beside[1] - beside[0]) / (2.0 * step))
+        if beside[1] is not None:
+            return np.asarray((beside[1] - image) / step)
+        return None if beside[0] is None else np.asarray((image - beside[0]) / step)
+
+    def end_of(self, state: FloatArray, parameter: float) -> FloatArray | None:
+        """Return the state at the end alone; None where the run does not come through."""
+        try:
+            problem, end = self._problem(self.regime.with_(self.name, parameter), state)
+        except InputError:
+            return None
+        return self._state_after(problem, end)
+
+    @staticmethod
+    def _state_after(problem: Problem, end: float) -> FloatArray | None:
+        record = problem.run(end)
+        return None if record.status_name != "ok" else np.asarray(record.nodes[-1, 1:3])
+
+    def _problem(self, regime: Regime, state: FloatArray) -> tuple[Problem, float]:
+        train, _ = regime.train(self.firings)
+        moments = regime.moments(train, self.firings, self.phase)
+        start = initial_state(regime.hammer, (float(state[0]), float(state[1])))
+        problem = Problem(regime.hammer, train, start, float(moments[0]), self.tolerance)
+        return problem, float(moments[-1])
+
+    def _passage(self, problem: Problem, record: Record, end: float) -> Passage:
+        period = (end - problem.start) / self.firings
+        zero = problem.start - self.phase * period
+        touches = _touches(problem.hammer, record, zero, end - problem.start)
+        return Passage(touches, period, self.firings)
+
+    def course(self, state: FloatArray, parameter: float) -> Course:
+        """Return what an orbit does, given its state at the section."""
+        regime = self.regime.with_(self.name, parameter)
+        problem, end = self._problem(regime, state)
+        record = problem.run(end)
+        increments = increments_of(problem, record)
+        forces = np.full(self.firings, np.nan)
+        zero = problem.start - self.phase * regime.period
+        for contact in contacts_of(problem, record, increments, rigid_backstop(regime)):
+            if contact.surface == "pack" and not contact.initial and contact.peak_force is not None:
+                fired = math.floor((contact.t_in - zero) / regime.period) % self.firings
+                forces[fired] = np.fmax(forces[fired], contact.peak_force)
+        sections = np.array([problem.start + regime.period * k for k in range(self.firings)])
+        states = problem.resample(record, sections)[:, :2].copy()
+        coil, drive, pack, backstop = (float(total) for total in increments.sum(axis=0))
+        return Course(states, forces, coil, drive, pack, backstop)
+
+
+def rigid_backstop(regime: Regime) -> bool:
+    """Return whether the velocity jumps at the backstop, so that the strobe map has a kink at a grazing."""
+    return regime.hammer.backstop is not None and regime.hammer.backstop.law == "rigid"
+
+
+def _touches(hammer: Hammer, record: Record, zero: float, length: float) -> tuple[Touch, ...]:
+    """Return the contacts of an orbit that begin in a record; one open at its end ends in the next period."""
+    position, front = hammer.position, hammer.front
+    found = []
+    open_at_start = {int(row[0]): float(row[3]) for row in record.contacts if row[6]}
+    for row in record.contacts:
+        if row[6]:
+            continue
+        leave = float(row[3])
+        if math.isnan(leave):
+            leave = open_at_start.get(int(row[0]), math.inf) + length
+        x = float(record.nodes[int(row[5]), 1])
+        pack = front is not None and (position is None or abs(x - front) < abs(x - position))
+        end = math.inf if math.isnan(leave) else leave - zero
+        found.append(Touch("pack" if pack else "backstop", float(row[1]) - zero, end, float(row[2])))
+    return tuple(found)

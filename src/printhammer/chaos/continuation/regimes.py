@@ -1,0 +1,346 @@
+"""The map of printing regimes: all periodic orbits of a hammer, followed in the rate.
+
+At several rates orbits are searched for, stable and unstable; each that does not lie on a known branch is
+followed in both directions. Period doublings lead to further branches. An island, an orbit that exists only
+between two folds and is joined to nothing, is a closed loop.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.continuation.arclength import Steps
+from printhammer.chaos.continuation.branch import MOST, Branch
+from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
+from printhammer.chaos.orbits.search import orbits_of
+from printhammer.chaos.strobe.map import MAP_TOLERANCE
+from printhammer.drive.input import read_count, read_positive
+from printhammer.errors import InputError
+from printhammer.run.regime import RATE, Regime
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    import xarray as xr
+
+    from printhammer.chaos.orbits.orbit import Orbit
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+SEEDS: Final = 6
+"""Number of rates at which orbits are searched for unless told otherwise."""
+
+_TOGETHER: Final = 4
+"""Branches that are followed side by side; a fixed number, so that the result does not depend on threads."""
+_SAME: Final = 1e-4
+"""Distance, in half-widths of the window, within which an orbit lies on a branch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """Branches of periodic orbits along the same constant.
+
+    That an orbit lies on none of them does not prove that there is none.
+
+    Attributes
+    ----------
+    found : tuple of Branch
+        By number of firings, then in the order in which they were found.
+    refused : tuple of str
+        Why an orbit could not be followed, or a search found nothing, a sentence each.
+    """
+
+    found: tuple[Branch, ...]
+    refused: tuple[str, ...] = field(default=())
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def __iter__(self) -> Iterator[Branch]:
+        return iter(self.found)
+
+    def __getitem__(self, place: int) -> Branch:
+        return self.found[place]
+
+    @property
+    def message(self) -> str:
+        """What was found, in one line."""
+        if not self.found:
+            return (
+                f"no branch was found; {'; '.join(self.refused)}" if self.refused else "no branch was found"
+            )
+        counts: dict[int, int] = {}
+        for branch in self.found:
+            counts[branch.firings] = counts.get(branch.firings, 0) + 1
+        kinds = ", ".join(f"{number} of period {firings}" for firings, number in sorted(counts.items()))
+        islands = sum(branch.closed for branch in self.found)
+        closed = f", {islands} of them closed loops" if islands else ""
+        missed = f"; {len(self.refused)} could not be followed" if self.refused else ""
+        number = len(self.found)
+        return f"{number} branch{'es' if number > 1 else ''}: {kinds}{closed}{missed}"
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the branches as a Dataset over `branch` and `orbit`, with units and provenance."""
+        from printhammer.chaos.continuation.tables import branches_dataset
+
+        return branches_dataset(self.found)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the branches against their constant; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.continuation").plot(self, **options)
+
+
+class InterruptedBranches(KeyboardInterrupt):
+    """The search for branches was interrupted.
+
+    Attributes
+    ----------
+    branches : Branches
+        Those that were followed to their ends by then.
+    """
+
+    def __init__(self, branches: Branches) -> None:
+        super().__init__("interrupted")
+        self.branches = branches
+
+
+def regimes(
+    hammer: Hammer,
+    rates: tuple[float | str, float | str],
+    *,
+    longest: SupportsIndex = 3,
+    seeds: SupportsIndex = SEEDS,
+    doublings: SupportsIndex = 0,
+    waveform: Waveform | None = None,
+    overlap: Overlap = "add",
+    most: SupportsIndex = MOST,
+    tolerance: float = MAP_TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Branches:
+    """Return which printing regimes of a hammer exist at which rate, stable or not.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    rates : tuple
+        Least and largest rate, Hz or text with a unit.
+    longest : int, optional
+        Largest number of firings of the orbits that are searched for.
+    seeds : int, optional
+        Number of rates, evenly spaced inside the range, at which orbits are searched for.
+    doublings : int, optional
+        How often the orbits born at period doublings are followed as well.
+    waveform, overlap
+        As for `printhammer.strobe`.
+    most : int, optional
+        Number of steps of a branch in either direction.
+    tolerance : float, optional
+        Error allowed in one step of the runs.
+    threads : int, optional
+        By default as many as there are cores; the branches do not depend on it.
+    progress : callable, optional
+        Called now and then with the amount of work that is done and of all that is known yet.
+
+    Returns
+    -------
+    Branches
+        With a sentence for each rate at which nothing was found and each orbit that could not be followed.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above.
+    InterruptedBranches
+        At an interrupt (Ctrl-C), with the branches that were followed by then.
+    """
+    try:
+        low, high = (read_positive(rate, "Hz", "rates") for rate in rates)
+    except (TypeError, ValueError):
+        raise InputError(f"rates = {rates!r}, expected the least and the largest rate") from None
+    if not low < high:
+        raise InputError(f"rates = {rates!r}, expected the least and the largest rate, ascending")
+    count, levels = read_count(seeds, "seeds"), _levels(doublings)
+    steps = Steps(most=read_count(most, "most"), precision=PRECISION)
+    collected = _Collected((low, high), steps, tolerance, threads)
+    many = read_count(longest, "longest")
+    with collected.kept_at_interrupt():
+        for k in range(count):
+            rate = low + (high - low) * (k + 0.5) / count
+            regime = Regime.of(hammer, rate=rate, waveform=waveform, overlap=overlap)
+            search = orbits_of(regime, longest=many, threads=threads)
+            if not search.found:
+                collected.refused.append(f"at {rate:.9g} Hz {search.message}")
+            collected.add(list(search.found))
+            if progress is not None:
+                progress(k + 1, count + levels)
+        for k in range(levels):
+            collected.double(k)
+            if progress is not None:
+                progress(count + k + 1, count + levels)
+    return collected.result()
+
+
+def follow_doublings(
+    branch: Branch, levels: int, *, most: int = MOST, threads: int | None = None
+) -> Branches:
+    """Return a branch with those born at its period doublings, theirs, and so on, to so many levels.
+
+    Raises
+    ------
+    InterruptedBranches
+        At an interrupt (Ctrl-C), with the branches that were followed by then.
+    """
+    steps = Steps(most=most, precision=PRECISION)
+    collected = _Collected(branch.bounds, steps, branch.tolerance, threads)
+    collected.found.append(branch)
+    with collected.kept_at_interrupt():
+        for k in range(levels):
+            collected.double(k)
+    return collected.result()
+
+
+def _levels(doublings: SupportsIndex) -> int:
+    try:
+        found = -1 if isinstance(doublings, bool) else doublings.__index__()
+    except AttributeError:
+        found = -1
+    if found < 0:
+        raise InputError(f"doublings = {doublings!r}, expected a whole number from 0 on")
+    return found
+
+
+class _Collected:
+    """Branches found so far."""
+
+    def __init__(
+        self, bounds: tuple[float, float], steps: Steps, tolerance: float, threads: int | None
+    ) -> None:
+        self.bounds, self.steps, self.tolerance, self.threads = bounds, steps, tolerance, threads
+        self.found: list[Branch] = []
+        self.refused: list[str] = []
+        self.done: set[tuple[int, int]] = set()
+
+    def result(self) -> Branches:
+        """Return all, shorter periods first."""
+        return Branches(tuple(sorted(self.found, key=lambda branch: branch.firings)), tuple(self.refused))
+
+    @contextmanager
+    def kept_at_interrupt(self) -> Iterator[None]:
+        """Hand over what was found at an interrupt."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            raise InterruptedBranches(self.result()) from None
+
+    def add(self, orbits: list[Orbit]) -> None:
+        """Follow the orbits that lie on no branch yet."""
+        left = list(orbits)
+        while left:
+            left = [orbit for orbit in left if not self.known(orbit)]
+            now, left = left[:_TOGETHER], left[_TOGETHER:]
+            for orbit, branch in zip(now, self.followed(now), strict=True):
+                if isinstance(branch, str):
+                    self.refused.append(branch)
+                elif not self.known(orbit):
+                    self.found.append(branch)
+
+    def followed(self, orbits: Sequence[Orbit]) -> list[Branch | str]:
+        """Return the branches through some orbits, or why there is none."""
+        results: dict[int, Branch | str] = {}
+
+        def work(begin: int, end: int) -> None:
+            for i in range(begin, end):
+                orbit = orbits[i]
+                bounds = read_bounds(orbit.regime, RATE, self.bounds)
+                try:
+                    branch = Tracer(orbit.regime, RATE, bounds, orbit.phase, self.tolerance, 1).branch(
+                        np.array(orbit.section), orbit.firings, self.steps, None
+                    )
+                except InputError as error:
+                    told = f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
+                    results[i] = told
+                else:
+                    results[i] = branch
+
+        in_threads([work], [len(orbits)], thread_count(self.threads), lengths=[1])
+        return [results[i] for i in range(len(orbits))]
+
+    def known(self, orbit: Orbit) -> bool:
+        """Return whether an orbit lies on a branch that was found."""
+        alike = [branch for branch in self.found if branch.firings == orbit.firings]
+        return any(_on(branch, orbit.regime.rate, _state_at(orbit, branch.phase)) for branch in alike)
+
+    def double(self, level: int) -> None:
+        """Follow what is born at the period doublings of all branches found so far."""
+        for number, branch in enumerate(list(self.found)):
+            for place, event in enumerate(branch.events):
+                if event.kind != "period doubling" or (number, place) in self.done:
+                    continue
+                self.done.add((number, place))
+                if any(_ends_at(other, event.value, event.state) for other in self.found):
+                    continue
+                try:
+                    born = branch.doubled(event, most=self.steps.most, threads=self.threads)
+                except InputError as error:
+                    self.refused.append(f"level {level + 1}, period doubling at {event.value:.9g}: {error}")
+                    continue
+                middle = born.curve.nodes[len(born) // 2]
+                if not any(
+                    _on(other, middle.parameter, middle.state)
+                    for other in self.found
+                    if other.firings == born.firings
+                ):
+                    self.found.append(born)
+
+
+def _state_at(orbit: Orbit, phase: float) -> FloatArray:
+    """Return a state of an orbit at another phase of the period."""
+    if phase == orbit.phase:
+        return orbit.section
+    motion = orbit.motion()
+    x, v = motion.at(motion.start + ((phase - orbit.phase) % 1.0) * orbit.regime.period)
+    return np.array([x[0], v[0]])
+
+
+def _ends_at(branch: Branch, value: float, state: FloatArray) -> bool:
+    """Return whether a branch ends in a period doubling there."""
+    scales = np.append(branch.regime.window.half_widths, (branch.bounds[1] - branch.bounds[0]))
+    place = np.append(state, value)
+    return any(
+        stop.reason == "period doubling"
+        and bool(np.abs((np.append(stop.state, stop.parameter) - place) / scales).max() < _SAME)
+        for stop in branch.stops
+    )
+
+
+def _on(branch: Branch, value: float, state: FloatArray) -> bool:
+    """Return whether an orbit with a state at one of its sections lies on a branch."""
+    half_widths = branch.regime.window.half_widths
+    values = branch.values
+    between = np.flatnonzero((values[:-1] - value) * (values[1:] - value) <= 0.0)
+    work = Tracer(branch.regime, branch.parameter, branch.bounds, branch.phase, branch.tolerance, 1)
+    for i in between:
+        for k in range(branch.firings):
+            # A rough look at the chord first, then the orbit itself.
+            ends = np.array([[branch.x[j, k], branch.v[j, k]] for j in (i, i + 1)]) / half_widths
+            reach = float(np.abs(ends[1] - ends[0]).max()) + 0.05
+            if np.abs(ends - state / half_widths).max(axis=1).min() > reach:
+                continue
+            share = 0.5 if values[i] == values[i + 1] else (value - values[i]) / (values[i + 1] - values[i])
+            guess = (ends[0] + share * (ends[1] - ends[0])) * half_widths
+            exact = work.at(value, guess, branch.firings)
+            if exact is not None and np.abs((exact - state) / half_widths).max() < _SAME:
+                return True
+    return False

@@ -1,0 +1,438 @@
+"""The designer's chart: where in the plane of two constants an orbit is stable, and what ends it.
+
+An orbit loses its stability at a fold, a period doubling or a Neimark-Sacker point. Each of them is a curve
+in the plane of two constants p and r, on which state, p and r obey
+
+    G(u, p, r) = u,   f(J(u, p, r)) = 0,   f = det(J - I), det(J + I) or det(J) - 1.
+
+These are the fixed points of the map (u, p) -> (G, p + f) with the parameter r, and are followed like any
+others (`printhammer.chaos.continuation.arclength`). Beside the curves the chart shows to what a train from
+rest settles, on a grid; a stable orbit need not be what is reached from there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.continuation.arclength import MapValue, Steps, follow
+from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, torus_test
+from printhammer.chaos.continuation.tracer import read_bounds, unit_of
+from printhammer.chaos.strobe.map import image_of
+from printhammer.chaos.strobe.train import Train
+from printhammer.chaos.strobe.verdict import period_of
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.chaos.continuation.arclength import Curve, Stop
+    from printhammer.chaos.continuation.branch import Branch
+    from printhammer.chaos.continuation.events import BranchEvent
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+MOST: Final = 200
+"""Number of steps of a curve in either direction unless told otherwise."""
+
+GRID: Final = (48, 32)
+"""Numbers of values of the two constants at which trains from rest are judged."""
+
+_TESTS: Final[dict[str, Callable[[FloatArray], float]]] = {
+    "fold": fold_test,
+    "period doubling": doubling_test,
+    "Neimark-Sacker": torus_test,
+}
+_SPACING: Final = 1e-5
+_PRECISION: Final = 1e-8
+_PARTS: Final = 5.0
+_FIRINGS: Final = 300
+_JUDGED: Final = 64
+_GRID_TOLERANCE: Final = 1e-9
+_SAME: Final = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class LossCurve:
+    """A curve in the plane of two constants on which an orbit loses its stability, or would.
+
+    Attributes
+    ----------
+    kind : str
+        "fold", "period doubling" or "Neimark-Sacker".
+    first, second : array, shape (N,)
+        The constants along the curve, SI.
+    state : array, shape (N, 2)
+        Displacement, m, and velocity, m/s, at the section.
+    multipliers : complex array, shape (N, 2)
+        One of them is 1 or -1, or both lie on the unit circle.
+    limits : bool array, shape (N,)
+        Whether the other multiplier lies inside the unit circle, so that stability is lost here.
+    stops : tuple of Stop
+        Why and where the curve ends.
+    """
+
+    kind: str
+    first: FloatArray
+    second: FloatArray
+    state: FloatArray
+    multipliers: npt.NDArray[np.complex128]
+    limits: npt.NDArray[np.bool_]
+    stops: tuple[Stop, Stop]
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityChart:
+    """Where in the plane of two constants an orbit is stable, and what ends it.
+
+    Attributes
+    ----------
+    regime : Regime
+        Hammer and periodic drive of the branch it came from.
+    names, units : tuple of str
+        The two constants and their SI units.
+    bounds : tuple of tuple of float
+        Their ranges.
+    firings : int
+        Number of firings after which the orbit repeats.
+    curves : tuple of LossCurve
+        On which it loses its stability.
+    grid : tuple of array
+        Values of the two constants, shapes (m,) and (n,), at which trains from rest were judged.
+    settled : int array, shape (n, m)
+        Number of firings after which the train from rest repeats; 0 where it does not within the firings
+        given to it, -1 where its run stopped.
+    refused : tuple of str
+        Why a curve could not be followed, a sentence each.
+    """
+
+    regime: Regime
+    names: tuple[str, str]
+    units: tuple[str, str]
+    bounds: tuple[tuple[float, float], tuple[float, float]]
+    firings: int
+    curves: tuple[LossCurve, ...] = field(repr=False)
+    grid: tuple[FloatArray, FloatArray] = field(repr=False)
+    settled: npt.NDArray[np.int64] = field(repr=False)
+    refused: tuple[str, ...] = ()
+
+    @property
+    def message(self) -> str:
+        """What was found, in one line."""
+        kinds = [curve.kind for curve in self.curves]
+        told = ", ".join(f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)) or "none"
+        share = float(np.mean(self.settled == self.firings)) if self.settled.size else 0.0
+        missed = f"; {len(self.refused)} could not be followed" if self.refused else ""
+        return (
+            f"curves on which the period-{self.firings} orbit loses its stability: {told}{missed};"
+            f" from rest {100.0 * share:.0f} % of the grid settles to period {self.firings}"
+        )
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return grid and curves as a Dataset, with units and provenance in the attributes."""
+        import xarray as xr
+
+        from printhammer.chaos.orbits.tables import provenance_of
+
+        # At least one of each: a dimension of length 0 has another meaning in the classic NetCDF format.
+        most, count = max((len(curve.first) for curve in self.curves), default=1), max(len(self.curves), 1)
+        table = {name: np.full((count, most), np.nan) for name in ("first", "second")}
+        limits = np.full((count, most), -1, np.int32)
+        kinds = list(_TESTS)
+        codes = np.full(count, -1, np.int32)
+        codes[: len(self.curves)] = [kinds.index(curve.kind) for curve in self.curves]
+        for i, curve in enumerate(self.curves):
+            table["first"][i, : len(curve.first)] = curve.first
+            table["second"][i, : len(curve.second)] = curve.second
+            limits[i, : len(curve.limits)] = curve.limits
+        data: dict[str, Any] = {
+            "settled": (
+                ("value", "main"),
+                self.settled.astype(np.int32),
+                {"units": "1", "long_name": "firings after which the train from rest repeats"},
+            ),
+            "kind": (
+                "curve",
+                codes,
+                {"units": "1", "codes": ", ".join(f"{code} {kind}" for code, kind in enumerate(kinds))},
+            ),
+            "limits": (("curve", "point"), limits, {"units": "1", "long_name": "whether stability is lost"}),
+        }
+        for place, name in enumerate(("first", "second")):
+            attributes = {"units": self.units[place], "long_name": self.names[place]}
+            data[name] = (("curve", "point"), table[name], attributes)
+        coordinates = {
+            "main": ("main", self.grid[0], {"units": self.units[0], "long_name": self.names[0]}),
+            "value": ("value", self.grid[1], {"units": self.units[1], "long_name": self.names[1]}),
+        }
+        title = f"stability of the period-{self.firings} orbit of {self.regime.hammer.name}"
+        known = {"title": title, **provenance_of(self.regime, _GRID_TOLERANCE), "message": self.message}
+        return xr.Dataset(data, coords=coordinates, attrs=known)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the chart; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.stability_chart").plot(self, **options)
+
+
+def stability_chart(
+    branch: Branch,
+    second: str,
+    bounds: tuple[float | str, float | str],
+    *,
+    grid: tuple[int, int] = GRID,
+    most: SupportsIndex = MOST,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> StabilityChart:
+    """Follow the limits of stability of a branch through a second constant.
+
+    Parameters
+    ----------
+    branch : Branch
+        From `printhammer.continuation`, usually in the rate; its constant is the first one, in its bounds.
+    second : str
+        The second constant, such as "backstop.damping" or "waveform.amplitude".
+    bounds : tuple
+        Its least and largest value, SI or text with a unit.
+    grid : tuple of int, optional
+        Numbers of values of the two constants at which trains from rest are judged; (0, 0) for none.
+    most : int, optional
+        Number of steps of a curve in either direction.
+    threads : int, optional
+        By default as many as there are cores; the chart does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of curves that are done and of all.
+
+    Returns
+    -------
+    StabilityChart
+        With the curves on which the branch's orbit loses its stability, one through each limit of a range of
+        stability that lies on no other curve, and what trains from rest settle to.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above, or both constants are the same.
+    """
+    regime = branch.regime
+    if second == branch.parameter:
+        raise InputError(f"second = {second!r}, expected another constant than that of the branch")
+    ends = read_bounds(regime, second, bounds)
+    value = regime.value(second)
+    if not ends[0] <= value <= ends[1]:
+        raise InputError(f"bounds = {bounds!r}, expected a range around the hammer's own {second}, {value:g}")
+    if min(grid) < 0:
+        raise InputError(f"grid = {grid!r}, expected two numbers of values, not negative")
+    work = _Chart(branch, second, ends, Steps(most=read_count(most, "most"), precision=_PRECISION))
+    limits = [event for event in branch.events if event.kind in _TESTS and _is_limit(event)]
+    curves, refused = work.curves(limits, thread_count(threads), progress)
+    axes, settled = _grid(branch, second, ends, grid, threads)
+    return StabilityChart(
+        regime=regime,
+        names=(branch.parameter, second),
+        units=(branch.unit, unit_of(regime, second)),
+        bounds=(branch.bounds, ends),
+        firings=branch.firings,
+        curves=tuple(curves),
+        grid=axes,
+        settled=settled,
+        refused=tuple(refused),
+    )
+
+
+def _is_limit(event: BranchEvent) -> bool:
+    """Return whether the other multiplier lies inside the unit circle at an event."""
+    return bool(np.abs(event.multipliers).max() < 1.0 + _SAME)
+
+
+class _Chart:
+    """The curves of one chart."""
+
+    def __init__(self, branch: Branch, second: str, bounds: tuple[float, float], steps: Steps) -> None:
+        self.branch, self.second, self.bounds, self.steps = branch, second, bounds, steps
+        widths = [(high - low) / _PARTS for low, high in (branch.bounds, bounds)]
+        self.scales = np.array([*branch.regime.window.half_widths, *widths])
+
+    def curves(
+        self, limits: list[BranchEvent], threads: int, progress: Progress | None
+    ) -> tuple[list[LossCurve], list[str]]:
+        """Return a curve through each limit, but those that lie on one already."""
+        found: list[LossCurve] = []
+        refused: list[str] = []
+        left = list(limits)
+        while left:
+            left = [event for event in left if not any(self.on(curve, event) for curve in found)]
+            # As many at once whatever the number of threads, so that the outcome is the same.
+            now, left = left[:2], left[2:]
+            results: dict[int, LossCurve | str] = {}
+
+            def work(begin: int, end: int, now: list[BranchEvent] = now, results: Any = results) -> None:
+                for i in range(begin, end):
+                    results[i] = self.curve(now[i])
+
+            in_threads([work], [len(now)], threads, lengths=[1])
+            for i, event in enumerate(now):
+                curve = results[i]
+                if isinstance(curve, str):
+                    refused.append(curve)
+                elif not any(self.on(other, event) for other in found):
+                    found.append(curve)
+            if progress is not None:
+                progress(len(limits) - len(left), len(limits))
+        return found, refused
+
+    def curve(self, event: BranchEvent) -> LossCurve | str:
+        """Return the curve through an event of the branch, or why there is none."""
+        regime = self.branch.regime
+        start = np.append(event.state, event.value)
+        try:
+            curve = follow(
+                self.family(event.kind),
+                start,
+                regime.value(self.second),
+                scales=self.scales,
+                bounds=self.bounds,
+                steps=self.steps,
+                watch=self.watch,
+            )
+        except InputError as error:
+            return f"{event.kind} at {self.branch.parameter} = {event.value:.9g} {self.branch.unit}: {error}"
+        return self.described(event.kind, curve)
+
+    def watch(self, here: Any, ahead: Any) -> Any:
+        """End a curve where the first constant leaves its bounds."""
+        from printhammer.chaos.continuation.arclength import Stop
+
+        low, high = self.branch.bounds
+        if low <= ahead.state[2] <= high:
+            return None
+        bound = low if ahead.state[2] < low else high
+        told = f"{self.branch.parameter} = {bound:.9g} {self.branch.unit} is the bound"
+        return Stop("bound", here.parameter, here.state, told, ahead)
+
+    def described(self, kind: str, curve: Curve) -> LossCurve:
+        """Return a curve in the words of a chart."""
+        nodes = curve.nodes
+        jacobians = [node.value.extra for node in nodes]
+        multipliers = np.array([np.linalg.eigvals(matrix) for matrix in jacobians], dtype=np.complex128)
+        multipliers = multipliers.reshape(len(nodes), 2)
+        return LossCurve(
+            kind=kind,
+            first=np.array([node.state[2] for node in nodes]),
+            second=np.array([node.parameter for node in nodes]),
+            state=np.array([node.state[:2] for node in nodes]),
+            multipliers=multipliers,
+            limits=np.abs(multipliers).max(axis=1) < 1.0 + _SAME,
+            stops=curve.stops,
+        )
+
+    def on(self, curve: LossCurve, event: BranchEvent) -> bool:
+        """Return whether an event of the branch lies on a curve, between two of its points."""
+        if curve.kind != event.kind:
+            return False
+        points = np.column_stack([curve.state, curve.first, curve.second]) / self.scales
+        place = np.array([*event.state, event.value, self.branch.regime.value(self.second)]) / self.scales
+        along = np.diff(points, axis=0)
+        lengths = (along**2).sum(axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shares = np.clip(((place - points[:-1]) * along).sum(axis=1) / lengths, 0.0, 1.0)
+        feet = points[:-1] + np.nan_to_num(shares)[:, np.newaxis] * along
+        # A chord leaves its curve by a part of its length.
+        near = np.sqrt(((feet - place) ** 2).sum(axis=1)) <= 0.1 * np.sqrt(lengths) + _SAME
+        return bool(near.any())
+
+    def family(self, kind: str) -> Callable[[FloatArray, float], MapValue]:
+        """Return the map whose fixed points are the curve: state and first constant, by the second one."""
+        branch, test = self.branch, _TESTS[kind]
+        scale = float(self.scales[2])
+
+        def images(points: list[tuple[FloatArray, float]]) -> list[tuple[FloatArray, FloatArray]] | str:
+            found = []
+            for whole, other in points:
+                try:
+                    regime = branch.regime.with_(self.second, other).with_(branch.parameter, float(whole[2]))
+                except InputError as error:
+                    return str(error)
+                image = image_of(
+                    regime, whole[:2], branch.firings, branch.phase, branch.tolerance, contacts=False
+                )
+                if not image.ok or not np.isfinite(image.jacobian).all():
+                    return image.status if not image.ok else "no derivative"
+                found.append((image.state, image.jacobian))
+            return found
+
+        def family(whole: FloatArray, other: float) -> MapValue:
+            moves = _SPACING * self.scales
+            points = [(whole, other)]
+            points += [(whole + moves[k] * np.eye(3)[k], other) for k in range(3)]
+            points.append((whole, other + moves[3]))
+            found = images(points)
+            if isinstance(found, str):
+                return MapValue.none(3, found)
+            (image, jacobian), *beside = found
+            value = scale * test(jacobian)
+            slopes = [(scale * test(near) - value) / moves[k] for k, (_, near) in enumerate(beside)]
+            across = [(state - image) / moves[k] for k, (state, _) in enumerate(beside)]
+            matrix = np.zeros((3, 3))
+            matrix[:2, :2] = jacobian
+            matrix[:2, 2] = across[2]
+            matrix[2] = slopes[:3]
+            matrix[2, 2] += 1.0
+            return MapValue(
+                np.append(image, whole[2] + value),
+                matrix,
+                np.append(across[3], slopes[3]),
+                extra=jacobian,
+            )
+
+        return family
+
+
+def _grid(
+    branch: Branch, second: str, bounds: tuple[float, float], grid: tuple[int, int], threads: int | None
+) -> tuple[tuple[FloatArray, FloatArray], npt.NDArray[np.int64]]:
+    """Return the values of both constants, and after how many firings trains from rest repeat there."""
+    regime = branch.regime
+    axes = (np.linspace(*branch.bounds, grid[0]), np.linspace(*bounds, grid[1]))
+    settled = np.zeros((grid[1], grid[0]), dtype=np.int64)
+    for row, value in enumerate(axes[1]):
+        moved = regime.with_(second, float(value))
+        here = [moved.with_(branch.parameter, float(first)) for first in axes[0]]
+        trains = [
+            Train.of(
+                one.hammer,
+                None if one.drive is not None else one.period,
+                _FIRINGS,
+                waveform=one.waveform,
+                drive=one.drive,
+                overlap=one.overlap,
+            )
+            for one in here
+        ]
+        settled[row] = _periods(trains, threads)
+    return axes, settled
+
+
+def _periods(trains: list[Train], threads: int | None) -> npt.NDArray[np.int64]:
+    """Return after how many firings trains repeat; 0 where they do not, -1 where they stopped."""
+    from printhammer.chaos.strobe.train import run_trains
+
+    if not trains:
+        return np.zeros(0, np.int64)
+    chosen = np.arange(_FIRINGS - _JUDGED + 1, _FIRINGS + 1)
+    states, _ = run_trains(trains, chosen, 0.0, _GRID_TOLERANCE, None, threads=threads)
+    found = []
+    for train, seen in zip(trains, states, strict=True):
+        period = period_of(seen.distances(train)) if seen.status == "ok" else -1
+        found.append(0 if period is None else period)
+    return np.array(found, dtype=np.int64)

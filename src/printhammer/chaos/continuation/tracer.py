@@ -1,0 +1,318 @@
+"""How a branch of periodic orbits is followed and described."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.continuation.arclength import Curve, Follower, Node, Steps, Stop, follow
+from printhammer.chaos.continuation.branch import Branch
+from printhammer.chaos.continuation.branch_points import (
+    BIRTH,
+    birth_of,
+    doubling_near,
+    follow_doubled,
+    points_of,
+)
+from printhammer.chaos.continuation.events import event_of
+from printhammer.chaos.continuation.family import RegimeFamily, rigid_backstop
+from printhammer.drive.input import read_number
+from printhammer.errors import InputError
+from printhammer.run.regime import PERIOD, RATE
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from printhammer.chaos.continuation.events import BranchEvent
+    from printhammer.chaos.continuation.family import Course, Passage
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+PRECISION: Final = 1e-10
+"""Scaled correction of Newton's method below which an orbit is found; see `arclength`."""
+
+_PARTS: Final = 5.0
+"""Parts of the range of the constant that count as much as half a width of the strobe window."""
+_MARGIN_STEP: Final = 1e-6
+_NEAR: Final = 1e-4
+"""Change of the margin from which its slope is known; part of the range within which its zero is a stop."""
+_SHORTER: Final = 1e-6
+"""Scaled distance of an orbit from itself after a part of its firings, up to which it repeats then."""
+_DIGITS: Final = ".9g"
+
+
+def unit_of(regime: Regime, parameter: str) -> str:
+    """Return the SI unit of a constant of a regime.
+
+    Raises
+    ------
+    InputError
+        There is no such constant.
+    """
+    regime.value(parameter)
+    own = {PERIOD: "s", RATE: "Hz", "drive.amplitude": "N", "drive.phase": "rad"}
+    if parameter in own:
+        return own[parameter]
+    if parameter.startswith("waveform.") and regime.waveform is not None:
+        from printhammer.support.constants import quantities
+
+        note = quantities(type(regime.waveform))[parameter.removeprefix("waveform.")]
+        return note.also[0] if note.also and regime.waveform.quantity == "force" else note.si
+    return regime.hammer.constants[parameter].si_unit
+
+
+def read_bounds(
+    regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
+) -> tuple[float, float]:
+    """Return the ends of a range of a constant, SI.
+
+    Raises
+    ------
+    InputError
+        There is no such constant, or the ends are not two ascending numbers.
+    """
+    unit = unit_of(regime, parameter)
+    try:
+        low, high = bounds
+    except (TypeError, ValueError):
+        raise InputError(f"bounds = {bounds!r}, expected the least and the largest {parameter}") from None
+    ends = read_number(low, unit, parameter), read_number(high, unit, parameter)
+    if not ends[0] < ends[1]:
+        raise InputError(f"bounds = {bounds!r}, expected the least and the largest {parameter}, ascending")
+    return ends
+
+
+class Tracer:
+    """What all branches along one constant of one regime have in common."""
+
+    def __init__(
+        self,
+        regime: Regime,
+        parameter: str,
+        bounds: tuple[float, float],
+        phase: float,
+        tolerance: float,
+        threads: int | None,
+    ) -> None:
+        self.regime, self.parameter, self.bounds = regime, parameter, bounds
+        self.phase, self.tolerance, self.threads = phase, tolerance, threads
+        self.scales = np.append(regime.window.half_widths, (bounds[1] - bounds[0]) / _PARTS)
+
+    def family(self, firings: int) -> RegimeFamily:
+        """Return the strobe map over so many firings."""
+        return RegimeFamily(self.regime, self.parameter, firings, self.phase, self.tolerance)
+
+    def branch(self, state: FloatArray, firings: int, steps: Steps, progress: Progress | None) -> Branch:
+        """Return the branch through an orbit."""
+        family = self.family(firings)
+        curve = follow(
+            family,
+            state,
+            self.regime.value(self.parameter),
+            scales=self.scales,
+            bounds=self.bounds,
+            steps=steps,
+            watch=self.watch(firings, steps, progress),
+        )
+        return self.described(family, self.grazed(family, curve), steps)
+
+    def grazed(self, family: RegimeFamily, curve: Curve) -> Curve:
+        """Return a curve that is lost where it grazes a rigid backstop with that as the reason.
+
+        The margin passes through 0 there, linearly on this side; its zero is the place.
+        """
+        if not rigid_backstop(self.regime):
+            return curve
+        stops = []
+        for stop, nodes in zip(curve.stops, (curve.nodes, curve.nodes[::-1]), strict=True):
+            place = self.zero_margin(family, nodes) if stop.reason in ("lost", "no value") else None
+            told = "it grazes the rigid backstop, where the strobe map has no derivative"
+            grazed = stop if place is None else Stop("grazing", place, nodes[0].state, told)
+            stops.append(grazed)
+        return Curve(curve.nodes, (stops[0], stops[1]))
+
+    def zero_margin(self, family: RegimeFamily, nodes: list[Node]) -> float | None:
+        """Return where the margin of the first node goes to 0, continued from a later one; None if far."""
+        last = family.margin(nodes[0].state, nodes[0].parameter)
+        for node in nodes[1:]:
+            margin = family.margin(node.state, node.parameter)
+            if abs(margin - last) > _MARGIN_STEP:
+                break
+        else:
+            return None
+        slope = (nodes[0].parameter - node.parameter) / (last - margin)
+        place = nodes[0].parameter - last * slope
+        near = abs(place - nodes[0].parameter) < _NEAR * (self.bounds[1] - self.bounds[0])
+        return place if abs(last) < abs(margin) and near else None
+
+    def doubled(self, firings: int, event: BranchEvent, most: int) -> Branch:
+        """Return the branch born at a period doubling of an orbit of so many firings."""
+        family = self.family(2 * firings)
+        steps = Steps(most=most, precision=PRECISION)
+        curve = follow_doubled(
+            family,
+            event.point,
+            scales=self.scales,
+            bounds=self.bounds,
+            steps=steps,
+            watch=self.watch(2 * firings, steps, None),
+        )
+        value, state = event.value, event.point.node.state
+        told = f"the orbit is born at {self.told(value)}, where one of half its period doubles"
+        born = Stop(BIRTH, value, state, told)
+        nodes = curve.nodes
+        at_birth = family(state, value)
+        if not at_birth.trouble:
+            way = np.append(nodes[0].state - state, nodes[0].parameter - value) / self.scales
+            arc = nodes[0].arc - float(np.linalg.norm(way))
+            nodes = [Node(state, value, nodes[0].tangent, arc, at_birth, 0.0), *nodes]
+        return self.described(family, Curve(nodes, (born, curve.stops[1])), steps)
+
+    def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
+        """Return the orbit near a state at one value of the constant; None if there is none."""
+        follower = Follower(self.family(firings), self.scales, PRECISION)
+        row = np.zeros(3)
+        row[-1] = 1.0
+        found = follower.correct(follower.scaled(state, value), row)
+        return None if found is None else np.asarray(found.state)
+
+    def told(self, value: float) -> str:
+        """Return a value of the constant with name and unit."""
+        return f"{self.parameter} = {value:{_DIGITS}} {unit_of(self.regime, self.parameter)}"
+
+    def watch(self, firings: int, steps: Steps, progress: Progress | None) -> Any:
+        """Return what is asked between any two nodes: whether the branch ends there."""
+        half, whole = None, self.family(firings)
+        if firings % 2 == 0:
+            half = Follower(self.family(firings // 2), self.scales, steps.precision)
+        rigid = rigid_backstop(self.regime)
+        parts = [self.family(firings // k) for k in range(2, firings + 1) if firings % k == 0]
+        taken = 0
+
+        def watched(here: Node, ahead: Node) -> Stop | None:
+            nonlocal taken
+            taken += 1
+            if progress is not None:
+                progress(min(taken, 2 * steps.most), 2 * steps.most)
+            if rigid and here.value.label != ahead.value.label:
+                told = "its sequence of contacts changes in a grazing, where the strobe map has no derivative"
+                return Stop("grazing", here.parameter, here.state, told, here)
+            born = None if half is None else birth_of(half, here, ahead)
+            if born is None:
+                shorter = [part for part in parts if self.repeats(part, ahead)]
+                return self.merged(shorter, here, ahead) if shorter else None
+            if born.node is None:
+                return born
+            # What the orbit does there is that of its whole period.
+            value = whole(born.node.state, born.node.parameter)
+            last = replace(born.node, value=value) if not value.trouble else here
+            return replace(born, node=last)
+
+        return watched
+
+    def repeats(self, part: RegimeFamily, node: Node) -> bool:
+        """Return whether an orbit repeats after the firings of a part of it already."""
+        end = part.end_of(node.state, node.parameter)
+        return end is not None and bool(np.abs((end - node.state) / self.scales[:2]).max() < _SHORTER)
+
+    def merged(self, shorter: list[RegimeFamily], here: Node, ahead: Node) -> Stop:
+        """Return the stop of a branch that has gone over to an orbit of fewer firings.
+
+        Near a period doubling the curves of both orbits lie so close that a step may lead from one to the
+        other.
+        """
+        longest = max(shorter, key=lambda part: part.firings)
+        half = Follower(longest, self.scales, PRECISION)
+        row = np.zeros(3)
+        row[-1] = 1.0
+        single = half.correct(half.scaled(ahead.state, ahead.parameter), row)
+        node = None if single is None else doubling_near(half, single)
+        if node is not None:
+            place, before = half.scaled(node.state, node.parameter), half.scaled(here.state, here.parameter)
+            step = float(np.linalg.norm(half.scaled(ahead.state, ahead.parameter) - before))
+            if float(np.linalg.norm(place - before)) < 3.0 * step:
+                return Stop(BIRTH, node.parameter, node.state, "born", here)
+        told = f"it merges with an orbit of {longest.firings} firings"
+        return Stop("merged", here.parameter, here.state, told, here)
+
+    def described(self, family: RegimeFamily, curve: Curve, steps: Steps) -> Branch:
+        """Return a branch with all about its orbits."""
+        nodes = curve.nodes
+        courses: dict[int, Course] = {}
+
+        def work(begin: int, end: int) -> None:
+            for i in range(begin, end):
+                courses[i] = family.course(nodes[i].state, nodes[i].parameter)
+
+        in_threads([work], [len(nodes)], thread_count(self.threads))
+        count = len(nodes)
+        passages: list[Passage] = [node.value.extra for node in nodes]
+        dots = [passage.dots for passage in passages]
+
+        def of_dots(place: int) -> FloatArray:
+            rows = [[math.nan if dot is None else dot[place] for dot in row] for row in dots]
+            return np.array(rows, dtype=np.float64).reshape(count, family.firings)
+
+        def of_courses(name: str) -> FloatArray:
+            return np.array([getattr(courses[i], name) for i in range(count)], dtype=np.float64)
+
+        states = of_courses("states").reshape(count, family.firings, 2)
+        found = points_of(
+            family,
+            curve,
+            self.scales,
+            steps.precision,
+            lambda node: family.margin(node.state, node.parameter),
+        )
+        lost = np.array([sum(dot is None for dot in row) for row in dots], dtype=np.int64)
+        stops = curve.stops
+        return Branch(
+            regime=self.regime,
+            parameter=self.parameter,
+            unit=unit_of(self.regime, self.parameter),
+            bounds=self.bounds,
+            firings=family.firings,
+            phase=self.phase,
+            tolerance=self.tolerance,
+            values=np.array([node.parameter for node in nodes]),
+            x=states[:, :, 0],
+            v=states[:, :, 1],
+            multipliers=np.array([node.multipliers for node in nodes]).reshape(count, 2),
+            backstop_contacts=np.array([len(row.of("backstop")) for row in passages], dtype=np.int64),
+            pack_contacts=np.array([len(row.of("pack")) for row in passages], dtype=np.int64),
+            printed=family.firings - lost,
+            lost=lost,
+            flight_time=of_dots(0),
+            impact_speed=of_dots(1),
+            peak_force=of_courses("peak_forces").reshape(count, family.firings),
+            coil_work=of_courses("coil_work"),
+            drive_work=of_courses("drive_work"),
+            pack_loss=of_courses("pack_loss"),
+            backstop_loss=of_courses("backstop_loss"),
+            residual=np.array([node.residual for node in nodes]),
+            contacts=tuple(row.sequence for row in passages),
+            events=tuple(event_of(point) for point in found),
+            stops=(self.retold(stops[0]), self.retold(stops[1])),
+            curve=curve,
+        )
+
+    def retold(self, stop: Stop) -> Stop:
+        """Return a stop whose sentence names the constant and its unit."""
+        at = self.told(stop.parameter)
+        why = stop.sentence.rpartition(": ")[2]
+        sentences = {
+            "bound": f"{at} is the bound",
+            "closed": f"the branch closes upon itself at {at}",
+            "no value": f"beyond {at} there is no strobe map: {why}",
+            "lost": f"beyond {at} Newton's method does not converge",
+            "length": f"the number of steps was used up at {at}",
+            "grazing": f"at {at} {why}",
+            "merged": f"close to {at} {why}",
+            BIRTH: f"at {at} it is born from an orbit of half its period, which doubles",
+            "not asked": f"it was not followed beyond {at}",
+        }
+        sentence = sentences.get(stop.reason, stop.sentence)
+        return Stop(stop.reason, stop.parameter, stop.state, sentence, stop.node)

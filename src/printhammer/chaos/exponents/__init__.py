@@ -1,0 +1,1 @@
+"""Lyapunov exponents, the 0-1 test for chaos and recurrence plots."""

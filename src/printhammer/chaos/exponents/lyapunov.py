@@ -1,0 +1,366 @@
+"""Lyapunov exponents of the strobe map: how fast neighbouring motions part, or come together.
+
+From firing to firing the tangent flow (docs/tangent.md) stretches one direction of the plane of displacement
+and velocity and shrinks the other. The mean logarithms are the exponents lambda_1 >= lambda_2; their sum is
+the mean logarithm of the determinant. A third one, that of the memory of the pack, is minus infinity. The
+exponents of the flow in time are these over the period, and a zero for the direction of time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.exponents.zero_one import FEWEST, ZeroOne, zero_one
+from printhammer.chaos.strobe.points import Strobe, transient_of
+from printhammer.chaos.strobe.train import States, Train
+from printhammer.chaos.strobe.verdict import SIGNIFICANT, verdict
+from printhammer.derivatives.states import standard_error, strobe_exponent
+from printhammer.drive.input import read_count, read_positive
+from printhammer.errors import InputError
+from printhammer.run.problem import TOLERANCE
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.chaos.strobe.verdict import Verdict
+    from printhammer.derivatives.states import Exponent
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+FIRINGS: Final = 1000
+"""Number of firings over which growth counts unless told otherwise."""
+
+TRANSIENT: Final = 1000
+"""Number of firings left out before them."""
+
+_COUNTS: Final = 100
+_CYCLES: Final = 8
+"""Number of cycles below which their scatter says nothing."""
+
+
+@dataclass(frozen=True)
+class Lyapunov:
+    """Lyapunov exponents of one train, and two opinions on what kind of motion it is.
+
+    Attributes
+    ----------
+    points : Strobe
+        The states at the firings, from the first to the last one between which growth counts, and the verdict
+        on them, which rests on recurrence and on the largest exponent.
+    exponents : array, shape (2,)
+        Exponents per firing, the largest one first; minus infinity where the motion forgets its past
+        altogether, NaN where the run did not get through.
+    standard_errors : array, shape (2,)
+        Of the exponents; infinite for fewer than eight firings.
+    total, total_error : float
+        Sum of the exponents, the mean logarithm of the determinant of the strobe map, with its standard
+        error.
+    dimension, dimension_error : float
+        Kaplan-Yorke dimension of the attractor of the strobe map, see `kaplan_yorke`; NaN where it is not
+        known.
+    factors : array, shape (n, 2)
+        Logarithms of the growth from each firing to the next.
+    smooth : bool
+        False where the motion passes a touch without velocity, where it has no derivative.
+    zero_one : ZeroOne or None
+        What the 0-1 test says of the points; None for fewer than 100 of them.
+    """
+
+    points: Strobe
+    exponents: FloatArray
+    standard_errors: FloatArray
+    total: float
+    total_error: float
+    dimension: float
+    dimension_error: float
+    factors: FloatArray = field(repr=False)
+    smooth: bool
+    zero_one: ZeroOne | None = field(repr=False)
+
+    @property
+    def hammer(self) -> Hammer:
+        """The hammer."""
+        return self.points.hammer
+
+    @property
+    def period(self) -> float:
+        """Time between firings, s."""
+        return self.points.period
+
+    @property
+    def status(self) -> str:
+        """How the run ended."""
+        return self.points.status
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run went as asked."""
+        return self.points.ok
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on the points, with its evidence."""
+        if self.points.verdict is None:
+            raise ValueError("the points have not been judged")
+        return self.points.verdict
+
+    @property
+    def per_second(self) -> FloatArray:
+        """The exponents per second, 1/s, shape (2,)."""
+        return self.exponents / self.period
+
+    @property
+    def cycle(self) -> int:
+        """Number of firings over which growth is averaged first: the period of a periodic train, else 1."""
+        return cycle_of(self.verdict.period, len(self.factors))
+
+    @property
+    def growth(self) -> str:
+        """What the largest exponent alone says: "chaotic", "regular", or "undecided" within three errors."""
+        return _growth(float(self.exponents[0]), float(self.standard_errors[0]), self.smooth)
+
+    @property
+    def agree(self) -> bool | None:
+        """Whether exponent and 0-1 test say the same; None where one of them does not decide."""
+        other = "undecided" if self.zero_one is None else self.zero_one.verdict
+        return None if "undecided" in (self.growth, other) else self.growth == other
+
+    def running(
+        self, counts: npt.ArrayLike | None = None
+    ) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]:
+        """Return the estimates from the first firings only, to see whether they have settled.
+
+        Parameters
+        ----------
+        counts : int array, optional
+            Numbers of firings, from 1 to all, of which whole cycles are taken; by default about a hundred,
+            evenly spaced in their logarithm.
+
+        Returns
+        -------
+        counts : int array, shape (k,)
+            The numbers of firings.
+        means : array, shape (k, 2)
+            The exponents over so many firings.
+        errors : array, shape (k, 2)
+            Their standard errors.
+
+        Raises
+        ------
+        InputError
+            A number that there is not.
+        """
+        q = self.cycle
+        whole = whole_cycles(self.factors, q)
+        n = q * len(whole)
+        if counts is None:
+            counts = np.geomspace(q, n, min(_COUNTS, len(whole)))
+        asked = np.atleast_1d(np.asarray(counts, dtype=np.float64))
+        if asked.size and not (asked.min() >= 1.0 and asked.max() <= n):
+            raise InputError(f"counts = {counts!r}, expected numbers of firings from 1 to {n}")
+        some = np.unique(np.maximum((asked / q).round(), 1.0).astype(np.int64))
+        means = np.cumsum(whole, axis=0)[some - 1] / some[:, np.newaxis]
+        errors = [[standard_error(whole[:cycles, k]) for k in (0, 1)] for cycles in some]
+        return q * some, means, np.array(errors).reshape(-1, 2)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return growth and states over `firing`, running estimates over `count`."""
+        from printhammer.chaos.exponents.tables import lyapunov_dataset
+
+        return lyapunov_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the running estimates with their errors; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.lyapunov").plot(self, **options)
+
+
+def lyapunov(
+    hammer: Hammer,
+    *,
+    period: float | str | None = None,
+    rate: float | str | None = None,
+    firings: SupportsIndex = FIRINGS,
+    transient: SupportsIndex = TRANSIENT,
+    waveform: Waveform | None = None,
+    drive: Drive | None = None,
+    overlap: Overlap = "add",
+    state: tuple[float, float] | None = None,
+    tolerance: float = TOLERANCE,
+) -> Lyapunov:
+    """Return the Lyapunov exponents of a train, with error bars, and the 0-1 test as a second opinion.
+
+    Two changes of the state are carried along with the motion and made orthonormal again at every step (G.
+    Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21); they begin up to a
+    hundred firings earlier, to find their directions. Standard errors are those of the means of
+    autocorrelated series, from overlapping batch means (`printhammer.derivatives.states.standard_error`); of
+    a periodic train, of whole cycles.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    period, rate : float or str
+        Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is taken as well.
+    firings : int, optional
+        Number of firings over which growth counts.
+    transient : int, optional
+        Number of firings left out before them.
+    waveform, drive, overlap, state
+        As for `printhammer.strobe`.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+
+    Returns
+    -------
+    Lyapunov
+        With a status; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above, or the hammer has no waveform or no rest state.
+    """
+    if drive is None and (period is None) == (rate is None):
+        raise InputError("period and rate: expected one of them, the time between firings or its inverse")
+    if drive is not None and (period is not None or rate is not None or waveform is not None):
+        raise InputError("drive is given, expected no period, rate or waveform beside it")
+    spacing = None
+    if period is not None:
+        spacing = read_positive(period, "s", "period")
+    elif rate is not None:
+        spacing = 1.0 / read_positive(rate, "Hz", "rate")
+    counts = read_count(firings, "firings"), transient_of(transient)
+    train = Train.of(
+        hammer, spacing, sum(counts) + 1, waveform=waveform, drive=drive, overlap=overlap, state=state
+    )
+    return exponents_of_train(train, counts, tolerance)
+
+
+def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
+    """Return the Kaplan-Yorke dimension of a map of the plane, and its standard error.
+
+    D = 1 - lambda_1/lambda_2 where lambda_1 > 0 > lambda_1 + lambda_2, 2 where areas do not shrink, 0 where
+    lambda_1 < 0 (J. L. Kaplan and J. A. Yorke, Lect. Notes Math. 730 (1979) 204). The error is that of the
+    mean of (D's slopes) x (growth), which knows how both exponents waver together. The flow in time has one
+    dimension more.
+
+    Parameters
+    ----------
+    factors : array, shape (n, 2)
+        Logarithms of the growth from step to step, the larger exponent first.
+
+    Returns
+    -------
+    dimension, error : float
+        NaN where the sign of the largest exponent is not known to three standard errors.
+    """
+    one, two = (float(mean) for mean in factors.mean(axis=0))
+    sign = _growth(one, standard_error(factors[:, 0]), True)
+    if sign == "undecided":
+        return math.nan, math.nan
+    if sign == "regular":
+        return 0.0, 0.0
+    if one + two >= 0.0:
+        return 2.0, 0.0
+    if math.isinf(two):
+        return 1.0, 0.0
+    return 1.0 - one / two, standard_error(one / two**2 * factors[:, 1] - factors[:, 0] / two)
+
+
+def cycle_of(period: int | None, firings: int) -> int:
+    """Return over how many firings to average growth first, so that a cycle does not count as scatter."""
+    return period if period is not None and firings >= _CYCLES * period else 1
+
+
+def whole_cycles(factors: FloatArray, cycle: int) -> FloatArray:
+    """Return means over whole cycles, shape (n // cycle, 2), the first few firings left out if need be."""
+    return np.asarray(factors[len(factors) % cycle :].reshape(-1, cycle, 2).mean(axis=1))
+
+
+def _growth(value: float, error: float, smooth: bool) -> str:
+    if math.isnan(value) or not smooth:
+        return "undecided"
+    # Of a motion that forgets its past altogether there is no scatter to speak of.
+    if value == -math.inf or value < -SIGNIFICANT * error:
+        return "regular"
+    return "chaotic" if value > SIGNIFICANT * error else "undecided"
+
+
+def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) -> Lyapunov:
+    """Return the exponents of a train over a number of firings, after another number that is left out."""
+    first = counts[1] + 1
+    last = first + counts[0]
+    found = strobe_exponent(
+        train.hammer,
+        train.drive,
+        train.period,
+        first=first,
+        last=last,
+        state=train.state,
+        tolerance=tolerance,
+    )
+    points = _points(train, first, last, found, tolerance)
+    factors = np.column_stack([found.factors, found.second_factors])
+    judged = points.verdict
+    whole = whole_cycles(factors, cycle_of(None if judged is None else judged.period, len(factors)))
+    total = whole.sum(axis=1)
+    values, errors, total_error = np.full(2, np.nan), np.full(2, np.nan), math.nan
+    dimension = math.nan, math.nan
+    if found.ok:
+        values = whole.mean(axis=0)
+        errors = np.array([standard_error(whole[:, k]) for k in (0, 1)])
+        total_error = standard_error(total)
+    if found.ok and found.smooth:
+        dimension = kaplan_yorke(whole)
+    return Lyapunov(
+        points=points,
+        exponents=values,
+        standard_errors=errors,
+        total=float(values.sum()),
+        total_error=total_error,
+        dimension=dimension[0],
+        dimension_error=dimension[1],
+        factors=factors,
+        smooth=found.smooth,
+        zero_one=zero_one(points) if len(points.x) >= FEWEST else None,
+    )
+
+
+def _points(train: Train, first: int, last: int, found: Exponent, tolerance: float) -> Strobe:
+    """Return the states that the tangent flow passed, judged."""
+    firing = np.arange(first, last + 1)
+    known = np.isfinite(found.states[:, 2])
+    states = States(
+        t=train.times(firing),
+        x=found.states[:, 0],
+        v=found.states[:, 1],
+        branch=np.where(known, np.nan_to_num(found.states[:, 2]), -1).astype(np.int64),
+        memory=found.states[:, 3],
+        status=found.status,
+    )
+    stopped = "" if found.ok else found.status
+    return Strobe(
+        hammer=train.hammer,
+        drive=train.drive,
+        period=train.period,
+        phase=0.0,
+        firing=firing,
+        t=states.t,
+        x=states.x,
+        v=states.v,
+        branch=states.branch,
+        memory=states.memory,
+        status=found.status,
+        tolerance=tolerance,
+        verdict=verdict(states.distances(train), (first, last), tolerance, found, stopped),
+    )

@@ -1,0 +1,266 @@
+"""Recurrence plots: when a motion comes back to where it was, and in what patterns.
+
+The recurrence matrix has a point at (i, j) where the states i and j lie within a threshold of each other.
+Its diagonal lines are stretches during which the motion repeats what it did before; its vertical ones,
+stretches during which it stays where it is. The quantities are those of N. Marwan, M. C. Romano, M. Thiel and
+J. Kurths, Phys. Rep. 438 (2007) 237, section 3.5.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.strobe.points import Strobe
+from printhammer.chaos.strobe.verdict import AGREEMENT
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.support.arrays import FloatArray
+
+MOST: Final = 4096
+"""Largest number of states; a matrix of so many squared has 16 million points."""
+
+RATE: Final = 0.05
+"""Recurrence rate unless a threshold is given."""
+
+SHORTEST: Final = 2
+"""Points from which on a row of them is a line."""
+
+_ROWS: Final = 256
+
+
+@dataclass(frozen=True)
+class Recurrence:
+    """A recurrence plot and what is counted in it.
+
+    Attributes
+    ----------
+    matrix : bool array, shape (n, n)
+        Whether two states lie within the threshold of each other.
+    threshold : float
+        Largest distance of states that count as the same, in units of the scales.
+    theiler : int
+        States less than so many places apart are not counted: 1 leaves out the main diagonal alone.
+    shortest : int
+        Points from which on a row of them is a line.
+    rate : float
+        Part of the counted pairs that recur.
+    determinism : float
+        Part of the recurring pairs that lie on diagonal lines; NaN where nothing recurs.
+    mean_diagonal : float
+        Mean length of the diagonal lines; NaN where there are none.
+    longest_diagonal : int
+        Length of the longest diagonal line, 0 where there is none; the main diagonal does not count. Its
+        inverse is the divergence.
+    entropy : float
+        Entropy of the lengths of the diagonal lines, nat.
+    laminarity : float
+        Part of the points that lie on vertical lines, the main diagonal among them.
+    trapping : float
+        Mean length of the vertical lines; NaN where there are none.
+    longest_vertical : int
+        Length of the longest vertical line, 0 where there is none.
+    """
+
+    matrix: npt.NDArray[np.bool_] = field(repr=False)
+    threshold: float
+    theiler: int
+    shortest: int
+    rate: float
+    determinism: float
+    mean_diagonal: float
+    longest_diagonal: int
+    entropy: float
+    laminarity: float
+    trapping: float
+    longest_vertical: int
+
+    @property
+    def quantities(self) -> dict[str, float]:
+        """The quantities by name."""
+        names = (
+            *("rate", "determinism", "mean_diagonal", "longest_diagonal", "entropy"),
+            *("laminarity", "trapping", "longest_vertical"),
+        )
+        return {name: getattr(self, name) for name in names}
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the matrix over `i` and `j`, the quantities in the attributes."""
+        import xarray as xr
+
+        meaning = {"units": "1", "long_name": "whether two states lie within the threshold of each other"}
+        attrs = {
+            "title": "recurrence plot",
+            "threshold": self.threshold,
+            "theiler": self.theiler,
+            "shortest": self.shortest,
+            **self.quantities,
+        }
+        return xr.Dataset({"recurs": (("i", "j"), self.matrix.astype(np.int8), meaning)}, attrs=attrs)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the plot with its quantities; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.recurrence").plot(self, **options)
+
+
+def recurrence(
+    states: npt.ArrayLike | Strobe,
+    *,
+    threshold: float | None = None,
+    rate: float | None = None,
+    scales: npt.ArrayLike | None = None,
+    theiler: SupportsIndex = 1,
+    shortest: SupportsIndex = SHORTEST,
+) -> Recurrence:
+    """Return the recurrence plot of a series of states, or of the points of a strobe.
+
+    Parameters
+    ----------
+    states : array or Strobe
+        One row for each state, or one number; at most 4096. Of strobe points: displacement, velocity
+        and memory of the pack.
+    threshold : float, optional
+        Largest distance of states that count as the same, in units of the scales. The distance is the largest
+        difference of a component.
+    rate : float, optional
+        Instead: the recurrence rate to have, from which the threshold follows; 0.05 where neither is given.
+        Where many distances are equal, the rate comes out larger; so it does for
+        strobe points that agree as closely as a verdict asks for.
+    scales : array, optional
+        By which the components are divided; by default the half-widths of the window of a strobe, and 1 for
+        other states.
+    theiler : int, optional
+        States less than so many places apart are not counted, so that a slow motion is no recurrence.
+    shortest : int, optional
+        Points from which on a row of them is a line.
+
+    Returns
+    -------
+    Recurrence
+        The matrix, and what is counted in it.
+
+    Raises
+    ------
+    InputError
+        Too many or too few states, states not finite, such as those of a strobe whose run ended early; both a
+        threshold and a rate; scales that do not fit.
+    """
+    rows, units = _rows(states, scales)
+    # Of a train that has settled only the noise of the arithmetic differs.
+    floor = AGREEMENT if isinstance(states, Strobe) and scales is None else 0.0
+    count = len(rows)
+    apart, least = read_count(theiler, "theiler"), read_count(shortest, "shortest")
+    if apart >= count:
+        raise InputError(f"theiler = {apart}, expected less than the number of states, {count}")
+    if threshold is not None and rate is not None:
+        raise InputError("threshold and rate are given, expected one of them")
+    scaled = rows / units
+    distances = _distances(scaled)
+    if threshold is None:
+        threshold = max(_threshold(distances, apart, RATE if rate is None else rate), floor)
+    elif not (math.isfinite(threshold) and threshold >= 0.0):
+        raise InputError(f"threshold = {threshold!r}, expected a number, not negative")
+    return counted(distances <= threshold, float(threshold), apart, least)
+
+
+def counted(matrix: npt.NDArray[np.bool_], threshold: float, theiler: int, shortest: int) -> Recurrence:
+    """Count the lines of a recurrence matrix.
+
+    Parameters
+    ----------
+    matrix : bool array, shape (n, n)
+        Symmetric, true on the main diagonal.
+    threshold, theiler, shortest
+        As for `Recurrence`.
+
+    Returns
+    -------
+    Recurrence
+        The matrix and its quantities.
+    """
+    count = len(matrix)
+    # The matrix is symmetric: one half of it has all diagonal lines.
+    diagonals = np.sort(
+        np.concatenate([run_lengths(matrix.diagonal(k)) for k in range(theiler, count)] or [np.zeros(0, int)])
+    )
+    verticals = np.sort(np.concatenate([run_lengths(column) for column in matrix.T]))
+    points = int(diagonals.sum())
+    pairs = (count - theiler) * (count - theiler + 1) // 2
+    lines, upright = diagonals[diagonals >= shortest], verticals[verticals >= shortest]
+    shares = np.unique(lines, return_counts=True)[1] / max(lines.size, 1)
+    return Recurrence(
+        matrix=matrix,
+        threshold=threshold,
+        theiler=theiler,
+        shortest=shortest,
+        rate=points / pairs,
+        determinism=float(lines.sum() / points) if points else math.nan,
+        mean_diagonal=float(lines.mean()) if lines.size else math.nan,
+        longest_diagonal=int(lines.max(initial=0)),
+        entropy=float(-(shares * np.log(shares)).sum()) if lines.size else 0.0,
+        laminarity=float(upright.sum() / verticals.sum()),
+        trapping=float(upright.mean()) if upright.size else math.nan,
+        longest_vertical=int(upright.max(initial=0)),
+    )
+
+
+def run_lengths(points: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """Return the lengths of the unbroken rows of true values, in order."""
+    steps = np.diff(np.concatenate([[0], points.astype(np.int8), [0]]))
+    return np.asarray(np.flatnonzero(steps == -1) - np.flatnonzero(steps == 1), dtype=np.int64)
+
+
+def _distances(scaled: FloatArray) -> FloatArray:
+    """Return the largest differences of a component of all pairs."""
+    count = len(scaled)
+    found = np.empty((count, count))
+    for first in range(0, count, _ROWS):
+        some = scaled[first : first + _ROWS, np.newaxis] - scaled[np.newaxis]
+        found[first : first + _ROWS] = np.abs(some).max(axis=2)
+    return found
+
+
+def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:
+    """Return the smallest threshold with which at least this part of the counted pairs recurs."""
+    if not 0.0 < rate <= 1.0:
+        raise InputError(f"rate = {rate!r}, expected a part of all pairs, above 0 up to 1")
+    pairs = distances[np.triu_indices(len(distances), theiler)]
+    wanted = max(math.ceil(rate * pairs.size), 1) - 1
+    return float(np.partition(pairs, wanted)[wanted])
+
+
+def _rows(states: npt.ArrayLike | Strobe, scales: npt.ArrayLike | None) -> tuple[FloatArray, FloatArray]:
+    """Return states, shape (n, m), and the scales of their components."""
+    if isinstance(states, Strobe):
+        rows = np.column_stack([states.x, states.v, states.memory])
+        units = states.window.half_widths[[0, 1, 0]]
+        if not np.isfinite(rows).all():
+            raise InputError(f"states: the run ended early ({states.status}), expected one that did not")
+    else:
+        try:
+            rows = np.array(states, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"states = {states!r}, expected numbers, a row for each state") from None
+        rows = rows[:, np.newaxis] if rows.ndim == 1 else rows
+        if rows.ndim != 2:
+            raise InputError(f"states: an array of shape {rows.shape}, expected a row for each state")
+        units = np.ones(rows.shape[1])
+    if not 2 <= len(rows) <= MOST:
+        raise InputError(f"states: {len(rows)} are given, expected 2 to {MOST}")
+    if not np.isfinite(rows).all():
+        raise InputError("states: not all are finite, expected finite numbers")
+    if scales is not None:
+        units = np.asarray(scales, dtype=np.float64)
+    if units.shape != (rows.shape[1],) or not (np.isfinite(units) & (units > 0.0)).all():
+        raise InputError(f"scales = {scales!r}, expected {rows.shape[1]} positive numbers")
+    return rows, units

@@ -1,0 +1,375 @@
+"""The 0-1 test: is a series of numbers chaotic or regular? A second opinion that needs no tangent flow.
+
+The numbers phi(1), phi(2), ... push a point about in a plane, each in a direction that turns on by an angle
+c,
+
+    p_c(n) = sum of phi(j) cos(j c),   q_c(n) = sum of phi(j) sin(j c),   j = 1 ... n.
+
+Where the series is regular the point stays within bounds; where it is chaotic it wanders off like a random
+walk, and its mean square displacement M_c(n) grows in proportion to n. The growth is measured by the
+correlation K_c of M_c(n) with n (G. A. Gottwald and I. Melbourne, Proc. R. Soc. Lond. A 460 (2004) 603; SIAM
+J. Appl. Dyn. Syst. 8 (2009) 129; the correlation method and its limits: same authors, Springer Lect. Notes
+Phys. 915 (2016) 221). K is the median over many angles, since at the few that resonate with the series a
+regular one walks away too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.strobe.points import Strobe
+from printhammer.chaos.strobe.verdict import AGREEMENT
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.support.arrays import FloatArray
+
+ANGLES: Final = 100
+"""Number of angles c unless told otherwise."""
+
+RANGE: Final = (math.pi / 5.0, 4.0 * math.pi / 5.0)
+"""Angles lie between these: nearer to 0 and pi short cycles resonate."""
+
+SEED: Final = 1983
+"""Seed of the angles unless told otherwise."""
+
+REGULAR: Final = 0.2
+CHAOTIC: Final = 0.8
+"""K up to which a series is regular, and from which on it is chaotic.
+
+K^2 is the part of the ups and downs of M_c(n) that a straight line accounts for: less than a twentieth, or
+about two thirds and more.
+"""
+
+FEWEST: Final = 100
+"""Least length of a series; the mean square displacement is taken up to a tenth of it."""
+
+SETTLING: Final = 0.5
+"""Changes die out that are smaller by this factor in the last quarter of a series than in the first."""
+
+LONGEST_CYCLE: Final = 64
+"""Largest number q after which a series may repeat itself; at most a quarter of its length."""
+
+CYCLES: Final = 5
+"""Growth counts as chaos where it is seen over so many cycles q; within one, any path may go away."""
+
+_CUT: Final = 10
+_PASSES: Final = 4
+_TOGETHER: Final = 1 << 20
+"""Complex numbers that are worked on together."""
+
+
+@dataclass(frozen=True)
+class ZeroOne:
+    """What the 0-1 test says of a series.
+
+    Attributes
+    ----------
+    k : float
+        Median of the correlations: near 0 for a regular series, near 1 for a chaotic one; NaN where the
+        series has gaps.
+    verdict : str
+        "regular" up to 0.2, "chaotic" from 0.8 on, else "undecided".
+    reason : str
+        Why the verdict is "undecided"; else empty.
+    length : int
+        Length of the series.
+    cycle : int
+        Number q after which the series most nearly repeats itself; the mean of each q-th number was taken
+        out.
+    resolution : float
+        Amplitude up to which changes of the series count as none, in its own unit.
+    seed : int
+        Seed of the angles.
+    angles : array, shape (m,)
+        The angles c, rad.
+    correlations : array, shape (m,)
+        K_c at each of them.
+    shown : int
+        Place of the angle whose correlation is the median; that which `displacement`, `p` and `q` are for.
+    displacement : array, shape (length // 10,)
+        Mean square displacement, corrected, after 1, 2, ... steps.
+    p, q : array, shape (length,)
+        The path in the plane.
+    """
+
+    k: float
+    verdict: str
+    reason: str
+    length: int
+    cycle: int
+    resolution: float
+    seed: int
+    angles: FloatArray = field(repr=False)
+    correlations: FloatArray = field(repr=False)
+    shown: int = field(repr=False)
+    displacement: FloatArray = field(repr=False)
+    p: FloatArray = field(repr=False)
+    q: FloatArray = field(repr=False)
+
+    @property
+    def phrase(self) -> str:
+        """The outcome in one line."""
+        # Without the sign of a zero.
+        k = round(self.k, 3) + 0.0
+        return f"K = {k:.3f}, median of {len(self.angles)} angles over {self.length} numbers"
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return correlations over `angle`, displacements over `step` and the path over `number`."""
+        import xarray as xr
+
+        data = {
+            "correlation": ("angle", self.correlations, {"units": "1", "long_name": "correlation K_c"}),
+            "displacement": (
+                "step",
+                self.displacement,
+                {"units": "unit of the series squared", "long_name": "mean square displacement, corrected"},
+            ),
+            "p": ("number", self.p, {"units": "unit of the series", "long_name": "path, first coordinate"}),
+            "q": ("number", self.q, {"units": "unit of the series", "long_name": "path, second coordinate"}),
+        }
+        coords = {
+            "angle": ("angle", self.angles, {"units": "rad", "long_name": "angle c"}),
+            "step": ("step", np.arange(1, len(self.displacement) + 1, dtype=np.int32)),
+            "number": ("number", np.arange(1, self.length + 1, dtype=np.int32)),
+        }
+        attrs = {
+            "title": "0-1 test for chaos",
+            "k": self.k,
+            "verdict": self.verdict,
+            "reason": self.reason,
+            "cycle": self.cycle,
+            "resolution": self.resolution,
+            "seed": self.seed,
+            "shown_angle": float(self.angles[self.shown]),
+        }
+        return xr.Dataset(data, coords=coords, attrs=attrs)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw path, mean square displacement and correlations; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.lyapunov").plot_zero_one(self, **options)
+
+
+def zero_one(
+    series: npt.ArrayLike | Strobe,
+    *,
+    resolution: float | None = None,
+    angles: SupportsIndex = ANGLES,
+    seed: int = SEED,
+) -> ZeroOne:
+    """Return what the 0-1 test says of a series, or of the displacements at the points of a strobe.
+
+    What repeats itself only makes M_c(n) oscillate, and hides slow growth. The test of 2009 takes out what
+    the mean adds, (mean)^2 (1 - cos n c)/(1 - cos c). Here the mean is taken out of the series itself, which
+    is the same in the limit and loses no digits; and of a series that nearly repeats itself every q numbers
+    the mean of each q-th one is, so that chaos within narrow bands is seen in short series too.
+
+    What is left of a series that has settled is the noise of the arithmetic, which wanders like chaos. So an
+    oscillation of the size of `resolution` is added, (resolution)^2 sin(n sqrt 2), as J. H. P. Dawes and M.
+    C. Freeland (2008, unpublished; see the review of 2016) do to damp weak noise: growth counts where it
+    exceeds that. A series whose changes die out is a transient, of which the test can say nothing.
+
+    Parameters
+    ----------
+    series : array or Strobe
+        At least 100 numbers; or strobe points, whose displacements are taken.
+    resolution : float, optional
+        Amplitude up to which changes count as none, in the unit of the series. By default 1e-12 of the
+        largest absolute value; for strobe points what also counts as agreement there, 1e-6 of the half-width
+        of the window.
+    angles : int, optional
+        Number of random angles.
+    seed : int, optional
+        Of the angles.
+
+    Returns
+    -------
+    ZeroOne
+        With a verdict; "undecided" for a strobe whose run ended early.
+
+    Raises
+    ------
+    InputError
+        The series is too short, has no shape (n,) or holds numbers that are not finite; the resolution is
+        negative.
+    """
+    many = read_count(angles, "angles")
+    stopped = ""
+    if isinstance(series, Strobe):
+        numbers = np.asarray(series.x, dtype=np.float64)
+        least = AGREEMENT * float(series.window.half_widths[0])
+        if not np.isfinite(numbers).all():
+            stopped = f"the run ended early: {series.status}"
+    else:
+        numbers = _numbers(series)
+        least = 1e-12 * float(np.abs(numbers).max(initial=0.0))
+    if numbers.size < FEWEST:
+        raise InputError(f"series: {numbers.size} numbers, expected at least {FEWEST}")
+    if resolution is not None:
+        if not (math.isfinite(resolution) and resolution >= 0.0):
+            raise InputError(f"resolution = {resolution!r}, expected a number, not negative")
+        least = float(resolution)
+    if seed < 0:
+        raise InputError(f"seed = {seed!r}, expected a whole number, not negative")
+    chosen = np.random.default_rng(seed).uniform(*RANGE, many)
+    length = numbers.size
+    if stopped:
+        unknown = np.full(length, np.nan)
+        none = np.full(many, np.nan)
+        return ZeroOne(
+            *(math.nan, "undecided", stopped, length, 1, least, seed, chosen, none, 0),
+            *(unknown[: length // _CUT], unknown, unknown),
+        )
+    cycle, rest = without_cycle(numbers, least)
+    found = np.concatenate(
+        [
+            _correlations(_displacements(_paths(rest, some), least))
+            for some in np.array_split(chosen, min(many, 1 + many * length // _TOGETHER))
+        ]
+    )
+    # The lower of the two in the middle, so that there is an angle which has it.
+    shown = int(np.argsort(found, kind="stable")[(many - 1) // 2])
+    path = _paths(rest, chosen[shown : shown + 1])
+    k = float(np.median(found))
+    verdict, reason = _judged(k, cycle, rest, least)
+    return ZeroOne(
+        k=k,
+        verdict=verdict,
+        reason=reason,
+        length=length,
+        cycle=cycle,
+        resolution=least,
+        seed=seed,
+        angles=chosen,
+        correlations=found,
+        shown=shown,
+        displacement=_displacements(path, least)[0],
+        p=path[0].real.copy(),
+        q=path[0].imag.copy(),
+    )
+
+
+def _judged(k: float, cycle: int, rest: FloatArray, resolution: float) -> tuple[str, str]:
+    """Return verdict and, where it is "undecided", the reason."""
+    if k <= REGULAR:
+        return "regular", ""
+    quarter = rest.size // 4
+    early, late = float(np.std(rest[:quarter])), float(np.std(rest[-quarter:]))
+    if early > resolution and late < SETTLING * early:
+        return "undecided", "the series has not settled: a longer transient may have to be left out"
+    if k < CHAOTIC:
+        return "undecided", f"K = {k:.2f} lies between {REGULAR:g} and {CHAOTIC:g}: a longer series may tell"
+    if rest.size // _CUT < CYCLES * cycle:
+        return "undecided", (
+            f"the series nearly repeats itself every {cycle} numbers; whether the rest is chaotic takes"
+            f" at least {_CUT * CYCLES * cycle} to tell"
+        )
+    return "chaotic", ""
+
+
+def _paths(rest: FloatArray, angles: FloatArray) -> npt.NDArray[np.complex128]:
+    turned = np.exp(1j * np.outer(angles, np.arange(1, rest.size + 1)))
+    return np.asarray(np.cumsum(rest * turned, axis=1))
+
+
+def _displacements(paths: npt.NDArray[np.complex128], resolution: float) -> FloatArray:
+    """Return mean square displacements up to a tenth of the length, weak noise damped."""
+    moved = mean_square_displacements(paths, paths.shape[1] // _CUT)
+    steps = np.arange(1, moved.shape[1] + 1)
+    return np.asarray(moved + resolution**2 * np.sin(math.sqrt(2.0) * steps))
+
+
+def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArray]:
+    """Return after how many numbers a series most nearly repeats itself, and what is left without that part.
+
+    Parameters
+    ----------
+    numbers : array, shape (n,)
+        The series.
+    resolution : float
+        Amplitude up to which changes count as none.
+
+    Returns
+    -------
+    cycle : int
+        The number q, 1 for the mean alone, whose q means are worth their number by the criterion of G.
+        Schwarz (Ann. Statist. 6 (1978) 461): n ln(variance left) + q ln(n) is least.
+    rest : array, shape (n,)
+        The series without the means of every q-th number.
+    """
+    worth = []
+    for q in range(1, min(LONGEST_CYCLE, numbers.size // _PASSES) + 1):
+        rest = _less_means(numbers, q)
+        variance = max(float((rest**2).sum()) / numbers.size + resolution**2, np.finfo(np.float64).tiny)
+        worth.append(numbers.size * math.log(variance) + q * math.log(numbers.size))
+    cycle = int(np.argmin(worth)) + 1
+    return cycle, _less_means(numbers, cycle)
+
+
+def _less_means(numbers: FloatArray, q: int) -> FloatArray:
+    rest = numbers.copy()
+    for start in range(q):
+        rest[start::q] -= rest[start::q].mean()
+    return rest
+
+
+def mean_square_displacements(paths: npt.NDArray[np.complex128], cut: int) -> FloatArray:
+    """Return mean |z(j + n) - z(j)|^2 over j, for n from 1 to `cut`, of each row z.
+
+    Parameters
+    ----------
+    paths : complex array, shape (m, N)
+        The paths.
+    cut : int
+        Largest number of steps; j runs over the first N - cut places, so that all means are of equally many.
+
+    Returns
+    -------
+    array, shape (m, cut)
+        In the unit of the paths squared.
+    """
+    many, count = paths.shape
+    first = count - cut
+    # |a - b|^2 = |a|^2 + |b|^2 - 2 Re a* b, and the sum of the last is a correlation.
+    size = 1 << (2 * count - 1).bit_length()
+    head = np.fft.fft(paths[:, :first], size)
+    crossed = np.fft.ifft(head.conj() * np.fft.fft(paths, size))[:, 1 : cut + 1].real
+    squares = np.concatenate([np.zeros((many, 1)), np.cumsum(np.abs(paths) ** 2, axis=1)], axis=1)
+    steps = np.arange(1, cut + 1)
+    moved = squares[:, steps + first] - squares[:, steps]
+    return np.asarray((moved + squares[:, [first]] - 2.0 * crossed) / first, dtype=np.float64)
+
+
+def _correlations(displacements: FloatArray) -> FloatArray:
+    """Return the correlation of each row with 1, 2, ...; 0 for a row that does not change at all."""
+    count = displacements.shape[1]
+    away = np.arange(count) - 0.5 * (count - 1)
+    rows = displacements - displacements.mean(axis=1, keepdims=True)
+    sizes = np.sqrt((away**2).sum() * (rows**2).sum(axis=1))
+    found: FloatArray = np.divide(
+        (rows * away).sum(axis=1), sizes, out=np.zeros(len(rows)), where=sizes > 0.0
+    )
+    return found
+
+
+def _numbers(series: npt.ArrayLike) -> FloatArray:
+    try:
+        numbers = np.array(series, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"series = {series!r}, expected numbers") from None
+    if numbers.ndim != 1:
+        raise InputError(f"series: an array of shape {numbers.shape}, expected one number after the other")
+    wrong = np.flatnonzero(~np.isfinite(numbers))
+    if wrong.size:
+        raise InputError(f"series: number {wrong[0] + 1} is {numbers[wrong[0]]}, expected finite numbers")
+    return numbers

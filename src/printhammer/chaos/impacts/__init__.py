@@ -1,0 +1,1 @@
+"""Impacts: Poincaré sections at the contacts, and the times between them."""

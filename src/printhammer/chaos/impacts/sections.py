@@ -1,0 +1,337 @@
+"""Impact maps: the state at each touch of the backstop or of the pack.
+
+At a touch the displacement is that of the surface. What decides all that follows is the velocity and the time
+since the last firing; from touch to touch these two are an iterated map, as the strobe is from firing to
+firing, only that here the armature tells when to look.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
+
+import numpy as np
+
+from printhammer.chaos.strobe.points import transient_of
+from printhammer.chaos.strobe.train import Train
+from printhammer.drive.input import MOST_PULSES, read_count, read_positive
+from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
+from printhammer.run.start import initial_state
+from printhammer.run.touches import touches_of
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+Surface = Literal["pack", "backstop"]
+SURFACES: Final = get_args(Surface)
+
+TOUCHES: Final = 1000
+"""Number of touches unless told otherwise."""
+
+_FIRINGS_A_TOUCH: Final = 10
+
+
+@dataclass(frozen=True)
+class Section:
+    """States of a hammer at the touches of a surface.
+
+    Attributes
+    ----------
+    hammer : Hammer
+        The hammer.
+    drive : Drive
+        The drive.
+    period : float
+        Time between firings, s.
+    surface : str
+        "pack" or "backstop".
+    first, last : int
+        Firings between which touches were looked for; the very first one is number 1.
+    t, v : array, shape (n,)
+        Time, s, and velocity, m/s, at each touch.
+    firing : int array, shape (n,)
+        Number of the latest firing at or before the touch.
+    since : array, shape (n,)
+        Time from that firing to the touch, s.
+    t_out, v_out : array, shape (n,)
+        Time, s, and velocity, m/s, at leaving; NaN where the contact is open at the end of the run.
+    wanted : int
+        Number of touches asked for; there are fewer where the surface is not touched often enough.
+    status : str
+        How the run ended.
+    tolerance : float
+        Tolerance of the integration.
+    """
+
+    hammer: Hammer
+    drive: Drive
+    period: float
+    surface: Surface
+    first: int
+    last: int
+    t: FloatArray = field(repr=False)
+    v: FloatArray = field(repr=False)
+    firing: npt.NDArray[np.int64] = field(repr=False)
+    since: FloatArray = field(repr=False)
+    t_out: FloatArray = field(repr=False)
+    v_out: FloatArray = field(repr=False)
+    wanted: int
+    status: str
+    tolerance: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run went as asked."""
+        return self.status == "ok"
+
+    @property
+    def per_firing(self) -> float:
+        """Mean number of touches from firing to firing; NaN where there was but one firing."""
+        fired = self.last - self.first
+        return int((self.firing < self.last).sum()) / fired if fired else float("nan")
+
+    @property
+    def remark(self) -> str:
+        """What there is to say of a section that has fewer touches than asked for; else empty."""
+        if len(self.t) == self.wanted:
+            return ""
+        why = "" if self.ok else f"; the run ended early: {self.status}"
+        return (
+            f"{len(self.t)} of {self.wanted} touches of the {self.surface} from firing {self.first} to"
+            f" {self.last}{why}"
+        )
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the touches come from: fingerprints, versions, tolerance."""
+        import numba
+
+        from printhammer import __version__
+
+        return {
+            "hammer": self.hammer.name,
+            "hammer_fingerprint": self.hammer.fingerprint,
+            "drive": repr(self.drive),
+            "drive_fingerprint": self.drive.fingerprint,
+            "period": self.period,
+            "surface": self.surface,
+            "first": self.first,
+            "last": self.last,
+            "wanted": self.wanted,
+            "status": self.status,
+            "tolerance": repr(self.tolerance),
+            "printhammer": __version__,
+            "numpy": np.__version__,
+            "numba": numba.__version__,
+        }
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the touches as a Dataset over `touch`, with units and provenance in the attributes."""
+        import xarray as xr
+
+        meanings = {
+            "t": ("s", "time of touch"),
+            "v": ("m/s", "velocity at touch"),
+            "since": ("s", "time since the last firing"),
+            "t_out": ("s", "time of leaving"),
+            "v_out": ("m/s", "velocity at leaving"),
+        }
+        data: dict[str, Any] = {
+            name: ("touch", getattr(self, name), {"units": unit, "long_name": meaning})
+            for name, (unit, meaning) in meanings.items()
+        }
+        number = {"units": "1", "long_name": "number of the latest firing"}
+        data["firing"] = ("touch", self.firing.astype(np.int32), number)
+        coords = {"touch": ("touch", np.arange(1, len(self.t) + 1, dtype=np.int32))}
+        title = f"touches of the {self.surface} by {self.hammer.name}, fired every {self.period:.9g} s"
+        return xr.Dataset(data, coords=coords, attrs={"title": title, **self.provenance})
+
+    def plot(self, **options: Any) -> Any:
+        """Draw velocity against time since the last firing; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.sections").plot(self, **options)
+
+
+def section(
+    hammer: Hammer,
+    *,
+    surface: Surface = "backstop",
+    period: float | str | None = None,
+    rate: float | str | None = None,
+    touches: SupportsIndex = TOUCHES,
+    transient: SupportsIndex = 0,
+    firings: SupportsIndex | None = None,
+    waveform: Waveform | None = None,
+    drive: Drive | None = None,
+    overlap: Overlap = "add",
+    state: tuple[float, float] | None = None,
+    tolerance: float = TOLERANCE,
+) -> Section:
+    """Return the state of a hammer at each touch of its backstop, or of the pack.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    surface : str, optional
+        "backstop" or "pack".
+    period, rate : float or str
+        Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is taken as well.
+    touches : int, optional
+        Number of touches.
+    transient : int, optional
+        Number of firings left out before the first touch.
+    firings : int, optional
+        Number of firings after which to give up looking; by default ten for each touch asked for.
+    waveform, drive, overlap, state
+        As for `printhammer.strobe`.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+
+    Returns
+    -------
+    Section
+        With a status; a run that could not go on, or has too few touches, is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; the hammer has no such surface, no waveform or no rest
+        state.
+    """
+    if drive is None and (period is None) == (rate is None):
+        raise InputError("period and rate: expected one of them, the time between firings or its inverse")
+    if drive is not None and (period is not None or rate is not None or waveform is not None):
+        raise InputError("drive is given, expected no period, rate or waveform beside it")
+    spacing = None
+    if period is not None:
+        spacing = read_positive(period, "s", "period")
+    elif rate is not None:
+        spacing = 1.0 / read_positive(rate, "Hz", "rate")
+    counts = _counts(touches, transient, firings)
+    check_tolerance(tolerance)
+    train = Train.of(
+        hammer, spacing, counts[1] + counts[2], waveform=waveform, drive=drive, overlap=overlap, state=state
+    )
+    return _section(train, surface, counts, tolerance)
+
+
+def sections(
+    hammers: Hammer | Sequence[Hammer],
+    periods: Sequence[float | str] | npt.ArrayLike,
+    *,
+    surface: Surface = "backstop",
+    touches: SupportsIndex = TOUCHES,
+    transient: SupportsIndex = 0,
+    firings: SupportsIndex | None = None,
+    waveform: Waveform | None = None,
+    overlap: Overlap = "add",
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[Section]:
+    """Return the sections of many trains from rest, computed on all cores; see `section`.
+
+    Parameters
+    ----------
+    hammers : Hammer or sequence of Hammer
+        One for all trains, or one for each.
+    periods : sequence
+        Times between firings, s or text with a unit, one for each train.
+    surface, touches, transient, firings, waveform, overlap, tolerance
+        As for `section`, for all trains.
+    threads : int, optional
+        By default as many as there are cores; the touches do not depend on it.
+    progress : callable, optional
+        Called now and then with the number of trains that are done and of all.
+
+    Returns
+    -------
+    list of Section
+        One for each train.
+
+    Raises
+    ------
+    InputError
+        As for `section`, or numbers of hammers and periods that do not fit together.
+    """
+    given: list[Any] = list(periods) if np.ndim(periods) else [periods]  # type: ignore[arg-type]
+    spacings = [read_positive(period, "s", "period") for period in given]
+    many = [hammers] * len(spacings) if isinstance(hammers, Hammer) else list(hammers)
+    if len(many) != len(spacings):
+        raise InputError(f"hammers: {len(many)} are given, expected 1 or {len(spacings)}")
+    counts = _counts(touches, transient, firings)
+    check_tolerance(tolerance)
+    trains = [
+        Train.of(hammer, spacing, counts[1] + counts[2], waveform=waveform, overlap=overlap)
+        for hammer, spacing in zip(many, spacings, strict=True)
+    ]
+    found: dict[int, Section] = {}
+
+    def work(begin: int, end: int) -> None:
+        for i in range(begin, end):
+            found[i] = _section(trains[i], surface, counts, tolerance)
+
+    in_threads([work], [len(trains)], thread_count(threads), progress)
+    return [found[i] for i in range(len(trains))]
+
+
+def _counts(
+    touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
+) -> tuple[int, int, int]:
+    """Return the numbers of touches, of firings left out, and of firings after which to give up."""
+    wanted, skipped = read_count(touches, "touches"), transient_of(transient)
+    room = MOST_PULSES - skipped - 1
+    limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
+    if not 1 <= limit <= room:
+        raise InputError(
+            f"firings = {limit} after a transient of {skipped}, expected at most {MOST_PULSES - 1} together"
+        )
+    return wanted, skipped, limit
+
+
+def _section(train: Train, surface: Surface, counts: tuple[int, int, int], tolerance: float) -> Section:
+    wanted, skipped, limit = counts
+    if surface not in SURFACES:
+        raise InputError(f"surface = {surface!r}, expected {' or '.join(SURFACES)}")
+    if getattr(train.hammer, surface) is None:
+        raise InputError(f"surface = {surface!r}: the hammer {train.hammer.name!r} has no {surface}")
+    state = initial_state(train.hammer, train.state)
+    problem = Problem(train.hammer, train.drive, state, 0.0, tolerance)
+    firing = np.arange(1, skipped + limit + 2)
+    times = train.times(firing)
+    found = touches_of(problem, surface, float(times[skipped]), float(times[-1]), wanted)
+    t, v, t_out, v_out = found.rows.T.copy()
+    latest = np.searchsorted(times, t, side="right") - 1
+    # Touches are looked for up to the last one found, or as far as the run got.
+    until = t[-1] if len(t) == wanted else found.reached
+    return Section(
+        hammer=train.hammer,
+        drive=train.drive,
+        period=train.period,
+        surface=surface,
+        first=skipped + 1,
+        last=max(int(np.searchsorted(times, until, side="right")), skipped + 1),
+        t=t,
+        v=v,
+        firing=firing[latest],
+        since=t - times[latest],
+        t_out=t_out,
+        v_out=v_out,
+        wanted=wanted,
+        status=found.status,
+        tolerance=tolerance,
+    )

@@ -1,0 +1,290 @@
+"""Guesses of periodic orbits: stretches of motions that nearly come back to where they began.
+
+Close returns of a recorded motion lie near unstable orbits (D. Auerbach et al., Phys. Rev. Lett. 58 (1987)
+2387). Here the record is one long train from rest, and many short ones from states spread evenly over the
+plane, so that orbits which no train from rest comes near are found too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.chaos.strobe.map import WITH_MEMORY, front_with_memory
+from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.run.ensemble import Ensemble
+from printhammer.run.problem import TOLERANCE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.chaos.orbits.newton import Closing
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+
+PHASES: Final = (0.0, 0.5)
+"""Sections at which orbits are looked for; the second one where the first falls into the pack."""
+
+_ALIKE: Final = 0.02
+"""Distance, in half-widths, up to which guesses count as the same."""
+_EARLY_ALIKE: Final = 0.1
+"""The same for those that begin early, so that they lie all over the plane."""
+_LOOKED_AT: Final = 4000
+"""Returns that are looked at, closest first, for guesses that are not alike."""
+_EARLY: Final = 2
+"""Firings of a record that count as early."""
+_ROOM: Final = 1.2
+_SCALES: Final = 6.0
+_PLASTIC: Final = 1.324717957244746
+"""The real root of x^3 = x + 1, whose powers spread points evenly over a square."""
+
+
+@dataclass(frozen=True)
+class Records:
+    """States of many motions at the sections, from one on.
+
+    Attributes
+    ----------
+    phase : float
+        Of the section.
+    states : array, shape (M, n, 2)
+        Displacement, m, and velocity, m/s; NaN where a run did not get.
+    usable : bool array, shape (M, n)
+        Whether that is the whole state.
+    """
+
+    phase: float
+    states: FloatArray
+    usable: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A stretch of a motion that nearly closes.
+
+    Attributes
+    ----------
+    phase : float
+        Of the section.
+    states : array, shape (m, 2)
+        States at the starts of the segments.
+    firings : int array, shape (m,)
+        Number of firings in each.
+    """
+
+    phase: float
+    states: FloatArray
+    firings: npt.NDArray[np.int64]
+
+
+def record(
+    regime: Regime, starts: FloatArray, firings: int, long: int, threads: int | None = None
+) -> list[Records]:
+    """Follow a hammer from rest for a long time and from other states for a short one.
+
+    Parameters
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    starts : array, shape (M, 2)
+        Displacements, m, and velocities, m/s, at a firing; the first one is followed for the long time.
+    firings, long : int
+        Number of firings of the short and the long time.
+    threads : int, optional
+        By default as many as there are cores.
+
+    Returns
+    -------
+    list of Records
+        One for each of `PHASES`.
+    """
+    longest = max(firings, long) if len(starts) else 0
+    drive, _ = regime.train(longest + 1)
+    moments = {phase: regime.moments(drive, longest, phase) for phase in PHASES}
+    counts = np.where(np.arange(len(starts)) == 0, long, firings)
+    times = np.sort(np.concatenate([*moments.values()]))
+    ends = moments[PHASES[-1]][counts]
+    result = Ensemble(
+        regime.hammer,
+        drive,
+        ends,
+        states=starts,
+        starts=float(moments[0.0][0]),
+        tolerance=TOLERANCE,
+    ).run(strobes=[times[times <= end] for end in ends], threads=threads)
+    table = result.strobes
+    assert table is not None
+    found = []
+    for phase, own in moments.items():
+        columns = np.searchsorted(times, own)
+        x, v, branch = (part[:, columns] for part in (table.x, table.v, table.branch))
+        out = (x > front_with_memory(regime.hammer)) & (v <= 0.0)
+        usable = np.isfinite(x) & ~np.isin(branch, WITH_MEMORY) & ~out
+        found.append(Records(phase, np.stack([x, v], axis=2), usable))
+    return found
+
+
+def spread(regime: Regime, count: int, seen: FloatArray) -> FloatArray:
+    """Return states spread evenly: half of them over the window, half over all that a motion visits.
+
+    Where the way is not bounded by both backstop and pack, the latter is no smaller than six times the scales
+    of the motion, which then are the half-widths of the window: a ball that bounces once a period rises five
+    of them high.
+
+    Parameters
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    count : int
+        Number of states.
+    seen : array, shape (n, 2)
+        States of a motion at the sections.
+
+    Returns
+    -------
+    array, shape (count, 2)
+        Displacement, m, and velocity, m/s.
+    """
+    window = regime.window
+    low, high = np.array([window.x[0], window.v[0]]), np.array([window.x[1], window.v[1]])
+    known = seen[np.isfinite(seen).all(axis=1)]
+    wide_low, wide_high = low.copy(), high.copy()
+    if len(known):
+        middle, half = 0.5 * (known.max(axis=0) + known.min(axis=0)), 0.5 * np.ptp(known, axis=0)
+        wide_low = np.minimum(low, middle - _ROOM * half)
+        wide_high = np.maximum(high, middle + _ROOM * half)
+    if regime.hammer.front is not None:
+        wide_high[0] = max(wide_high[0], regime.hammer.front)
+    if regime.hammer.front is None or regime.hammer.position is None:
+        reach = _SCALES * window.half_widths
+        wide_low = np.minimum(wide_low, np.array([regime.hammer.origin, 0.0]) - reach)
+        wide_high = np.maximum(wide_high, np.array([regime.hammer.origin, 0.0]) + reach)
+    wide_high[1] = max(wide_high[1], -wide_low[1])
+    wide_low[1] = -wide_high[1]
+    number = np.arange(1, count + 1)[:, np.newaxis]
+    share = (0.5 + number * np.array([1.0 / _PLASTIC, 1.0 / _PLASTIC**2])) % 1.0
+    odd = (number % 2).astype(bool)
+    states: FloatArray = np.where(odd, wide_low + share * (wide_high - wide_low), low + share * (high - low))
+    least, most = _domain(regime.hammer)
+    states[:, 0] = np.clip(states[:, 0], least, most)
+    return states
+
+
+def _domain(hammer: Hammer) -> tuple[float, float]:
+    """Return between which displacements a motion may begin, m."""
+    low, high = hammer.magnet.domain if hammer.magnet is not None else (-np.inf, np.inf)
+    if hammer.backstop is not None and hammer.backstop.law == "rigid":
+        low = max(low, hammer.backstop.position)
+    return low, high
+
+
+def first_state(regime: Regime) -> tuple[float, float]:
+    """Return the rest state of the hammer, or where it has none, the middle of its window."""
+    try:
+        return rest_state(regime.hammer), 0.0
+    except InputError:
+        window = regime.window
+        return 0.5 * (window.x[0] + window.x[1]), 0.0
+
+
+def close_returns(records: Records, period: int, most: int, scales: FloatArray) -> list[Guess]:
+    """Return the closest returns of records after so many firings that are not alike.
+
+    Parameters
+    ----------
+    records : Records
+        Of many motions.
+    period : int
+        Number of firings.
+    most : int
+        Largest number of guesses.
+    scales : array, shape (2,)
+        Half-widths of the window.
+
+    Returns
+    -------
+    list of Guess
+        The first half are the closest of all, the others the closest of those that begin early.
+    """
+    scaled = records.states / scales
+    count = scaled.shape[1] - period
+    if count <= 0:
+        return []
+    gap = np.abs(scaled[:, period:] - scaled[:, :count]).max(axis=2)
+    gap = np.where(records.usable[:, period:] & records.usable[:, :count], gap, np.inf)
+    # Late returns lie close to what attracts, early ones everywhere.
+    early = gap.copy()
+    early[:, _EARLY:] = np.inf
+    found: list[Guess] = []
+    kept = np.empty((most, period, 2))
+    for among, up_to, apart in ((gap, most - most // 2, _ALIKE), (early, most, _EARLY_ALIKE)):
+        flat = among.reshape(-1)
+        known = int(np.isfinite(flat).sum())
+        for place in np.argsort(flat, kind="stable")[: min(known, _LOOKED_AT)]:
+            if len(found) == up_to:
+                break
+            member, first = divmod(int(place), count)
+            cycle = scaled[member, first : first + period]
+            if _is_new(cycle, kept[: len(found)], apart):
+                kept[len(found)] = cycle
+                found.append(_guess(records, member, first, period))
+    return found
+
+
+def joined(
+    shorter: Sequence[Closing], phase: float, period: int, most: int, scales: FloatArray
+) -> list[Guess]:
+    """Return guesses made of two shorter orbits, one run through after the other.
+
+    Parameters
+    ----------
+    shorter : sequence of Closing
+        Orbits of fewer firings.
+    phase : float
+        Of the section.
+    period : int
+        Number of firings.
+    most : int
+        Largest number of guesses.
+    scales : array, shape (2,)
+        Half-widths of the window.
+
+    Returns
+    -------
+    list of Guess
+        Those with the smallest jump from one orbit to the other first.
+    """
+    found: list[tuple[float, Guess]] = []
+    for k, one in enumerate(shorter):
+        for other in shorter[:k]:
+            if int(one.firings.sum() + other.firings.sum()) != period:
+                continue
+            gaps = np.abs((one.states[:, np.newaxis] - other.states) / scales).max(axis=2)
+            here, there = (int(place) for place in np.unravel_index(np.argmin(gaps), gaps.shape))
+            states = [np.roll(one.states, -here, axis=0), np.roll(other.states, -there, axis=0)]
+            firings = [np.roll(one.firings, -here), np.roll(other.firings, -there)]
+            guess = Guess(phase, np.concatenate(states), np.concatenate(firings))
+            found.append((float(gaps[here, there]), guess))
+    return [guess for _gap, guess in sorted(found, key=lambda pair: pair[0])[:most]]
+
+
+def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
+    """Tell whether a cycle is none of others, whichever of its states comes first."""
+    if not len(kept):
+        return True
+    return all(
+        float(np.abs(kept - np.roll(cycle, shift, axis=0)).max(axis=(1, 2)).min()) > apart
+        for shift in range(len(cycle))
+    )
+
+
+def _guess(records: Records, member: int, first: int, period: int) -> Guess:
+    starts = np.flatnonzero(records.usable[member, first : first + period])
+    lengths = np.diff(np.append(starts, period))
+    return Guess(records.phase, records.states[member, first + starts], lengths.astype(np.int64))

@@ -1,0 +1,150 @@
+"""Images of many states under the strobe map, in two ways: exact with the tangent flow, or fast side by side.
+
+The fast way integrates three neighbours of each state together with those of all others, and takes the
+derivative from their differences: good enough for Newton's method to come close.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.chaos.orbits.newton import CLOSED, Images
+from printhammer.chaos.strobe.map import IN_PACK, WITH_MEMORY, image_of, usable
+from printhammer.errors import InputError
+from printhammer.run.ensemble import Ensemble
+from printhammer.run.start import initial_state
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+
+RANGE_LEFT: Final = "range left"
+_SPACING: Final = 1e-5
+"""Distance of neighbours, in half-widths of the window."""
+_PIECE: Final = 30_000
+"""States that are integrated together at most, which bounds the memory."""
+
+
+class ExactMaps:
+    """Images with derivatives from the tangent flow, one at a time in threads.
+
+    Parameters
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    phase : float
+        Of the section.
+    tolerance : float
+        Of the integration.
+    threads : int, optional
+        By default as many as there are cores.
+    """
+
+    def __init__(self, regime: Regime, phase: float, tolerance: float, threads: int | None = None) -> None:
+        self.regime, self.phase, self.tolerance = regime, phase, tolerance
+        self.threads = thread_count(threads)
+
+    def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
+        """Return the images of states, each after its own number of firings."""
+        found = Images.empty(len(states))
+
+        def work(begin: int, end: int) -> None:
+            for i in range(begin, end):
+                image = image_of(
+                    self.regime, states[i], int(firings[i]), self.phase, self.tolerance, contacts=False
+                )
+                found.states[i], found.jacobians[i] = image.state, image.jacobian
+                found.smooth[i] = image.smooth
+                found.reasons[i] = CLOSED if image.ok else image.status
+
+        in_threads([work], [len(states)], self.threads)
+        return found
+
+
+class FastMaps:
+    """Images with derivatives from differences, in an ensemble.
+
+    Parameters
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    phase : float
+        Of the section.
+    tolerance : float
+        Of the integration.
+    longest : int
+        Largest number of firings.
+    threads : int, optional
+        By default as many as there are cores; the images do not depend on it.
+    """
+
+    def __init__(
+        self, regime: Regime, phase: float, tolerance: float, longest: int, threads: int | None = None
+    ) -> None:
+        self.regime, self.tolerance, self.threads = regime, tolerance, threads
+        self.drive, _ = regime.train(longest)
+        self.moments = regime.moments(self.drive, longest, phase)
+        self.scales = regime.window.half_widths
+
+    def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
+        """Return the images of states, each after its own number of firings."""
+        found = Images.empty(len(states))
+        step = _SPACING * self.scales
+        neighbours = states[:, np.newaxis] + np.array([[0.0, 0.0], [step[0], 0.0], [0.0, step[1]]])
+        allowed = np.array([all(self._possible(row) for row in three) for three in neighbours], np.bool_)
+        found.reasons[~allowed] = RANGE_LEFT
+        out = np.array(
+            [not all(usable(self.regime.hammer, x, v) for x, v in three) for three in neighbours], np.bool_
+        )
+        found.reasons[allowed & out] = IN_PACK
+        rows = np.flatnonzero(allowed & ~out)
+        for begin in range(0, len(rows), _PIECE // 3):
+            self._piece(rows[begin : begin + _PIECE // 3], neighbours, firings, found, step)
+        return found
+
+    def _possible(self, state: FloatArray) -> bool:
+        try:
+            initial_state(self.regime.hammer, (float(state[0]), float(state[1])))
+        except InputError:
+            return False
+        return True
+
+    def _piece(
+        self,
+        rows: npt.NDArray[np.int64],
+        neighbours: FloatArray,
+        firings: npt.NDArray[np.int64],
+        found: Images,
+        step: FloatArray,
+    ) -> None:
+        ends = np.repeat(self.moments[firings[rows]], 3)
+        ensemble = Ensemble(
+            self.regime.hammer,
+            self.drive,
+            ends,
+            states=neighbours[rows].reshape(-1, 2),
+            starts=float(self.moments[0]),
+            tolerance=self.tolerance,
+        )
+        result = ensemble.run(strobes=ends[:, np.newaxis], threads=self.threads)  # type: ignore[arg-type]
+        table = result.strobes
+        assert table is not None
+        shape = (len(rows), 3)
+        final = np.stack([table.x[:, 0].reshape(shape), table.v[:, 0].reshape(shape)], axis=2)
+        kept = np.isin(table.branch[:, 0].reshape(shape), WITH_MEMORY).any(axis=1)
+        names = np.array(result.status_names).reshape(shape)
+        stopped = ~result.ok.reshape(shape)
+        found.states[rows] = final[:, 0]
+        found.jacobians[rows] = np.stack(
+            [(final[:, 1 + k] - final[:, 0]) / step[k] for k in range(2)], axis=2
+        )
+        found.smooth[rows] = True
+        why = np.where(kept, IN_PACK, CLOSED)
+        first = np.argmax(stopped, axis=1)
+        failed = stopped.any(axis=1)
+        found.reasons[rows] = np.where(failed, names[np.arange(len(rows)), first], why)

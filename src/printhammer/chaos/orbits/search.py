@@ -1,0 +1,456 @@
+"""Search for periodic orbits, stable and unstable: guesses from motions, closed by Newton's method."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.orbits.guesses import PHASES, close_returns, first_state, joined, record, spread
+from printhammer.chaos.orbits.maps import ExactMaps, FastMaps
+from printhammer.chaos.orbits.newton import Closing, close_orbits
+from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, no_orbit, orbit_of
+from printhammer.chaos.strobe.map import MAP_TOLERANCE, check_phase
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+from printhammer.run.problem import TOLERANCE, check_tolerance
+from printhammer.run.regime import Regime
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.chaos.orbits.guesses import Guess, Records
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+LONGEST: Final = 8
+"""Largest number of firings of the orbits that are looked for unless told otherwise."""
+
+MOST_FIRINGS: Final = 64
+STARTS: Final = 1024
+GUESSES: Final = 48
+"""Number of states from which motions are followed, and of guesses for each number of firings."""
+
+_LONG: Final = 400
+"""Firings of the train from rest in which close returns are looked for."""
+_SAME: Final = 1e-6
+"""Distance, in half-widths of the window, up to which states of two orbits are one."""
+_FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
+_EXACT: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 8}
+_LONE: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 60}
+
+
+@dataclass(frozen=True)
+class Orbits:
+    """The periodic orbits that a search has found, and what became of the search.
+
+    That an orbit is not among them does not prove that there is none.
+
+    Attributes
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    found : tuple of Orbit
+        By number of firings; stable ones first.
+    longest : int
+        Largest number of firings that was looked for.
+    starts : int
+        Number of motions in which close returns were looked for.
+    guesses : tuple of int
+        Number of guesses for orbits of 1, 2, ... firings.
+    repeats : int
+        How many guesses led to an orbit that another one led to as well, or to one of fewer firings.
+    failures : mapping of str to int
+        How many guesses led nowhere, by reason.
+    tolerance : float
+        Of the integration.
+    """
+
+    regime: Regime
+    found: tuple[Orbit, ...]
+    longest: int
+    starts: int
+    guesses: tuple[int, ...]
+    repeats: int
+    failures: Mapping[str, int] = field(default_factory=dict)
+    tolerance: float = MAP_TOLERANCE
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def __iter__(self) -> Iterator[Orbit]:
+        return iter(self.found)
+
+    def __getitem__(self, place: int) -> Orbit:
+        return self.found[place]
+
+    @property
+    def stable(self) -> tuple[Orbit, ...]:
+        """Those that are stable."""
+        return tuple(orbit for orbit in self.found if orbit.kind == STABLE)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of orbits of each kind that there is."""
+        told = Counter(orbit.kind for orbit in self.found)
+        return {kind: told[kind] for kind in KINDS if told[kind]}
+
+    @property
+    def message(self) -> str:
+        """What was found and what became of the other guesses, in one line."""
+        what = ", ".join(f"{number} {kind}" for kind, number in self.counts.items())
+        count = len(self.found)
+        most = "1 firing" if self.longest == 1 else f"up to {self.longest} firings"
+        head = f"{count or 'no'} orbit{'' if count == 1 else 's'} of {most}"
+        tried = f"{sum(self.guesses)} guesses in motions from {self.starts} states"
+        ends = [f"{self.repeats} led to one of these again"] if self.repeats else []
+        ends += [f"{number}: {reason}" for reason, number in sorted(self.failures.items())]
+        return f"{head}{f' ({what})' if what else ''}; {tried}{': ' if ends else ''}{'; '.join(ends)}"
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the orbits come from: fingerprints, versions, tolerance, and the search."""
+        from printhammer.chaos.orbits.tables import provenance_of
+
+        return {
+            **provenance_of(self.regime, self.tolerance),
+            "longest": self.longest,
+            "starts": self.starts,
+            "guesses": list(self.guesses),
+            "repeats": self.repeats,
+            "failures": "; ".join(f"{number}: {reason}" for reason, number in sorted(self.failures.items())),
+            "search": self.message,
+        }
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the orbits as a Dataset over `orbit` and `firing`, with units and provenance."""
+        from printhammer.chaos.orbits.tables import orbits_dataset
+
+        return orbits_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the orbits in the plane of displacement and velocity; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.chaos.orbits").plot(self, **options)
+
+
+def orbits(
+    hammer: Hammer,
+    *,
+    period: float | str | None = None,
+    rate: float | str | None = None,
+    longest: SupportsIndex = LONGEST,
+    starts: SupportsIndex = STARTS,
+    guesses: SupportsIndex = GUESSES,
+    waveform: Waveform | None = None,
+    drive: Drive | None = None,
+    overlap: Overlap = "add",
+    tolerance: float = MAP_TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Orbits:
+    """Search for the periodic orbits of a hammer under a periodic drive, stable and unstable.
+
+    Motions from rest and from states spread over the plane are followed; where one nearly comes back to
+    where it was some firings before, Newton's method on the strobe map is tried. Nothing is left to chance:
+    the same search finds the same orbits, whatever the number of threads.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    period, rate : float or str
+        Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is taken as well.
+    longest : int, optional
+        Largest number of firings of an orbit, at most 64.
+    starts : int, optional
+        Number of states from which motions are followed beside that from rest.
+    guesses : int, optional
+        Number of guesses for each number of firings; at most as many again are made of shorter orbits that
+        are known by then.
+    waveform : Waveform, optional
+        What every firing does; by default the waveform of the hammer.
+    drive : Drive, optional
+        Instead of a waveform, period and rate: an endless force such as `printhammer.SineForce`.
+    overlap : str, optional
+        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
+    tolerance : float, optional
+        Error allowed in one step of the runs that the orbits are found with in the end.
+    threads : int, optional
+        By default as many as there are cores.
+    progress : callable, optional
+        Called now and then with the amount of work that is done and of all.
+
+    Returns
+    -------
+    Orbits
+        With a count of what became of the guesses; a search that finds nothing is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above.
+    """
+    regime = Regime.of(hammer, period=period, rate=rate, waveform=waveform, drive=drive, overlap=overlap)
+    return orbits_of(
+        regime,
+        longest=longest,
+        starts=starts,
+        guesses=guesses,
+        tolerance=tolerance,
+        threads=threads,
+        progress=progress,
+    )
+
+
+def orbits_of(
+    regime: Regime,
+    *,
+    longest: SupportsIndex = LONGEST,
+    starts: SupportsIndex = STARTS,
+    guesses: SupportsIndex = GUESSES,
+    tolerance: float = MAP_TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Orbits:
+    """Search for the periodic orbits of a regime; see `orbits`."""
+    most, several = read_count(longest, "longest"), read_count(guesses, "guesses")
+    count = read_count(starts, "starts")
+    if most > MOST_FIRINGS:
+        raise InputError(f"longest = {most}, expected at most {MOST_FIRINGS} firings")
+    check_tolerance(tolerance)
+    search = _Search(regime, most, several, tolerance, thread_count(threads), progress)
+    return search.run(count)
+
+
+def orbit(
+    regime: Regime,
+    state: npt.ArrayLike,
+    *,
+    firings: SupportsIndex = 1,
+    phase: float = 0.0,
+    tolerance: float = MAP_TOLERANCE,
+    threads: int | None = None,
+) -> Orbit:
+    """Return the periodic orbit near a strobe point.
+
+    Parameters
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    state : array, shape (2,)
+        Displacement, m, and velocity, m/s, at a section.
+    firings : int, optional
+        Number of firings after which the motion is to repeat.
+    phase : float, optional
+        Part of the period between a firing and the section. The armature must not be on its way out of the
+        pack there, where the state has a memory.
+    tolerance : float, optional
+        Error allowed in one step of the runs.
+    threads : int, optional
+        By default as many as there are cores.
+
+    Returns
+    -------
+    Orbit
+        Of fewer firings where the motion repeats after a divisor of theirs. With a status: that there is
+        none near is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above.
+    """
+    count, part = read_count(firings, "firings"), check_phase(phase)
+    check_tolerance(tolerance)
+    found = np.asarray(state, dtype=np.float64)
+    if found.shape != (2,) or not np.isfinite(found).all():
+        raise InputError(
+            f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
+        )
+    if count > MOST_FIRINGS:
+        raise InputError(f"firings = {count}, expected at most {MOST_FIRINGS}")
+    scales = regime.window.half_widths
+    states, images = [found], None
+    exact = ExactMaps(regime, part, tolerance, threads)
+    for _ in range(count - 1):
+        images = exact(states[-1][np.newaxis], np.ones(1, np.int64))
+        if images.reasons[0] or not np.isfinite(images.states).all():
+            break
+        states.append(images.states[0])
+    # Where a section in between falls into the pack, the orbit is closed as a whole.
+    segments = np.ones(count, np.int64) if len(states) == count else np.array([count])
+    guess = np.array(states[: len(segments)])
+    (closing,) = close_orbits(exact, guess[np.newaxis], segments[np.newaxis], scales, **_LONE)
+    if not closing.closed:
+        return no_orbit(regime, count, part, tolerance, closing.reason)
+    return orbit_of(regime, shortest(closing, scales), part, tolerance)
+
+
+def shortest(closing: Closing, scales: FloatArray) -> Closing:
+    """Return an orbit that is not the repeat of a shorter one."""
+    ends = np.cumsum(closing.firings)
+    total = int(ends[-1])
+    for k in range(1, len(closing.states)):
+        after = int(ends[k - 1])
+        gap = float(np.abs((closing.states[k] - closing.states[0]) / scales).max())
+        if total % after == 0 and gap <= _SAME:
+            return Closing(
+                closing.states[:k],
+                closing.firings[:k],
+                closing.jacobians[:k],
+                closing.residual,
+                closing.smooth,
+                closing.reason,
+            )
+    return closing
+
+
+class _Search:
+    """A search that is under way."""
+
+    def __init__(
+        self,
+        regime: Regime,
+        longest: int,
+        several: int,
+        tolerance: float,
+        threads: int,
+        progress: Progress | None,
+    ) -> None:
+        self.regime, self.longest, self.several = regime, longest, several
+        self.tolerance, self.threads, self.progress = tolerance, threads, progress
+        self.scales = regime.window.half_widths
+        self.failures: Counter[str] = Counter()
+        self.tried = [0] * longest
+        self.repeats = 0
+        self.done, self.all = 0, 1
+
+    def run(self, starts: int) -> Orbits:
+        rest = np.array([first_state(self.regime)])
+        self.all = 2 + 2 * self.longest
+        (seen, *_others) = record(self.regime, rest, 1, _LONG, self.threads)
+        begun = np.vstack([rest, spread(self.regime, starts, seen.states[0])])
+        records = record(self.regime, begun, 2 * self.longest, _LONG, self.threads)
+        self._tell(1)
+        closed: list[tuple[float, Closing]] = []
+        for place, (phase, kept) in enumerate(zip(PHASES, records, strict=True)):
+            inside = np.isfinite(records[0].states).all(axis=2) & ~records[0].usable
+            if place and not inside.any():
+                continue
+            closed += [(phase, closing) for closing in self._phase(phase, kept)]
+        self._tell(self.all - self.done - 1)
+        found = self._described(closed)
+        self._tell(1)
+        return Orbits(
+            self.regime,
+            tuple(found),
+            self.longest,
+            len(begun),
+            tuple(self.tried),
+            self.repeats,
+            dict(self.failures),
+            self.tolerance,
+        )
+
+    def _tell(self, more: int) -> None:
+        self.done += more
+        if self.progress is not None:
+            self.progress(self.done, self.all)
+
+    def _phase(self, phase: float, records: Records) -> list[Closing]:
+        """Return the different orbits through one section."""
+        fast = FastMaps(self.regime, phase, TOLERANCE, self.longest, self.threads)
+        different: list[Closing] = []
+        for period in range(1, self.longest + 1):
+            tried = close_returns(records, period, self.several, self.scales)
+            tried += joined(different, phase, period, self.several, self.scales)
+            self.tried[period - 1] += len(tried)
+            for closing in _closed(fast, tried, self.scales, _FAST):
+                if closing.closed:
+                    self._add(different, shortest(closing, self.scales))
+                else:
+                    self.failures[closing.reason] += 1
+            self._tell(1)
+        exact = ExactMaps(self.regime, phase, self.tolerance, self.threads)
+        refined: list[Closing] = []
+        for closing in _closed(exact, different, self.scales, _EXACT):
+            if closing.closed:
+                self._add(refined, shortest(closing, self.scales))
+            else:
+                self.failures[closing.reason] += 1
+        return refined
+
+    def _add(self, different: list[Closing], closing: Closing) -> None:
+        """Add an orbit unless it is among them: orbits that share a state are one."""
+        for k, other in enumerate(different):
+            gaps = np.abs((other.states[:, np.newaxis] - closing.states) / self.scales).max(axis=2)
+            if gaps.min() <= _SAME:
+                self.repeats += 1
+                if closing.firings.sum() < other.firings.sum():
+                    different[k] = closing
+                return
+        different.append(closing)
+
+    def _described(self, closed: Sequence[tuple[float, Closing]]) -> list[Orbit]:
+        """Return all about the orbits, without those that were found at another section too."""
+        every: dict[int, Orbit] = {}
+
+        def work(begin: int, end: int) -> None:
+            for i in range(begin, end):
+                phase, closing = closed[i]
+                every[i] = orbit_of(self.regime, closing, phase, self.tolerance)
+
+        in_threads([work], [len(closed)], self.threads)
+        found: list[Orbit] = []
+        for i in range(len(closed)):
+            if not every[i].ok:
+                self.failures[every[i].status] += 1
+            elif any(self._same(every[i], other) for other in found):
+                self.repeats += 1
+            else:
+                found.append(every[i])
+        return sorted(found, key=lambda orbit: (orbit.firings, KINDS.index(orbit.kind), *orbit.x, *orbit.v))
+
+    def _same(self, one: Orbit, other: Orbit) -> bool:
+        if one.firings != other.firings:
+            return False
+        gaps = np.maximum(
+            np.abs(one.x[0] - other.x) / self.scales[0], np.abs(one.v[0] - other.v) / self.scales[1]
+        )
+        nearest = int(np.argmin(gaps))
+        memory = abs(one.memory[0] - other.memory[nearest]) / self.scales[0]
+        return bool(max(gaps[nearest], memory) <= _SAME and one.branch[0] == other.branch[nearest])
+
+
+def _closed(
+    maps: ExactMaps | FastMaps,
+    tried: Sequence[Guess] | Sequence[Closing],
+    scales: FloatArray,
+    options: Mapping[str, Any],
+) -> list[Closing]:
+    """Return what becomes of guesses, in their order; those with as many segments are closed together."""
+    found: dict[int, Closing] = {}
+    counts = [len(guess.firings) for guess in tried]
+    for segments in sorted(set(counts)):
+        rows = [i for i, count in enumerate(counts) if count == segments]
+        closings = close_orbits(
+            maps,
+            np.array([tried[i].states for i in rows]),
+            np.array([tried[i].firings for i in rows]),
+            scales,
+            **options,
+        )
+        found |= dict(zip(rows, closings, strict=True))
+    return [found[i] for i in range(len(tried))]

@@ -1,0 +1,352 @@
+"""The strobe map: from the state at one section to that some firings later, with its derivative.
+
+A section lies at a fixed phase of the period. There the state is displacement and velocity, unless the
+armature is just then in the pack on its way out: then what the pack remembers belongs to it too, and the
+image says "in the pack"; another phase of the period is to be chosen, at which that does not happen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.derivatives.states import follow
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+from printhammer.run.contacts import touches_of
+from printhammer.run.ensemble import MODE_NAMES
+from printhammer.run.problem import Problem, check_tolerance
+from printhammer.run.regime import Regime
+from printhammer.run.start import initial_state
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.problem import Record
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+__all__ = ["IN_PACK", "MAP_TOLERANCE", "Image", "Regime", "strobe_map", "strobe_maps", "strobe_slope"]
+
+MAP_TOLERANCE: Final = 1e-13
+"""Tolerance with which the map is computed: its noise limits how well a fixed point can be known."""
+
+IN_PACK: Final = "in the pack"
+"""Status where the state at a section has a memory of the pack beside displacement and velocity."""
+
+WITH_MEMORY: Final = tuple(
+    MODE_NAMES.index(name) for name in ("unloading", "reloading", "held on the unloading branch")
+)
+"""Modes whose state has a memory."""
+_OK: Final = "ok"
+_RANGE_LEFT: Final = "range left"
+_TURN_STEPS: Final = 60
+_STILL: Final = 1e-9
+"""Speed, in units of the typical one, below which an extremum is found: its place is exact to the square."""
+_SPACING: Final = 1e-4
+"""Relative change of a constant by which a slope is taken."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """What the strobe map makes of a state.
+
+    Attributes
+    ----------
+    state : array, shape (2,)
+        Displacement, m, and velocity, m/s, at the end; NaN unless the status is "ok".
+    jacobian : array, shape (2, 2)
+        Derivative of the state at the end with respect to that at the start, from the tangent flow; NaN
+        likewise.
+    status : str
+        "ok"; how the run ended otherwise; or "in the pack" where the state at the start or the end has a
+        memory.
+    smooth : bool
+        False where the motion passes a touch without velocity, where the state has no derivative.
+    contacts : tuple of (str, float)
+        Surface, "pack" or "backstop", and time of touch since the start, s, of every contact that begins in
+        between, in order; empty where they were not asked for.
+    margin : float
+        Signed nearness of a grazing, in units of the way from backstop to pack: of all local extrema of the
+        displacement, how far the one that is nearest to the pack's front or to the backstop's position lies
+        beyond it in its own direction, so that it passes through 0 where a contact appears, vanishes, parts
+        or merges. An impact on a rigid backstop counts with the square of its speed in units of the typical
+        speed. NaN where there is none, or where it was not asked for.
+    """
+
+    state: FloatArray
+    jacobian: FloatArray
+    status: str
+    smooth: bool
+    contacts: tuple[tuple[str, float], ...]
+    margin: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether the state came through."""
+        return self.status == _OK
+
+
+def strobe_map(
+    regime: Regime,
+    state: npt.ArrayLike,
+    *,
+    firings: int = 1,
+    phase: float = 0.0,
+    tolerance: float = MAP_TOLERANCE,
+    contacts: bool = True,
+) -> Image:
+    """Return the image of a state under the strobe map, iterated, with its derivative.
+
+    The pulses fired before the start are under way at it, as in a train that has always been fired.
+
+    Parameters
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    state : array, shape (2,)
+        Displacement, m, and velocity, m/s, at a section.
+    firings : int, optional
+        Number of periods.
+    phase : float, optional
+        Part of the period between a firing and the section, from 0 up to but not including 1.
+    tolerance : float, optional
+        Error allowed in one step of the run.
+    contacts : bool, optional
+        Whether to keep the contacts and the margin, which takes about a third of the time.
+
+    Returns
+    -------
+    Image
+        With a status; a run that could not go on, or a state where no force law holds, is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above.
+    """
+    count, part = read_count(firings, "firings"), check_phase(phase)
+    check_tolerance(tolerance)
+    found = np.asarray(state, dtype=np.float64)
+    if found.shape != (2,) or not np.isfinite(found).all():
+        raise InputError(
+            f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
+        )
+    return image_of(regime, found, count, part, tolerance, contacts=contacts)
+
+
+def strobe_maps(
+    regimes: Regime | Sequence[Regime],
+    states: npt.ArrayLike,
+    *,
+    firings: int = 1,
+    phase: float = 0.0,
+    tolerance: float = MAP_TOLERANCE,
+    contacts: bool = True,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[Image]:
+    """Return the images of many states, computed on all cores; see `strobe_map`.
+
+    Parameters
+    ----------
+    regimes : Regime or sequence of Regime
+        One for all states, or one for each.
+    states : array, shape (M, 2)
+        Displacements, m, and velocities, m/s.
+    firings, phase, tolerance, contacts
+        As for `strobe_map`, for all.
+    threads : int, optional
+        By default as many as there are cores; the images do not depend on it.
+    progress : callable, optional
+        Called now and then with the number of images that are done and of all.
+
+    Raises
+    ------
+    InputError
+        As for `strobe_map`, or numbers of regimes and states that do not fit together.
+    """
+    count, part = read_count(firings, "firings"), check_phase(phase)
+    check_tolerance(tolerance)
+    rows = np.asarray(states, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != 2 or not np.isfinite(rows).all():
+        raise InputError(f"states: shape {rows.shape}, expected rows of two finite numbers")
+    many = [regimes] * len(rows) if isinstance(regimes, Regime) else list(regimes)
+    if len(many) != len(rows):
+        raise InputError(f"regimes: {len(many)} are given, expected 1 or {len(rows)}")
+    found: dict[int, Image] = {}
+
+    def work(begin: int, end: int) -> None:
+        for i in range(begin, end):
+            found[i] = image_of(many[i], rows[i], count, part, tolerance, contacts=contacts)
+
+    in_threads([work], [len(rows)], thread_count(threads), progress)
+    return [found[i] for i in range(len(rows))]
+
+
+def strobe_slope(
+    regime: Regime,
+    name: str,
+    state: npt.ArrayLike,
+    *,
+    firings: int = 1,
+    phase: float = 0.0,
+    tolerance: float = MAP_TOLERANCE,
+) -> FloatArray:
+    """Return the derivative of the image of a state with respect to one constant, shape (2,), SI.
+
+    From the images at four neighbouring values, a difference of fourth order.
+
+    Parameters
+    ----------
+    regime : Regime
+        Hammer and periodic drive.
+    name : str
+        Of the constant, see `Regime.with_`.
+    state, firings, phase, tolerance
+        As for `strobe_map`.
+
+    Returns
+    -------
+    array
+        NaN where one of the four runs did not come through.
+
+    Raises
+    ------
+    InputError
+        As for `strobe_map`, or there is no such constant.
+    """
+    value = regime.value(name)
+    spacing = _SPACING * abs(value) or _SPACING
+    near, far = (
+        [
+            strobe_map(
+                regime.with_(name, value + sign * k * spacing),
+                state,
+                firings=firings,
+                phase=phase,
+                tolerance=tolerance,
+                contacts=False,
+            ).state
+            for sign in (-1.0, 1.0)
+        ]
+        for k in (1.0, 2.0)
+    )
+    return np.asarray((8.0 * (near[1] - near[0]) - (far[1] - far[0])) / (12.0 * spacing))
+
+
+def check_phase(phase: float) -> float:
+    """Return a phase of the period that is one.
+
+    Raises
+    ------
+    InputError
+        It is not from 0 up to but not including 1.
+    """
+    if not (math.isfinite(phase) and 0.0 <= phase < 1.0):
+        raise InputError(f"phase = {phase!r}, expected a part of the period from 0 up to but not including 1")
+    return float(phase)
+
+
+def image_of(
+    regime: Regime, state: FloatArray, firings: int, phase: float, tolerance: float, *, contacts: bool = True
+) -> Image:
+    """Do as `strobe_map` with arguments that are known to be right."""
+    train, _ = regime.train(firings)
+    moments = regime.moments(train, firings, phase)
+    try:
+        start = initial_state(regime.hammer, (float(state[0]), float(state[1])))
+    except InputError:
+        return _no_image(_RANGE_LEFT)
+    if not usable(regime.hammer, start[0], start[1]):
+        return _no_image(IN_PACK)
+    problem = Problem(regime.hammer, train, start, float(moments[0]), tolerance)
+    followed = follow(problem, moments[[0, -1]], np.eye(3), renormalise=False)
+    if followed.status_name != _OK:
+        return _no_image(followed.status_name)
+    if int(followed.found[-1, 2]) in WITH_MEMORY:
+        return _no_image(IN_PACK)
+    touched: tuple[tuple[str, float], ...] = ()
+    margin = math.nan
+    if contacts:
+        record = problem.run(float(moments[-1]))
+        touched = tuple((surface, t - float(moments[0])) for surface, t in touches_of(record))
+        margin = margin_of(problem, record)
+    return Image(
+        state=followed.found[-1, :2].copy(),
+        jacobian=followed.columns[:2, :2].copy(),
+        status=_OK,
+        smooth=followed.smooth,
+        contacts=touched,
+        margin=margin,
+    )
+
+
+def usable(hammer: Hammer, x: float, v: float) -> bool:
+    """Whether displacement, m, and velocity, m/s, alone are a state: not so on the way out of the pack."""
+    return not (v <= 0.0 and x > front_with_memory(hammer))
+
+
+def front_with_memory(hammer: Hammer) -> float:
+    """Return the front of the pack, m; infinite without a pack that has a memory."""
+    if hammer.pack is None or not getattr(import_module(hammer.pack.module), "MEMORY", False):
+        return math.inf
+    return hammer.pack.front
+
+
+def _no_image(status: str) -> Image:
+    return Image(np.full(2, np.nan), np.full((2, 2), np.nan), status, False, (), math.nan)
+
+
+def margin_of(problem: Problem, record: Record) -> float:
+    """Return the signed nearness of a grazing in a run, see `Image`."""
+    hammer, (way, speed) = problem.hammer, problem.scales
+    surfaces = [place for place in (hammer.position, hammer.front) if place is not None]
+    x, sign = _turns(problem, record)
+    found = [sign * (x - place) / way for place in surfaces]
+    nodes = record.nodes
+    rebound = (nodes[1:, 0] == nodes[:-1, 0]) & (nodes[:-1, 2] < 0.0) & (nodes[1:, 2] >= 0.0)
+    found.append((nodes[:-1, 2][rebound] / speed) ** 2)
+    every = np.concatenate(found)
+    return float(every[np.argmin(np.abs(every))]) if every.size else math.nan
+
+
+def _turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray]:
+    """Return the displacements of all local extrema, m, and 1 for a maximum, -1 for a minimum."""
+    nodes = record.nodes
+    before, after = nodes[:-1, 2], nodes[1:, 2]
+    rows = np.flatnonzero(
+        ((before * after < 0.0) | ((after == 0.0) & (before != 0.0))) & (nodes[1:, 0] > nodes[:-1, 0])
+    )
+    sign = np.sign(before[rows])
+    if not rows.size:
+        return np.zeros(0), sign
+    low, high = nodes[rows, 0].copy(), nodes[rows + 1, 0].copy()
+    f_low, f_high = before[rows].copy(), after[rows].copy()
+    time, kept = high.copy(), np.zeros(len(rows))
+    table = problem.resample(record, time)
+    # The method of false position, with the Illinois rule: the end that stays counts half.
+    for _ in range(_TURN_STEPS):
+        open_ = (np.abs(table[:, 1]) > _STILL * problem.scales[1]) & (high - low > 4.0 * np.spacing(high))
+        if not open_.any():
+            break
+        share = np.divide(f_low, f_low - f_high, out=np.full(len(rows), 0.5), where=f_low != f_high)
+        time = np.where(open_, low + share * (high - low), time)
+        table = problem.resample(record, time)
+        v = table[:, 1]
+        left = open_ & (v * sign > 0.0)
+        right = open_ & ~left
+        f_high = np.where(left & (kept < 0.0), 0.5 * f_high, f_high)
+        f_low = np.where(right & (kept > 0.0), 0.5 * f_low, f_low)
+        low, f_low = np.where(left, time, low), np.where(left, v, f_low)
+        high, f_high = np.where(right, time, high), np.where(right, v, f_high)
+        kept = np.where(left, -1.0, np.where(right, 1.0, kept))
+    return table[:, 0], sign

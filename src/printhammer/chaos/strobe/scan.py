@@ -1,0 +1,204 @@
+"""Verdicts on very many trains, by a shorter way to the same end.
+
+Most trains settle within a few firings, and need not be followed to firing 2000 to know what they do there. A
+train counts as periodic as soon as
+
+- its states q firings apart agree a hundred times closer than the verdict asks for, over a window of at least
+  2 q firings, and no smaller number of firings does as closely as the verdict asks for; and
+- a small change of the state dies out: the derivative of the state after q firings with respect to the state
+  before them has no eigenvalue beyond 0.99 in absolute value.
+
+Of a difference d that is left, what adds up later is then at most d / (1 - 0.99), which is within what the
+verdict asks for. All other trains are followed to firing 2000. Those without a period are strange if the
+exponent over three hundred firings on the attractor, from the state at firing 1001 on, is positive by five
+standard errors, more than the verdict asks for; where it is not, it is computed over firings 1001 to 2000.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.chaos.strobe.train import Train, exponents_of, run_trains
+from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, period_of, verdict
+from printhammer.drive.trains import PulseTrain
+from printhammer.run.problem import TOLERANCE
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.chaos.strobe.train import States
+    from printhammer.chaos.strobe.verdict import Verdict
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.threads import Progress
+
+STAGES: Final = (32, 128)
+"""Numbers of firings after which a train may count as periodic."""
+
+CLOSER: Final = 1e-2
+"""Part of the agreement asked for at which a train may count as periodic before its end."""
+
+LARGEST_MULTIPLIER: Final = 0.99
+"""Largest absolute value of an eigenvalue with which it does."""
+
+_BEFORE: Final = 100
+_SHORT: Final = 300
+_SURE: Final = 5.0
+"""Firings before an exponent counts, firings over which it does, standard errors that it takes."""
+
+
+def scan(
+    hammer: Hammer,
+    periods: npt.ArrayLike,
+    *,
+    tolerance: float = TOLERANCE,
+    exponents: bool = True,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[Verdict]:
+    """Return the verdicts on the trains of a hammer from rest, one for each period.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    periods : array
+        Times between firings, s.
+    tolerance : float, optional
+        As for `printhammer.simulate`.
+    exponents : bool, optional
+        Whether to compute exponents; without them, trains that have no period are left undecided.
+    threads : int, optional
+        By default as many as there are cores.
+    progress : callable, optional
+        Called now and then with the number of trains that are judged and of all.
+
+    Returns
+    -------
+    list of Verdict
+        The firings that a verdict names are those that it rests on: fewer than 1001 to 2000 where that is
+        enough, see the head of this module.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform or no rest state, or a period is not positive.
+    """
+    times = np.atleast_1d(np.asarray(periods, dtype=np.float64)).tolist()
+    found: dict[int, Verdict] = {}
+
+    def tell() -> None:
+        if progress is not None:
+            progress(len(found), len(times))
+
+    for last in STAGES:
+        left = [i for i in range(len(times)) if i not in found]
+        trains = [Train.of(hammer, times[i], last) for i in left]
+        window = (last // 2 + 1, last)
+        states, _ = run_trains(trains, np.arange(window[0], last + 1), 0.0, tolerance, None, threads=threads)
+        settled = _settled(trains, states, window, tolerance, threads)
+        found |= {i: judged for i, judged in zip(left, settled, strict=True) if judged is not None}
+        tell()
+    left = [i for i in range(len(times)) if i not in found]
+    trains = [Train.of(hammer, times[i], LAST) for i in left]
+    found |= dict(zip(left, _followed(trains, tolerance, exponents, threads), strict=True))
+    tell()
+    return [found[i] for i in range(len(times))]
+
+
+def _settled(
+    trains: Sequence[Train],
+    states: Sequence[States],
+    firings: tuple[int, int],
+    tolerance: float,
+    threads: int | None,
+) -> list[Verdict | None]:
+    """Return the verdicts on trains that have settled, None for the others."""
+    distances = [found.distances(train) for found, train in zip(states, trains, strict=True)]
+    closer: list[int | None] = []
+    for row, found in zip(distances, states, strict=True):
+        period = period_of(row)
+        done = period is not None and found.status == "ok" and row[period - 1] <= CLOSER * AGREEMENT
+        closer.append(period if done else None)
+    stable: dict[int, bool] = {}
+    candidates = [(i, period) for i, period in enumerate(closer) if period is not None]
+
+    def work(begin: int, end: int) -> None:
+        for i, period in candidates[begin:end]:
+            stable[i] = largest_multiplier(trains[i], states[i], period, tolerance) <= LARGEST_MULTIPLIER
+
+    in_threads([work], [len(candidates)], thread_count(threads))
+    return [
+        verdict(distances[i], firings, tolerance, None) if stable.get(i, False) else None
+        for i in range(len(trains))
+    ]
+
+
+def largest_multiplier(train: Train, states: States, period: int, tolerance: float) -> float:
+    """Return the largest absolute eigenvalue of the derivative of the state after a period by that before it.
+
+    Infinite where the period begins inside the pack, where the state has a memory, or the derivative is not
+    known.
+    """
+    from printhammer.derivatives.states import tangent_map
+
+    if _in_pack(train, states, -1):
+        return np.inf
+    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
+    waveform, overlap = train.drive.waveform, train.drive.overlap
+    cycle = PulseTrain(waveform, period=train.period, pulses=period, overlap=overlap)
+    found = tangent_map(
+        train.hammer,
+        cycle,
+        0.0,
+        period * train.period,
+        state=(float(states.x[-1]), float(states.v[-1])),
+        tolerance=tolerance,
+    )
+    if not found.ok or not found.smooth or found.matrix.shape != (2, 2):
+        return np.inf
+    return float(np.abs(np.linalg.eigvals(found.matrix)).max())
+
+
+def _followed(
+    trains: Sequence[Train], tolerance: float, exponents: bool, threads: int | None
+) -> list[Verdict]:
+    """Return the verdicts on trains that are followed to the end."""
+    judged = (FIRST, LAST)
+    states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), 0.0, tolerance, None, threads=threads)
+    distances = [found.distances(train) for found, train in zip(states, trains, strict=True)]
+    stopped = ["" if found.status == "ok" else found.status for found in states]
+    verdicts = {
+        i: verdict(row, judged, tolerance, None, why)
+        for i, (row, why) in enumerate(zip(distances, stopped, strict=True))
+        if why or not exponents or period_of(row) is not None
+    }
+    short = (_BEFORE + 1, _BEFORE + _SHORT + 1)
+    left = [i for i in range(len(trains)) if i not in verdicts]
+    # A start inside the pack would need its memory; such a train gets its exponent the long way.
+    on_it = [i for i in left if not _in_pack(trains[i], states[i], 0)]
+    begun = [_continued(trains[i], states[i], short[1]) for i in on_it]
+    for i, exponent in zip(on_it, exponents_of(begun, short, tolerance, threads=threads), strict=True):
+        if exponent.smooth and exponent.value > _SURE * exponent.standard_error:
+            verdicts[i] = verdict(distances[i], judged, tolerance, exponent)
+    left = [i for i in left if i not in verdicts]
+    for i, exponent in zip(
+        left, exponents_of([trains[i] for i in left], judged, tolerance, threads=threads), strict=True
+    ):
+        verdicts[i] = verdict(distances[i], judged, tolerance, exponent)
+    return [verdicts[i] for i in range(len(trains))]
+
+
+def _in_pack(train: Train, states: States, row: int) -> bool:
+    return train.hammer.front is not None and bool(states.x[row] > train.hammer.front)
+
+
+def _continued(train: Train, states: States, pulses: int) -> Train:
+    """Return a train that starts at the first of some states, as if nothing had been fired before."""
+    waveform, overlap = train.drive.waveform, train.drive.overlap
+    drive = PulseTrain(waveform, period=train.period, pulses=pulses, overlap=overlap)
+    return Train(train.hammer, drive, train.period, (float(states.x[0]), float(states.v[0])))

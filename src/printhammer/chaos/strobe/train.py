@@ -1,0 +1,247 @@
+"""Trains from rest to their last strobe point, together on all cores, and verdicts on them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Self
+
+import numpy as np
+
+from printhammer.chaos.strobe.verdict import period_of, repeats, verdict
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.run.ensemble import MODE_NAMES, Ensemble
+from printhammer.run.window import window_of
+from printhammer.support.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.chaos.strobe.verdict import Verdict
+    from printhammer.derivatives.states import Exponent
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+HELD_BRANCHES: Final = {
+    MODE_NAMES.index(f"held on the {branch} branch"): MODE_NAMES.index(branch)
+    for branch in ("loading", "unloading")
+}
+"""Branches of the pack on which the armature rests, and those that they are part of."""
+
+
+@dataclass(frozen=True)
+class Train:
+    """One hammer, fired again and again.
+
+    Attributes
+    ----------
+    hammer : Hammer
+        The hammer.
+    drive : Drive
+        The drive.
+    period : float
+        Time between firings, s.
+    state : tuple of float or None
+        Displacement, m, and velocity, m/s, at time 0; None for the rest state.
+    """
+
+    hammer: Hammer
+    drive: Drive
+    period: float
+    state: tuple[float, float] | None
+
+    @classmethod
+    def of(
+        cls,
+        hammer: Hammer,
+        period: float | None,
+        firings: int,
+        *,
+        waveform: Waveform | None = None,
+        drive: Drive | None = None,
+        overlap: Overlap = "add",
+        state: tuple[float, float] | None = None,
+    ) -> Self:
+        """Make a train of pulses, or of the periods of an endless force, for states up to a firing.
+
+        One more is fired: runs end there, so that no state depends on where that is.
+
+        Raises
+        ------
+        InputError
+            There is nothing to fire, or the drive is no endless force with a period.
+        """
+        if drive is not None:
+            if drive.period is None or math.isfinite(drive.waveform.support):
+                raise InputError(f"drive = {drive!r}, expected an endless force with a period")
+            return cls(hammer, drive, drive.period, state)
+        fired = hammer.waveform if waveform is None else waveform
+        if fired is None:
+            raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+        if period is None:
+            raise InputError("period is missing, expected the time between firings, s")
+        train = PulseTrain(fired, period=period, pulses=firings + 1, overlap=overlap)
+        return cls(hammer, train, period, state)
+
+    def times(self, firings: npt.NDArray[np.int64]) -> FloatArray:
+        """Return the times of firings, s, the very first one being number 1."""
+        if len(self.drive.times) > 1:
+            return np.asarray(self.drive.times[firings - 1], dtype=np.float64)
+        return np.asarray(self.drive.times[0] + self.period * (firings - 1.0), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class States:
+    """States of one train; see `printhammer.chaos.strobe.points.Strobe`."""
+
+    t: FloatArray
+    x: FloatArray
+    v: FloatArray
+    branch: npt.NDArray[np.int64]
+    memory: FloatArray
+    status: str
+
+    def distances(self, train: Train) -> FloatArray:
+        """Return how far the states are from repeating, see `printhammer.chaos.strobe.verdict.repeats`."""
+        width, speed = window_of(train.hammer, train.drive).half_widths
+        front = math.inf if train.hammer.front is None else train.hammer.front
+        branch = np.where(self.x > front, self.branch, 0)
+        for held, part_of in HELD_BRANCHES.items():
+            branch[branch == held] = part_of
+        return repeats(
+            np.column_stack([self.x, self.v, self.memory]),
+            branch,
+            np.array([width, speed, width]),
+        )
+
+
+def run_trains(
+    trains: Sequence[Train],
+    chosen: npt.NDArray[np.int64],
+    phase: float,
+    tolerance: float,
+    judged: tuple[int, int] | None,
+    *,
+    every_exponent: bool = False,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[list[States], list[Verdict | None]]:
+    """Run trains and judge them.
+
+    Parameters
+    ----------
+    trains : sequence of Train
+        The trains.
+    chosen : int array
+        Numbers of the firings whose states are wanted.
+    phase : float
+        Part of the period between a firing and its state.
+    tolerance : float
+        Of the integration.
+    judged : tuple of int or None
+        First and last firing for the verdict; None for no verdict.
+    every_exponent : bool, optional
+        Whether to compute the exponent of periodic trains too.
+    threads, progress
+        As for `printhammer.Ensemble.run`.
+
+    Returns
+    -------
+    states : list of States
+        At the chosen firings.
+    verdicts : list of Verdict or None
+        One for each train.
+    """
+    if not trains:
+        return [], []
+    total = len(trains)
+
+    def tell(done: int) -> None:
+        if progress is not None:
+            progress(done, total if judged is None else 2 * total)
+
+    firings = np.arange(judged[0], judged[1] + 1) if judged is not None else np.zeros(0, np.int64)
+    own = [train.times(chosen) + phase * train.period for train in trains]
+    theirs = [train.times(firings) for train in trains]
+    every = [np.union1d(mine, other) for mine, other in zip(own, theirs, strict=True)]
+    after = np.array([max(int(chosen.max(initial=1)), int(firings.max(initial=1))) + 1])
+    ends = [float(train.times(after)[0]) for train in trains]
+    given = [train.state for train in trains]
+    ensemble = Ensemble(
+        [train.hammer for train in trains],
+        [train.drive for train in trains],
+        ends,
+        states=None if None in given else np.array(given),
+        tolerance=tolerance,
+    )
+    result = ensemble.run(strobes=every, threads=threads, progress=lambda done, _all: tell(done))
+    table, names = result.strobes, result.status_names
+    assert table is not None
+
+    def at(i: int, times: FloatArray) -> States:
+        rows = np.searchsorted(every[i], times)
+        return States(
+            times,
+            table.x[i, rows].copy(),
+            table.v[i, rows].copy(),
+            table.branch[i, rows].copy(),
+            table.memory[i, rows].copy(),
+            names[i],
+        )
+
+    states = [at(i, times) for i, times in enumerate(own)]
+    if judged is None:
+        return states, [None] * total
+    seen = [at(i, times) for i, times in enumerate(theirs)]
+    stopped = [names[i] if result.reached[i] < theirs[i][-1] else "" for i in range(total)]
+    distances = [found.distances(train) for found, train in zip(seen, trains, strict=True)]
+    open_cases = [
+        i for i in range(total) if not stopped[i] and (every_exponent or period_of(distances[i]) is None)
+    ]
+    before = 2 * total - len(open_cases)
+    exponents = exponents_of(
+        [trains[i] for i in open_cases],
+        judged,
+        tolerance,
+        threads=threads,
+        progress=lambda done, _all: tell(before + done),
+    )
+    growth = dict(zip(open_cases, exponents, strict=True))
+    return states, [verdict(distances[i], judged, tolerance, growth.get(i), stopped[i]) for i in range(total)]
+
+
+def exponents_of(
+    trains: Sequence[Train],
+    firings: tuple[int, int],
+    tolerance: float,
+    *,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[Exponent]:
+    """Return the largest exponents of trains, from the first to the last of some firings, on all cores."""
+    from printhammer.derivatives.states import strobe_exponent
+
+    found: dict[int, Exponent] = {}
+
+    def work(begin: int, end: int) -> None:
+        for i in range(begin, end):
+            train = trains[i]
+            found[i] = strobe_exponent(
+                train.hammer,
+                train.drive,
+                train.period,
+                first=firings[0],
+                last=firings[1],
+                state=train.state,
+                tolerance=tolerance,
+            )
+
+    in_threads([work], [len(trains)], thread_count(threads), progress)
+    return [found[i] for i in range(len(trains))]

@@ -1,0 +1,248 @@
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+
+import printhammer as ph
+from printhammer.chaos import basin_entropy
+from printhammer.chaos.basins import attractors
+from printhammer.chaos.basins.attractors import Attractors
+from printhammer.chaos.basins.basins import FAILED, NO_STATE, UNDECIDED, Basins
+from printhammer.chaos.basins.tables import basins_table, save_basins
+from printhammer.chaos.bifurcation.columns import Columns
+from printhammer.run.regime import Regime
+
+PLANE = {"x": (20e-6, 260e-6, 9), "v": (-1.0, 1.0, 8)}
+LN2 = math.log(2.0)
+
+
+@pytest.fixture(scope="module")
+def two(hammer: "ph.Hammer") -> Basins:
+    """A train with two orbits of period 1."""
+    return ph.basins(hammer, period=1.3e-3, **PLANE)
+
+
+def test_every_cell_leads_where_its_train_does(hammer: "ph.Hammer", two: Basins) -> None:
+    assert [attractor.name for attractor in two.attractors] == ["period-1", "period-1"]
+    assert two.attractors[0].states[0, 0] < two.attractors[1].states[0, 0]
+    assert set(two.labels.flat) == {1, 2}
+    assert two.labels.shape == (8, 9)
+    half = two.regime.window.half_widths
+    for row, column in ((0, 0), (3, 4), (7, 8), (5, 1)):
+        state = two.x[column], two.v[row]
+        # Before the first firing that counts the train has been fired, so that its pulse is under way.
+        found = ph.bifurcation(hammer, periods=[1.3e-3], state=state, refine=0, firings=402, transient=400)
+        orbit = two.attractors[two.labels[row, column] - 1].states
+        end = np.array([found.x[0, 0, -1], found.v[0, 0, -1]])
+        assert np.abs((end - orbit[0]) / half).max() < 1e-5
+
+
+def test_shares_and_their_errors(two: Basins) -> None:
+    share, error = two.shares
+    assert share.sum() == pytest.approx(1.0)
+    assert share[0] == (two.labels == 1).sum() / 72
+    np.testing.assert_allclose(error, np.sqrt(share * (1.0 - share) / 72.0))
+    counts = two.counts
+    assert sum(counts.values()) == 72
+    assert (counts[UNDECIDED], counts[FAILED], counts[NO_STATE]) == (0, 0, 0)
+
+
+def test_the_result_does_not_depend_on_threads(hammer: "ph.Hammer", two: Basins) -> None:
+    alone = ph.basins(hammer, period=1.3e-3, threads=1, **PLANE)
+    np.testing.assert_array_equal(alone.labels, two.labels)
+    np.testing.assert_array_equal(alone.firings, two.firings)
+    for one, other in zip(alone.attractors, two.attractors, strict=True):
+        np.testing.assert_array_equal(one.states, other.states)
+
+
+def test_labels_do_not_depend_on_the_order_of_the_cells(hammer: "ph.Hammer", two: Basins) -> None:
+    # The last row alone: whatever attractor is met first, the numbers mean the same.
+    last = ph.basins(hammer, period=1.3e-3, x=PLANE["x"], v=(0.9, 1.0, 2))
+    np.testing.assert_array_equal(last.labels[-1], two.labels[-1])
+
+
+def test_a_strange_attractor_is_found_by_its_exponent(hammer: "ph.Hammer") -> None:
+    found = ph.basins(hammer, period=1.05e-3, x=(30e-6, 80e-6, 4), v=(-0.4, 0.4, 3))
+    (attractor,) = found.attractors
+    assert attractor.name == "strange"
+    assert attractor.period is None
+    assert attractor.exponent > 3.0 * attractor.standard_error
+    assert (found.labels == 1).all()
+
+
+def test_what_does_not_settle_is_undecided(hammer: "ph.Hammer", monkeypatch: pytest.MonkeyPatch) -> None:
+    # Without a train that is followed for long nothing strange can be told.
+    monkeypatch.setattr(attractors, "ATTEMPTS", 0)
+    found = ph.basins(hammer, period=1.05e-3, x=(30e-6, 80e-6, 3), v=(-0.4, 0.4, 2), firings=40, rounds=2)
+    assert found.attractors == ()
+    assert (found.labels == UNDECIDED).all()
+    assert found.counts[UNDECIDED] == 6
+    assert (found.firings == 80).all()
+    assert math.isnan(found.entropy(box=2).entropy)
+
+
+def test_cells_without_a_state_and_runs_that_end_early(hammer: "ph.Hammer") -> None:
+    # The law of the magnet needs x > 0; a fast armature leaves its range.
+    short = hammer.replace("magnet.range_max", "290 um")
+    found = ph.basins(short, period=1.3e-3, x=(-20e-6, 280e-6, 4), v=(-0.2, 4.0, 2))
+    assert (found.labels[:, 0] == NO_STATE).all()
+    assert (found.status[:, 0] == "no state").all()
+    assert found.labels[1, -1] == FAILED
+    assert found.status[1, -1] == "range left"
+    share, _ = found.shares
+    decided = (found.labels > 0).sum()
+    assert share.sum() == pytest.approx(decided / 6)
+    assert (found.firings[:, 0] == 0).all()
+
+
+def test_progress_comes_to_its_end(hammer: "ph.Hammer") -> None:
+    told: list[tuple[int, int]] = []
+    ph.basins(
+        hammer,
+        period=1.3e-3,
+        x=(40e-6, 60e-6, 3),
+        v=(-0.1, 0.1, 3),
+        progress=lambda done, total: told.append((done, total)),
+    )
+    assert told[-1] == (9, 9)
+
+
+def columns_of(points: np.ndarray) -> Columns:
+    """Trains with given states at the firings."""
+    count, length = points.shape[:2]
+    return Columns(
+        x=points[..., 0],
+        v=points[..., 1],
+        branch=np.zeros((count, length), np.int8),
+        memory=np.zeros((count, length)),
+        status=np.full(count, "ok", "U16"),
+        last=np.column_stack([points[:, -1], np.full(count, -1.0), np.zeros(count)]),
+    )
+
+
+def test_orbits_are_known_again_whatever_their_phase(hammer: "ph.Hammer") -> None:
+    attractors = Attractors(Regime.of(hammer, period=1e-3), np.ones(3), 1e-9, 1)
+    first = np.array([[3.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
+    other = np.array([[3.0, 0.0], [2.0, 0.0], [1.0, 0.0]])
+    trains = np.stack(
+        [np.tile(orbit, (6, 1)) for orbit in (first, np.roll(first, 1, axis=0), other, first + 1e-3)]
+    )
+    # The same points in another order are another orbit.
+    assert attractors.judge(columns_of(trains)).tolist() == [0, 0, 1, 0]
+    assert attractors.found[0].states[0].tolist() == [1.0, 0.0]
+    assert [attractor.period for attractor in attractors.found] == [3, 3]
+
+
+def test_the_entropy_of_one_colour_is_zero() -> None:
+    found = basin_entropy(np.ones((8, 8), int), box=4)
+    assert (found.entropy, found.boxes, found.boundary_boxes) == (0.0, 4, 0)
+    assert math.isnan(found.boundary_entropy)
+    assert not found.fractal
+
+
+def test_the_entropy_of_halves_and_of_a_chessboard() -> None:
+    halves = np.repeat([[1, 2]], 4, axis=1)[0] * np.ones((8, 1), int)
+    # The boundary between the columns 3 and 4 falls between boxes of 4, and cuts those of 8 in the middle.
+    assert basin_entropy(halves, box=4).entropy == 0.0
+    whole = basin_entropy(halves, box=8)
+    assert whole.entropy == pytest.approx(LN2)
+    assert whole.boundary_entropy == pytest.approx(LN2)
+    board = np.indices((8, 8)).sum(axis=0) % 2 + 1
+    assert basin_entropy(board, box=2).boundary_boxes == 16
+    assert basin_entropy(board, box=2).entropy == pytest.approx(LN2)
+
+
+def test_the_entropy_of_unequal_shares() -> None:
+    labels = np.ones((4, 8), int)
+    labels[0, 0] = 2
+    found = basin_entropy(labels, box=4)
+    box = -(15.0 / 16.0) * math.log(15.0 / 16.0) - math.log(1.0 / 16.0) / 16.0
+    assert found.entropy == pytest.approx(box / 2.0)
+    assert found.boundary_entropy == pytest.approx(box)
+
+
+def test_more_colours_in_a_box_show_a_fractal_boundary() -> None:
+    labels = np.arange(1, 17).reshape(4, 4)
+    found = basin_entropy(labels, box=2)
+    assert found.boundary_entropy == pytest.approx(math.log(4.0))
+    assert found.fractal
+
+
+def test_cells_that_are_not_known_are_left_out() -> None:
+    labels = np.array([[1, 2, 0, 0, 1], [0, -1, -2, 0, 1], [1, 1, 1, 1, 1]])
+    found = basin_entropy(labels, box=2)
+    # One box with a cell of each, one with none; the last row and column are in no whole box.
+    assert (found.boxes, found.boundary_boxes) == (1, 1)
+    assert found.entropy == pytest.approx(LN2)
+    assert found.left_out == 15 - 2
+    nothing = basin_entropy(np.zeros((4, 4), int))
+    assert (nothing.boxes, nothing.left_out) == (0, 16)
+    assert math.isnan(nothing.entropy)
+
+
+@given(
+    colours=st.integers(1, 5), box=st.integers(1, 4), seed=st.integers(0, 2**32 - 1), rows=st.integers(4, 9)
+)
+def test_entropies_stay_within_their_bounds(colours: int, box: int, seed: int, rows: int) -> None:
+    labels = np.random.default_rng(seed).integers(1, colours + 1, (rows, 8))
+    found = basin_entropy(labels, box=box)
+    assert 0.0 <= found.entropy <= math.log(min(colours, box * box)) + 1e-12
+    if found.boundary_boxes:
+        assert found.boundary_entropy * found.boundary_boxes == pytest.approx(found.entropy * found.boxes)
+    # Renaming attractors changes nothing.
+    renamed = basin_entropy(colours + 1 - labels, box=box)
+    assert renamed.entropy == pytest.approx(found.entropy)
+
+
+def test_a_dataset_and_files_hold_everything(two: Basins, tmp_path: Path) -> None:
+    chart = two.to_dataset()
+    assert chart["label"].dims == ("v", "x")
+    assert chart["label"].attrs["codes"].endswith("0 undecided, 1 period-1, 2 period-1")
+    assert chart["share"].values.tolist() == two.shares[0].tolist()
+    assert chart.attrs["basin_entropy"] == two.entropy().entropy
+    save_basins(two, tmp_path / "basins.nc")
+    with xr.open_dataset(tmp_path / "basins.nc", engine="scipy") as kept:
+        np.testing.assert_array_equal(kept["label"], two.labels)
+    save_basins(two, tmp_path / "basins.csv")
+    table = pd.read_csv(tmp_path / "basins.csv")
+    assert table["label"].tolist() == two.labels.reshape(-1).tolist()
+    assert set(basins_table(two)["attractor"]) == {"period-1"}
+    with pytest.raises(ph.InputError, match=r"basins\.txt"):
+        save_basins(two, tmp_path / "basins.txt")
+    assert dataclasses.is_dataclass(two)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({}, "period and rate"),
+        ({"period": 1e-3, "rate": 1e3}, "period and rate"),
+        ({"period": 1e-3, "x": (1e-5, 2e-5)}, "x = "),
+        ({"period": 1e-3, "x": (2e-5, 1e-5, 4)}, "x = "),
+        ({"period": 1e-3, "x": (1e-5, 2e-5, 0)}, "x: number"),
+        ({"period": 1e-3, "v": (-1.0, "1 kg", 4)}, "v"),
+        ({"period": 1e-3, "firings": 3}, "firings"),
+        ({"period": 1e-3, "rounds": 0}, "rounds"),
+        ({"period": 1e-3, "tolerance": 1.0}, "tolerance"),
+        ({"period": 1e-3, "x": (1e-5, 2e-5, 10_000), "v": (-1.0, 1.0, 10_000)}, "cells"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
+    with pytest.raises(ph.InputError, match=said) as caught:
+        ph.basins(hammer, **options)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("labels", "box", "said"),
+    [(np.ones((2, 2)), 1, "labels"), (np.ones(4, int), 1, "labels"), (np.ones((2, 4), int), 3, "box")],
+)
+def test_entropy_of_what_is_no_plane_is_refused(labels: np.ndarray, box: int, said: str) -> None:
+    with pytest.raises(ph.InputError, match=said):
+        basin_entropy(labels, box=box)
