@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 import printhammer as ph
-from printhammer.control.controller import Controller
-from printhammer.control.driver import driver_of
-from printhammer.control.feedback import Feedback, FeedbackStrategy
+from printhammer.control.feedback.comparison import Feedback, FeedbackStrategy
+from printhammer.control.feedback.controller import Controller
+from printhammer.control.feedback.driver import driver_of
 from printhammer.printing.page import Page
 from printhammer.printing.strategy import Strategy, open_loop
 

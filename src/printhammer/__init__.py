@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from printhammer.chaos.stability_chart import stability_chart
     from printhammer.chaos.strobe import strobe
     from printhammer.chaos.zero_one import zero_one
-    from printhammer.control.feedback import feedback
-    from printhammer.control.least_work import least_work
-    from printhammer.control.table import CompensationTable
-    from printhammer.control.table_files import load_table
-    from printhammer.control.table_report import judge_table
-    from printhammer.control.table_tuning import tune
+    from printhammer.control.feedback.comparison import feedback
+    from printhammer.control.least_work.burst import least_work
+    from printhammer.control.table.compensation import CompensationTable
+    from printhammer.control.table.files import load_table
+    from printhammer.control.table.report import judge_table
+    from printhammer.control.table.tuning import tune
     from printhammer.drive.sequence import PulseSequence
     from printhammer.drive.trains import Burst, PulseTrain, SineForce
     from printhammer.drive.waveforms.shapes import Chain, Waveform
@@ -116,7 +116,7 @@ __all__ = [
 _HOME = {
     "Burst": "drive",
     "Chain": "waveforms",
-    "CompensationTable": "control.table",
+    "CompensationTable": "control.table.compensation",
     "Ensemble": "ensemble",
     "EnsembleResult": "ensemble",
     "Hammer": "hammer",
@@ -136,15 +136,15 @@ _HOME = {
     "continuation": "chaos.continuation",
     "damping_study": "printing.damping",
     "equilibria": "equilibrium",
-    "feedback": "control.feedback",
+    "feedback": "control.feedback.comparison",
     "fit": "identify.fitting",
     "frequency_map": "maps",
     "holding_margin": "equilibrium",
     "impact_train": "chaos.impact_train",
-    "judge_table": "control.table_report",
-    "least_work": "control.least_work",
+    "judge_table": "control.table.report",
+    "least_work": "control.least_work.burst",
     "load": "hammer",
-    "load_table": "control.table_files",
+    "load_table": "control.table.files",
     "lyapunov": "chaos.lyapunov",
     "measure": "identify.laboratory",
     "orbits": "chaos.orbit_search",
@@ -164,7 +164,7 @@ _HOME = {
     "strobe": "chaos.strobe",
     "sweep": "sweep",
     "tolerance_yield": "printing.tolerance",
-    "tune": "control.table_tuning",
+    "tune": "control.table.tuning",
     "zero_one": "chaos.zero_one",
 }
 
