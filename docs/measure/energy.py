@@ -5,7 +5,7 @@ rest, the settle-out included, for the shipped hammer and five of its family; th
 """
 
 import printhammer as ph
-from printhammer.control.least_work import NoBurstError
+from printhammer.control.least_work.burst import NoBurstError
 from printhammer.reconstruction.family.family import family_hammers
 
 FAMILY = ("02", "06", "10", "14", "18")

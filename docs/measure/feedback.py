@@ -15,10 +15,10 @@ import argparse
 import numpy as np
 
 import printhammer as ph
-from printhammer.control.controller import Controller
-from printhammer.control.driver import driver_of
-from printhammer.control.feedback import FeedbackStrategy
-from printhammer.control.sensor import PositionSensor
+from printhammer.control.feedback.comparison import FeedbackStrategy
+from printhammer.control.feedback.controller import Controller
+from printhammer.control.feedback.driver import driver_of
+from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.strategy import Strategy, open_loop
 from printhammer.printing.dots.trial import Case, attempt

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import printhammer as ph
-from printhammer.control.table import CompensationTable
-from printhammer.control.table_report import PERTURBATIONS
+from printhammer.control.table.compensation import CompensationTable
+from printhammer.control.table.report import PERTURBATIONS
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import SafeRate

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 import printhammer as ph
-from printhammer.control.controller import Controller
-from printhammer.control.driver import driver_of
-from printhammer.control.feedback import Feedback, FeedbackStrategy
+from printhammer.control.feedback.comparison import Feedback
+from printhammer.control.feedback.comparison import FeedbackStrategy
+from printhammer.control.feedback.controller import Controller
+from printhammer.control.feedback.driver import driver_of
 from printhammer.printing.dots.strategy import Strategy, open_loop
 from printhammer.printing.page.page import Page
 

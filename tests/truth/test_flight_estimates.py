@@ -5,7 +5,7 @@ import pytest
 from tests import hammers
 
 import printhammer as ph
-from printhammer.control.flight import Expected, Flight, FreeForce, flight_from_samples
+from printhammer.control.feedback.estimator.flight import Expected, Flight, FreeForce, flight_from_samples
 
 
 def expected(touch: float, speed: float, errors: tuple[float, float, float], count: int = 1) -> Expected:

@@ -8,8 +8,8 @@ from scipy import optimize
 from tests import hammers
 
 import printhammer as ph
-from printhammer.control.coil_force import CoilForce
-from printhammer.control.least_work_bound import bound
+from printhammer.control.least_work.bound import bound
+from printhammer.control.least_work.coil_force import CoilForce
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack

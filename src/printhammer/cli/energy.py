@@ -15,8 +15,8 @@ from printhammer.cli.units import Units
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from printhammer.control.least_work import LeastWork
-    from printhammer.control.least_work_supply import SupplyCheck
+    from printhammer.control.least_work.burst import LeastWork
+    from printhammer.control.least_work.supply import SupplyCheck
     from printhammer.hammer.hammer import Hammer
 
 EXAMPLE: Final = "Example: printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png"
@@ -83,8 +83,8 @@ def energy(
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.control.least_work import least_work
-    from printhammer.control.least_work_tables import save_least_work
+    from printhammer.control.least_work.burst import least_work
+    from printhammer.control.least_work.tables import save_least_work
     from printhammer.errors import InputError
     from printhammer.support.outputs import check_outputs
 
@@ -193,7 +193,7 @@ def _at_rates(hammer: Hammer, rates: list[float], options: dict[str, Any], wante
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import write_found
     from printhammer.cli.terminal import complain, console, honesty, plain_table
-    from printhammer.control.least_work_rates import FOUND, least_work_rates
+    from printhammer.control.least_work.rates import FOUND, least_work_rates
     from printhammer.support.outputs import write_dataset
 
     with counting("rates") as tell:

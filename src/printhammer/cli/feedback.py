@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from printhammer.control.feedback import Feedback, FeedbackStrategy
+    from printhammer.control.feedback.comparison import Feedback, FeedbackStrategy
     from printhammer.hammer.hammer import Hammer
 
 EXAMPLE: Final = "Example: printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png"
@@ -82,8 +82,8 @@ def feedback(
 
     from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.control.feedback import feedback as compared
-    from printhammer.control.feedback_tables import save_feedback
+    from printhammer.control.feedback.comparison import feedback as compared
+    from printhammer.control.feedback.tables import save_feedback
     from printhammer.drive.file import save_drive
     from printhammer.drive.input import read_number, read_positive
     from printhammer.support.outputs import check_outputs
@@ -164,7 +164,7 @@ def told(found: Feedback, units: Units) -> Table:
 
 
 def _sensor(given: dict[str, Any]) -> Any:
-    from printhammer.control.sensor import PositionSensor
+    from printhammer.control.feedback.estimator.sensor import PositionSensor
 
     return PositionSensor(**{key: value for key, value in given.items() if value is not None})
 
@@ -179,8 +179,8 @@ def _driven(hammer: Hammer, supply: str, travel: str) -> Hammer:
 
 
 def _table(path: Path, hammer: Hammer) -> Any:
-    from printhammer.control.table_drive import TableStrategy
-    from printhammer.control.table_files import load_table
+    from printhammer.control.table.drive import TableStrategy
+    from printhammer.control.table.files import load_table
 
     return TableStrategy(load_table(path), hammer)
 
@@ -189,9 +189,9 @@ def feedback_strategy(hammer: Hammer) -> FeedbackStrategy:
     """Return feedback as a way to drive a hammer, with its usual driver and sensor."""
     from rich.console import Console
 
-    from printhammer.control.controller import Controller
-    from printhammer.control.driver import driver_of
-    from printhammer.control.feedback import FeedbackStrategy
+    from printhammer.control.feedback.comparison import FeedbackStrategy
+    from printhammer.control.feedback.controller import Controller
+    from printhammer.control.feedback.driver import driver_of
 
     with Console(stderr=True).status("tables of the controller"):
         return FeedbackStrategy(Controller(hammer, driver_of(hammer)))

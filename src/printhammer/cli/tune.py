@@ -15,8 +15,8 @@ from printhammer.cli.units import Units
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from printhammer.control.table import CompensationTable
-    from printhammer.control.table_report import TableReport
+    from printhammer.control.table.compensation import CompensationTable
+    from printhammer.control.table.report import TableReport
 
 EXAMPLE: Final = (
     "Example: printhammer tune hendriks-1983 --rate 1.3kHz --history 2 --out table.csv --out table.h"
@@ -72,9 +72,9 @@ def tune(
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.control.table_files import SUFFIXES
-    from printhammer.control.table_report import judge_table
-    from printhammer.control.table_tuning import tune as tuned
+    from printhammer.control.table.files import SUFFIXES
+    from printhammer.control.table.report import judge_table
+    from printhammer.control.table.tuning import tune as tuned
     from printhammer.errors import InputError
     from printhammer.support.outputs import check_outputs, write_dataset
 
@@ -131,7 +131,7 @@ def told(table: CompensationTable, units: Units) -> Table:
     """Return the entries at the highest rate, a row each."""
     from printhammer.cli.terminal import plain_table
     from printhammer.cli.units import shown, unit
-    from printhammer.control.histories import gap_text, histories, number_of
+    from printhammer.control.table.histories import gap_text, histories, number_of
 
     time = unit("time", units)
     count = table.rates.size

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.histories import REST, gap_text, histories, number_of
-from printhammer.control.table_report import STRATEGIES
+from printhammer.control.table.histories import REST, gap_text, histories, number_of
+from printhammer.control.table.report import STRATEGIES
 from printhammer.figures.elements.scales import Scale
 from printhammer.figures.elements.style import (
     BLUE,
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.control.table import CompensationTable
-    from printhammer.control.table_report import TableReport
+    from printhammer.control.table.compensation import CompensationTable
+    from printhammer.control.table.report import TableReport
     from printhammer.support.arrays import FloatArray
 
 _FEW: Final = 4
@@ -141,7 +141,7 @@ def plot_report(report: TableReport) -> Figure:
     Parameters
     ----------
     report : TableReport
-        From `printhammer.control.judge_table`.
+        From `printhammer.judge_table`.
 
     Returns
     -------

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.control.least_work import LeastWork
+    from printhammer.control.least_work.burst import LeastWork
 
 _AFTER: Final = 0.08
 
@@ -43,7 +43,7 @@ def plot(found: LeastWork) -> Figure:
     Parameters
     ----------
     found : LeastWork
-        From `printhammer.control.least_work.least_work`.
+        From `printhammer.control.least_work.burst.least_work`.
 
     Returns
     -------

@@ -21,7 +21,7 @@ from printhammer.figures.elements.style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.control.least_work_rates import LeastWorkRates
+    from printhammer.control.least_work.rates import LeastWorkRates
 
 
 @styled
@@ -31,7 +31,7 @@ def plot(found: LeastWorkRates) -> Figure:
     Parameters
     ----------
     found : LeastWorkRates
-        From `printhammer.control.least_work_rates.least_work_rates`.
+        From `printhammer.control.least_work.rates.least_work_rates`.
 
     Returns
     -------

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.control.feedback import Feedback
+    from printhammer.control.feedback.comparison import Feedback
     from printhammer.support.arrays import FloatArray
 
 _COLOURS: Final = (ORANGE, YELLOW, GREEN)
@@ -42,7 +42,7 @@ def plot(found: Feedback) -> Figure:
     Parameters
     ----------
     found : Feedback
-        From `printhammer.control.feedback.feedback`.
+        From `printhammer.control.feedback.comparison.feedback`.
 
     Returns
     -------

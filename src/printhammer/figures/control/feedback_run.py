@@ -27,7 +27,7 @@ from printhammer.units import from_si
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.control.feedback import Feedback
+    from printhammer.control.feedback.comparison import Feedback
 
 
 @styled
@@ -37,7 +37,7 @@ def plot(found: Feedback) -> Figure:
     Parameters
     ----------
     found : Feedback
-        From `printhammer.control.feedback.feedback`.
+        From `printhammer.control.feedback.comparison.feedback`.
 
     Returns
     -------

@@ -1,0 +1,1 @@
+"""Feedback: an observer, a controller by dynamic programming, and their closed loop."""

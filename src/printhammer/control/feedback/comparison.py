@@ -1,0 +1,314 @@
+"""Feedback: a drive that sees the hammer, beside an open loop and whatever else there is.
+
+F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), ends with the wish that "driving
+current waveforms ought to respond to the phase of the hammer motion and the pattern to be printed". Here they
+do. A controller that knows the nominal hammer, and sees the real one late and with noise, prints all patterns
+of eight slots; so does the open loop, and both fire two pulses at all distances.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.control.feedback.closed_loop import closed_loops
+from printhammer.control.feedback.controller import Controller
+from printhammer.control.feedback.driver import LARGEST_CURRENT, driver_of
+from printhammer.control.feedback.estimator.sensor import PositionSensor
+from printhammer.drive.input import read_number, read_positive
+from printhammer.errors import InputError
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import WAIT, rate_of
+from printhammer.printing.dots.slots import slots_of
+from printhammer.printing.dots.strategy import name_of, open_loop
+from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.rates.safe_rate import from_rest
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.control.feedback.driver import Driver
+    from printhammer.drive.sequence import PulseSequence
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.nominal import Nominal
+    from printhammer.printing.dots.strategy import Strategy
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
+
+BURST: Final = "11101101"
+"""Pattern of the run that is shown."""
+
+MOST_GAPS: Final = 500
+"""Number of gaps above which a double-pulse test is refused."""
+
+_GAPS: Final = (1.5, 6.0, 46)
+
+
+class FeedbackStrategy:
+    """Feedback as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`.
+
+    Parameters
+    ----------
+    controller : Controller
+        Made for the nominal hammer.
+    sensor : PositionSensor, optional
+        What it sees of the hammer that is driven.
+    tolerance : float, optional
+        Of the closed loop.
+    threads : int, optional
+        By default as many as there are cores; the drives do not depend on it.
+    """
+
+    name = "feedback"
+
+    def __init__(
+        self,
+        controller: Controller,
+        sensor: PositionSensor | None = None,
+        *,
+        tolerance: float = DISPLAY_TOLERANCE,
+        threads: int | None = None,
+    ) -> None:
+        self.controller = controller
+        self.sensor = PositionSensor() if sensor is None else sensor
+        self._options: dict[str, Any] = {"tolerance": tolerance, "threads": threads}
+
+    def __call__(
+        self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
+    ) -> list[PulseSequence]:
+        """Run the closed loop on a hammer, and return the drive that it gave each pattern."""
+        if not patterns:
+            return []
+        loops = closed_loops(hammer, self.controller, self.sensor, patterns, rate, **self._options)
+        return [loop.drive(self.controller.driver.edge) for loop in loops]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """One run of the closed loop, and what the controller saw of it.
+
+    Attributes
+    ----------
+    pattern : str
+        The slots, 1 where a dot is wanted.
+    motion : Motion
+        The run.
+    times, shown : array
+        Times of the samples that were looked at, s, and what the sensor showed, m.
+    due : array
+        Times at which touches were wanted, s.
+    """
+
+    pattern: str
+    motion: Motion = field(repr=False)
+    times: FloatArray = field(repr=False)
+    shown: FloatArray = field(repr=False)
+    due: FloatArray = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """Strategies side by side, feedback the last of them.
+
+    Attributes
+    ----------
+    hammer : Hammer
+        The nominal hammer, for which the controller is made.
+    driven : Hammer
+        The hammer that is driven.
+    driver : Driver
+        Of the coil, with feedback.
+    sensor : PositionSensor
+        What the controller sees.
+    limits : Limits
+        How far dots may be off.
+    single : Nominal
+        The single-pulse dot of the nominal hammer, by which all are judged.
+    rate : float
+        Slots per second, Hz.
+    strategies : tuple of str
+        Names of the ways to drive, (S,).
+    passed : bool array, shape (S, P)
+        Whether a pattern is printed within limits.
+    force : array, shape (S, P, 8)
+        Force less that of the single pulse, in parts of it; NaN where no dot is wanted or it is lost.
+    arrival : array, shape (S, P, 8)
+        Touch less slot time and flight time of the single pulse, s; NaN likewise.
+    lost, extra_contacts : int array, shape (S,)
+        Number of lost dots and of extra contacts.
+    peak_current : array, shape (S,)
+        Largest absolute value of any drive, A.
+    gaps : array, shape (G,)
+        Times between the two slots of the double-pulse test, s.
+    gap_force, gap_arrival : array, shape (S, G)
+        Deviations of the second dot: of the force in parts, of the arrival, s; NaN for a lost one.
+    seen : Seen
+        One run with feedback.
+    tolerance : float
+        Of the integration.
+    """
+
+    hammer: Hammer
+    driven: Hammer
+    driver: Driver
+    sensor: PositionSensor
+    limits: Limits
+    single: Nominal
+    rate: float
+    strategies: tuple[str, ...]
+    passed: npt.NDArray[np.bool_] = field(repr=False)
+    force: FloatArray = field(repr=False)
+    arrival: FloatArray = field(repr=False)
+    lost: npt.NDArray[np.int64]
+    extra_contacts: npt.NDArray[np.int64]
+    peak_current: FloatArray
+    gaps: FloatArray = field(repr=False)
+    gap_force: FloatArray = field(repr=False)
+    gap_arrival: FloatArray = field(repr=False)
+    seen: Seen = field(repr=False)
+    tolerance: float
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return all deviations as a Dataset, with units and provenance in the attributes."""
+        from printhammer.control.feedback.tables import feedback_dataset
+
+        return feedback_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the comparison; returns a matplotlib figure, see `printhammer.figures.control.feedback`."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.control.feedback").plot(self, **options)
+
+    def plot_run(self, **options: Any) -> Any:
+        """Draw the run with what the controller saw; returns a matplotlib figure."""
+        return import_module("printhammer.figures.control.feedback_run").plot(self, **options)
+
+
+def feedback(
+    hammer: Hammer,
+    rate: float | str,
+    *,
+    driven: Hammer | None = None,
+    sensor: PositionSensor | None = None,
+    current: float | str = LARGEST_CURRENT,
+    edge: float | str | None = None,
+    limits: Limits | None = None,
+    beside: Sequence[Strategy] = (),
+    gaps: npt.ArrayLike | None = None,
+    tolerance: float = DISPLAY_TOLERANCE,
+    threads: int | None = None,
+) -> Feedback:
+    """Drive a hammer with feedback, and compare it with the open loop.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The nominal hammer, with a pack, a backstop and a waveform that is a current.
+    rate : float or str
+        Slots per second, Hz, or text with a unit.
+    driven : Hammer, optional
+        The hammer that is driven; by default the nominal one.
+    sensor : PositionSensor, optional
+        What the controller sees; by default 1 % noise and 20 us delay.
+    current : float or str, optional
+        Largest current of the driver to either side, A.
+    edge : float or str, optional
+        Time constant of the driver, s; by default that with which the hammer's own waveform decays.
+    limits : Limits, optional
+        How far dots may be off.
+    beside : sequence of Strategy, optional
+        Further ways to drive, for instance a compensation table.
+    gaps : array, optional
+        Times between the two slots of the double-pulse test, s; by default 46 from one and a half to six
+        times the flight time of the single pulse.
+    tolerance : float, optional
+        As for `printhammer.simulate`; by default that for pictures.
+    threads : int, optional
+        By default as many as there are cores; the result does not depend on it.
+
+    Returns
+    -------
+    Feedback
+        A run that could not go on is no exception: its dots are lost.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above, or the driver is too weak for the hammer.
+    """
+    speed = rate_of(rate)
+    wide = None if edge is None else read_positive(edge, "s", "edge")
+    driver = driver_of(hammer, read_positive(current, "A", "current"), wide)
+    seeing = PositionSensor() if sensor is None else sensor
+    bounds = Limits() if limits is None else limits
+    real = hammer if driven is None else driven
+    between = None if gaps is None else _checked_gaps(gaps)
+    controller = Controller(hammer, driver, bounds, threads=threads)
+    own = FeedbackStrategy(controller, seeing, tolerance=tolerance, threads=threads)
+    every: list[Strategy] = [open_loop, *beside, own]
+    if between is None:
+        between = np.linspace(*_GAPS) * controller.single.flight_time
+    options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
+    patterns = from_rest(every=False)
+    single = controller.single
+    trials = [attempt([Case(real, single, speed)], patterns, way, **options) for way in every]
+    cases = [Case(real, single, 1.0 / gap) for gap in between.tolist()]
+    doubles = [attempt(cases, [(0, 1)], way, **options) for way in every]
+    judged = [trial.judgement for trial in trials]
+    return Feedback(
+        hammer=hammer,
+        driven=real,
+        driver=driver,
+        sensor=seeing,
+        limits=bounds,
+        single=single,
+        rate=speed,
+        strategies=tuple(name_of(way) for way in every),
+        passed=np.array([one.passed for one in judged]),
+        force=np.array([one.force_deviation for one in judged]),
+        arrival=np.array([one.arrival_deviation for one in judged]),
+        lost=np.array([int(one.lost.sum()) for one in judged]),
+        extra_contacts=np.array([int(one.extra_contacts.sum()) for one in judged]),
+        peak_current=np.array([max(drive.peak for drive in trial.drives) for trial in trials]),
+        gaps=between,
+        gap_force=np.array([double.judgement.force_deviation[:, 1] for double in doubles]),
+        gap_arrival=np.array([double.judgement.arrival_deviation[:, 1] for double in doubles]),
+        seen=_seen(real, controller, seeing, speed, tolerance, threads),
+        tolerance=read_number(tolerance, "1", "tolerance"),
+    )
+
+
+def _checked_gaps(given: npt.ArrayLike) -> FloatArray:
+    gaps = np.asarray(given, dtype=np.float64)
+    if gaps.ndim != 1 or not 0 < gaps.size <= MOST_GAPS or not (np.isfinite(gaps) & (gaps > 0.0)).all():
+        raise InputError(f"gaps = {given!r}, expected 1 to {MOST_GAPS} positive times, s")
+    return gaps
+
+
+def _seen(
+    hammer: Hammer,
+    controller: Controller,
+    sensor: PositionSensor,
+    rate: float,
+    tolerance: float,
+    threads: int | None,
+) -> Seen:
+    slots = slots_of([mark == "1" for mark in BURST])
+    loop = closed_loops(hammer, controller, sensor, [slots], rate, tolerance=tolerance, threads=threads)[0]
+    drive = loop.drive(controller.driver.edge)
+    duration = max(float(loop.due[-1]), float(drive.times[-1])) + 0.5 * WAIT
+    return Seen(
+        pattern=BURST,
+        motion=simulate(hammer, drive, duration=duration, tolerance=tolerance),
+        times=np.concatenate([times for times, _shown in loop.seen]),
+        shown=np.concatenate([shown for _times, shown in loop.seen]),
+        due=loop.due,
+    )

@@ -1,0 +1,432 @@
+"""The controller: it knows the nominal hammer, sees the real one through its sensor, and switches the coil.
+
+It fires on energy and phase, releases the armature before a first impact and measures out the rest of its
+energy with a push into the pack, catches it on the way back and throws it again where the next dot is due
+soon, and brakes it before the backstop where there is time to come to rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from printhammer.control.feedback.closed_loop import APART, REMEMBERED, Pulse
+from printhammer.control.feedback.estimator.adaptation import Contacts, Touched
+from printhammer.control.feedback.estimator.flight import Expected, FreeForce, flight_from_samples
+from printhammer.control.feedback.fronts import between_fronts, fronts
+from printhammer.control.feedback.impact_map import ALWAYS, FREE, PUSHED, force_map
+from printhammer.control.feedback.launch import Launch, launch
+from printhammer.control.feedback.policy import KNOWN, Done, Policy, between
+from printhammer.errors import InputError
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.control.feedback.closed_loop import Loop
+    from printhammer.control.feedback.driver import Driver
+    from printhammer.control.feedback.estimator.sensor import PositionSensor
+    from printhammer.control.feedback.impact_map import IntArray
+    from printhammer.control.feedback.policy import Choice
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
+"""Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,
+and does not begin before it."""
+
+WINDOW: Final = 120e-6
+"""Time over which samples are looked at, s."""
+
+_SPEED_ERROR: Final = 0.03
+_PLACE_ERROR: Final = 0.03
+_LAUNCH_ERRORS: Final = (0.005, 0.003)
+_BEFORE: Final = 0.15
+_CONTACT: Final = 1.1
+_ASTRAY: Final = 0.4
+_LEAST_ERROR: Final = 1e-4
+_CLAMP: Final = 1.0
+_CLAMPED: Final = 0.6
+_LONGEST: Final = 1.2
+_FADED: Final = 3.0
+_CLEAR: Final = 0.22
+_PATIENCE: Final = 40e-6
+_POLICIES: Final = 8
+
+
+class Ahead(NamedTuple):
+    """Where a way leads.
+
+    Times after a touch, s, of the throw, of leaving the pack and of the next touch; width of the push, s;
+    kind and speed, m/s, of that touch.
+    """
+
+    fire: float
+    width: float
+    leaves: float
+    kind: int
+    touch: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A touch as it was when its push was decided, before the contact told where the front is.
+
+    Attributes
+    ----------
+    touch, speed, kind
+        Time, s, speed, m/s, and kind of the touch.
+    front : float
+        By how much the front was thought to be farther away, in parts of the way to the pack.
+    force, slope : float
+        Force in parts of the single-pulse force, and by how much it grows with the distance of the front.
+    back : float
+        Return current, A.
+    """
+
+    touch: float
+    speed: float
+    kind: int
+    front: float
+    force: float
+    slope: float
+    back: float
+
+
+class Controller:
+    """A controller made for one hammer.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The nominal hammer, with a pack and a backstop.
+    driver : Driver
+        Of its coil.
+    limits : Limits, optional
+        How far a dot may be off.
+    threads : int, optional
+        By default as many as there are cores.
+
+    Raises
+    ------
+    InputError
+        The hammer has no pack, no backstop, no waveform or no rest state, or the driver is too weak for it.
+    """
+
+    def __init__(
+        self, hammer: Hammer, driver: Driver, limits: Limits | None = None, *, threads: int | None = None
+    ) -> None:
+        if hammer.front is None or hammer.backstop is None:
+            missing = "pack" if hammer.front is None else "backstop"
+            raise InputError(f"{hammer.path}: the hammer has no {missing}, expected one")
+        self.hammer = hammer
+        self.driver = driver
+        self.limits = Limits() if limits is None else limits
+        self.leads = LEADS
+        self.single = nominal(hammer)
+        self.front: float = hammer.front
+        self.stroke: float = hammer.front - hammer.origin
+        forces = force_map(hammer, driver, self.single, threads=threads)
+        self.start: Launch = launch(hammer, driver, self.single, forces, threads=threads)
+        self.fronts = fronts(hammer, driver, self.single, forces, self.start, threads=threads)
+        self.table = self.fronts.table
+        self.landing = self.fronts.landing
+        self._policies: dict[float, Policy] = {}
+        self._threads = threads
+
+    @cached_property
+    def force(self) -> FreeForce:
+        """Force on the flying armature."""
+        return FreeForce(self.hammer, self.hammer.origin, self.front, self.driver.current)
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """Contacts of the nominal hammer with packs at several places."""
+        return Contacts(self.hammer, self.stroke, self.driver)
+
+    def policy(self, period: float) -> Policy:
+        """Return the policy for a period, s."""
+        if period not in self._policies:
+            if len(self._policies) >= _POLICIES:
+                self._policies.clear()
+            self._policies[period] = Policy(self.fronts, period, self.limits)
+        return self._policies[period]
+
+    def samples(self, sensor: PositionSensor) -> int:
+        """Return how many samples are looked at."""
+        return max(1, round(WINDOW / sensor.interval))
+
+    def contact_samples(self, sensor: PositionSensor) -> int:
+        """Return how many samples of a contact are looked at."""
+        return max(1, round(_CONTACT * self.single.flight_time / sensor.interval))
+
+    def launch(self, loop: Loop, dot: int) -> None:
+        """Fire from rest, so that a dot comes when it is due."""
+        start = self.start
+        known = loop.learned
+        late = (known.front * self.stroke - start.place_slope * known.scale) / start.speed
+        earliest = loop.pulses[-1].at[-1] if loop.pulses else 0.0
+        fired = max(float(loop.due[dot]) - start.flight - late, earliest)
+        pulse = Pulse(fired, [], [])
+        pulse.switch(fired, self.driver.current)
+        pulse.switch(fired + start.width, 0.0)
+        loop.pulses.append(pulse)
+        loop.touch, loop.speed, loop.kind = fired + start.flight + late, start.speed, FREE
+        loop.speed += start.speed_slope * known.scale
+        loop.launched, loop.rests = True, False
+        loop.since = fired + _CLEAR * start.flight
+
+    def learn(
+        self, loops: Sequence[Loop], times: FloatArray, shown: FloatArray, used: Any, sensor: PositionSensor
+    ) -> None:
+        """Learn where the front of the pack is from what the sensor showed of contacts, arrays (M, N)."""
+        rows = [k for k, loop in enumerate(loops) if loop.alive and loop.touched is not None]
+        for loop in loops:
+            loop.learned.drift()
+        if rows:
+            self.contacts.learn(
+                [loops[k] for k in rows],
+                times[rows],
+                np.nan_to_num(shown[rows]),
+                used[rows].astype(np.float64),
+                self._error(sensor),
+                self._threads,
+            )
+
+    def estimate(
+        self, loops: Sequence[Loop], times: FloatArray, shown: FloatArray, used: Any, sensor: PositionSensor
+    ) -> None:
+        """Estimate the coming touches from what the sensor shows, arrays (M, N)."""
+        expected = Expected(
+            np.array([loop.touch for loop in loops]),
+            np.array([loop.speed for loop in loops]),
+            np.array([loop.learned.scale for loop in loops]),
+            np.array([self._expected(loop) for loop in loops]),
+        )
+        front = self.front + self.stroke * np.array([loop.learned.front for loop in loops])
+        steps = _steps(loops)
+
+        def accelerations(x: FloatArray, t: FloatArray, scale: FloatArray) -> FloatArray:
+            current = (1.0 + scale) * _current(*steps, self.driver.edge, t)
+            return self.force(x, current) / self.hammer.mass
+
+        flight = flight_from_samples(
+            times,
+            np.nan_to_num(shown),
+            used.astype(np.float64),
+            self._error(sensor),
+            expected,
+            front,
+            accelerations,
+        )
+        before = flight.touch - _BEFORE * self.stroke / flight.speed
+        begins = np.maximum(before, np.array([loop.since for loop in loops]))
+        states, covariances = flight.at(begins, accelerations)
+        for k, loop in enumerate(loops):
+            if not loop.alive:
+                continue
+            # What is far from all that was expected is no estimate of this touch: the plan stands.
+            if (
+                abs(flight.touch[k] - loop.touch) < _ASTRAY * self.single.flight_time
+                and flight.speed[k] > 0.0
+            ):
+                loop.touch, loop.speed = float(flight.touch[k]), float(flight.speed[k])
+                loop.learned.take_scale(float(flight.scale[k]), float(flight.covariance[k, 2, 2]))
+                end = loop.touch + _CONTACT * self.single.flight_time
+                loop.touched = Touched(float(begins[k]), end, states[k], covariances[k])
+            loop.touches.append((loop.touch, loop.speed))
+            loop.seen.append((times[k][used[k]], shown[k][used[k]]))
+
+    def _error(self, sensor: PositionSensor) -> float:
+        return max(float(np.hypot(sensor.noise, sensor.step / np.sqrt(12.0))), _LEAST_ERROR) * self.stroke
+
+    def _expected(self, loop: Loop) -> FloatArray:
+        """Return the covariance of displacement, speed and scale that are expected at a touch."""
+        # Later launches begin with what a landing has left of the motion before.
+        if loop.launched and len(loop.pulses) == 1:
+            start = self.start
+            slope = np.array([start.place_slope, start.speed_slope, 1.0])
+            place, speed = _LAUNCH_ERRORS
+            errors = np.array([place * self.stroke, speed, 0.0])
+            # The first one differs by what the scale of the currents makes of it.
+            return np.outer(slope, slope) * loop.learned.scale_error**2 + np.diag(errors**2)
+        return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
+
+    def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
+        """Decide how some runs go on after a touch that is about to come; each with the number of its dot."""
+        kind = np.array([loop.kind for loop, _dot in now])
+        speed = np.array([loop.speed for loop, _dot in now])
+        touch = np.array([loop.touch for loop, _dot in now])
+        late = touch - np.array([loop.due[dot] for loop, dot in now])
+        wait = np.array(
+            [loop.due[dot + 1] - loop.due[dot] if dot + 1 < len(loop.due) else np.inf for loop, dot in now]
+        )
+        rests = wait >= self.landing.settled + self.start.flight
+        after = np.array([self._before_rest(loop, dot + 1) for loop, dot in now])
+        front = np.array([loop.learned.front for loop, _dot in now])
+        front_error = np.array([loop.learned.front_error for loop, _dot in now])
+        way, cost, choice = policy.best(
+            kind, late, speed, np.where(rests, policy.period, wait), after, front, front_error
+        )
+        table = self.table
+        release = choice.at("release", way)
+        ahead = self._ahead(choice, way)
+        force = choice.at("force", way)
+        slope = choice.of_way(self.fronts.front_force, way)
+        landed = self._landings(kind, speed, front)
+        for k, (loop, dot) in enumerate(now):
+            pulse = loop.pulses[-1]
+            if loop.kind != FREE:
+                # The push has no end yet.
+                del pulse.at[1:], pulse.levels[1:]
+            if rests[k] or not np.isfinite(cost[k]):
+                self._land(loop, dot, *(float(values[k]) for values in landed))
+                loop.rests = dot + 1 < len(loop.due)
+                continue
+            back = float(table.back[way[k]])
+            known = loop.learned
+            printed = Printed(
+                loop.touch, loop.speed, loop.kind, known.front, float(force[k]), float(slope[k]), back
+            )
+            self._push(loop, pulse, float(release[k]), back)
+            pulse.switch(loop.touch + ahead[k].fire, 0.0)
+            self._throw(loop, loop.touch, ahead[k])
+            # What the contact tells of the front comes in time for a throw that is late.
+            told = printed.touch + _CONTACT * self.single.flight_time + _PATIENCE
+            unsure = known.front_error > KNOWN and loop.pulses[-1].fired > told
+            loop.printed = printed if unsure else None
+
+    def decide_again(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
+        """Decide anew how some runs are thrown, each with the number of the dot that is coming."""
+        before = [loop.printed for loop, _dot in now if loop.printed is not None]
+        front = np.array([loop.learned.front for loop, _dot in now])
+        farther = front - np.array([one.front for one in before])
+        speed = np.array([one.speed for one in before])
+        touch = np.array([one.touch for one in before]) + farther * self.stroke / speed
+        due = np.array([loop.due[dot - 1] for loop, dot in now])
+        way, cost, choice = policy.best(
+            np.array([one.kind for one in before]),
+            touch - due,
+            speed,
+            np.array([loop.due[dot] for loop, dot in now]) - due,
+            np.array([self._before_rest(loop, dot) for loop, dot in now]),
+            front,
+            np.array([loop.learned.front_error for loop, _dot in now]),
+            Done(
+                np.array([one.back for one in before]),
+                np.array([one.force + more * one.slope for one, more in zip(before, farther, strict=True)]),
+                np.array([loop.time for loop, _dot in now]) - touch,
+            ),
+        )
+        ahead = self._ahead(choice, way)
+        for k, (loop, _dot) in enumerate(now):
+            loop.printed = None
+            if not np.isfinite(cost[k]):
+                continue
+            loop.pulses.pop()
+            loop.pulses[-1].at[-1] = max(float(touch[k]) + ahead[k].fire, loop.pulses[-1].at[-2] + APART)
+            self._throw(loop, float(touch[k]), ahead[k])
+
+    def _ahead(self, choice: Choice, way: IntArray) -> list[Ahead]:
+        """Return what some ways lead to."""
+        table, rows = self.table, np.arange(len(way))
+        columns = (
+            table.fire[way],
+            table.width[way],
+            choice.at("leaves", way),
+            table.next_kind[way],
+            choice.next_touch[rows, way],
+            choice.next_speed[rows, way],
+        )
+        return [Ahead(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+
+    def _throw(self, loop: Loop, touch: float, ahead: Ahead) -> None:
+        """Throw the armature where the last pulse ends."""
+        throw = Pulse(loop.pulses[-1].at[-1], [], [])
+        throw.switch(throw.fired, self.driver.current)
+        throw.switch(throw.fired + ahead.width, 0.0)
+        loop.pulses.append(throw)
+        clear = max(ahead.leaves, ahead.fire) if ahead.width != ALWAYS else ahead.leaves
+        loop.since = touch + clear
+        loop.kind, loop.launched = int(ahead.kind), False
+        loop.touch, loop.speed = touch + ahead.touch, ahead.speed
+
+    def _push(self, loop: Loop, pulse: Pulse, release: float, back: float) -> None:
+        """Push into the pack from the touch to the release, if at all, then pull back."""
+        if loop.kind == FREE and release > 0.0:
+            pulse.switch(max(loop.touch, loop.time), self.driver.current)
+        pulse.switch(max(loop.touch + release, loop.time), back)
+
+    def _land(self, loop: Loop, dot: int, release: float, brake: float, width: float) -> None:
+        """Print, and brake on the way back."""
+        pulse = loop.pulses[-1]
+        self._push(loop, pulse, 0.0 if np.isnan(release) else release, 0.0)
+        if not np.isnan(brake):
+            pulse.switch(loop.touch + brake, self.driver.current)
+            # Whatever is left of the motion is pressed out of it against the backstop.
+            pulse.switch(loop.touch + brake + width, -_CLAMP * self.driver.current)
+            single = self.single.flight_time
+            end = min(brake + width + _CLAMPED * single, self.landing.settled - _FADED * self.driver.edge)
+            if dot + 1 < len(loop.due):
+                later = float(loop.due[dot + 1]) - self.start.flight - _FADED * self.driver.edge - loop.touch
+                end = max(end, min(later, brake + width + _LONGEST * single))
+            pulse.switch(loop.touch + end, 0.0)
+
+    def _landings(
+        self, kind: Any, speed: FloatArray, front: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return release, begin and width of the brake pulse for some touches."""
+        below, share = between(self.table, kind, speed)
+        nearer, farther = between_fronts(front)
+        found = []
+        for name in ("release", "brake", "width"):
+            tables = np.array([getattr(one, name) for one in self.fronts.landings])
+            rows = [
+                _known(tables[number, below], tables[number, below + 1], share)
+                for number in (nearer, nearer + 1)
+            ]
+            found.append(_known(rows[0], rows[1], farther))
+        return found[0], found[1], found[2]
+
+    def _before_rest(self, loop: Loop, dot: int) -> int:
+        """Return how many dots come between a dot and a rest."""
+        enough = self.landing.settled + self.start.flight
+        rests = np.flatnonzero(np.diff(loop.due[dot:]) >= enough)
+        return int(rests[0]) if rests.size else max(len(loop.due) - dot - 1, 0)
+
+
+def _known(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
+    """Interpolate; where one is not known, take the other."""
+    low, high = np.where(np.isnan(low), high, low), np.where(np.isnan(high), low, high)
+    return (1.0 - share) * low + share * high
+
+
+def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
+    """Return times, s, and heights, A, of all changes of the command to the coil, (M, S), filled with 0."""
+    rows = []
+    for loop in loops:
+        steps = [
+            (at, level - before)
+            for pulse in loop.pulses[-REMEMBERED:]
+            for at, level, before in zip(pulse.at, pulse.levels, [0.0, *pulse.levels], strict=False)
+        ]
+        rows.append(steps)
+    most = max(len(row) for row in rows)
+    whole = np.zeros((len(rows), most, 2))
+    for k, row in enumerate(rows):
+        whole[k, : len(row)] = row
+    return whole[..., 0], whole[..., 1]
+
+
+def _current(at: FloatArray, height: FloatArray, edge: float, t: FloatArray) -> FloatArray:
+    """Return the current, A, at times t, (M, K), after steps of the command, (M, S)."""
+    total = np.zeros_like(t)
+    for k in range(at.shape[1]):
+        since = np.maximum(t - at[:, k, np.newaxis], 0.0)
+        total -= height[:, k, np.newaxis] * np.expm1(-since / edge)
+    return total

@@ -1,0 +1,321 @@
+"""Which way to go on: the one that costs least, now and later, by dynamic programming.
+
+A dot costs a² + b², a and b its deviations of force and arrival in parts of the limits, each raised so that
+what nears a limit costs much more than what does not. Pulling the armature back costs a little, and so does a
+way whose next touch depends much on the speed of this one, which is known only so well. The cost of all that
+follows, discounted, is a function of how a touch comes (kind, lateness, speed) and of the number of dots
+before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957): first of the
+last dot before a rest, then of the one before, and so on.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from printhammer.control.feedback.fronts import MIDDLE, OFFSETS, between_fronts
+from printhammer.control.feedback.impact_map import FORCES
+
+if TYPE_CHECKING:
+    from printhammer.control.feedback.fronts import Fronts
+    from printhammer.control.feedback.impact_map import IntArray, SwingTable
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.support.arrays import FloatArray
+
+NEVER: Final = 50.0
+"""Cost of what leads nowhere."""
+
+KNOWN: Final = 0.01
+"""Standard deviation of the front, in parts of the way to the pack, above which it counts as not known."""
+
+_DISCOUNT: Final = 0.9
+_ROUNDS: Final = 8
+_LATENESS: Final = np.linspace(-0.9, 0.9, 13)
+_SPEED_DOUBT: Final = 0.04
+_STEEPEST: Final = 2e-3
+_NEAR: Final = 2
+_FAST: Final = 0.3
+_STEEP: Final = 8.0
+_EFFORT: Final = 0.1
+
+
+class Done(NamedTuple):
+    """What has been done after some touches (M,).
+
+    Return current, A; force that was printed, in parts of the single-pulse force; time after the touch, s.
+    """
+
+    back: FloatArray
+    force: FloatArray
+    time: FloatArray
+
+
+class Policy:
+    """Costs of the ways to go on at one rate.
+
+    Parameters
+    ----------
+    fronts : Fronts
+        Where they lead, and how well the armature comes to rest.
+    period : float
+        Time from slot to slot, s.
+    limits : Limits
+        How far dots may be off.
+    """
+
+    def __init__(self, fronts: Fronts, period: float, limits: Limits) -> None:
+        self.fronts = fronts
+        self.table = table = fronts.table
+        self.landing = fronts.landing
+        self.period = period
+        self.limits = limits
+        self._late = _LATENESS * limits.arrival
+        self._rows = [np.flatnonzero(table.kind == kind) for kind in range(int(table.kind.max()) + 1)]
+        self._doubt = self._doubts()
+        self._known = [np.flatnonzero(np.isfinite(row)) for row in table.next_touch]
+        self._efforts = self.effort(table.release) + self._doubt
+        self._costs = [self._resting()]
+
+    def dot_cost(self, force: FloatArray, late: FloatArray) -> FloatArray:
+        """Return the cost of a dot: force in parts of the single-pulse force, lateness in s."""
+        a, b = (force - 1.0) / self.limits.force, late / self.limits.arrival
+        cost: FloatArray = a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4)
+        return cost
+
+    def effort(self, release: FloatArray) -> FloatArray:
+        """Return what it costs to pull back, where it is not needed: a hard landing wears the backstop."""
+        table = self.table
+        cost: FloatArray = _EFFORT * np.square(table.back / table.driver.current) * (table.fire - release)
+        return cost / self.period
+
+    def ahead(self, kind: IntArray, late: FloatArray, speed: FloatArray, costs: FloatArray) -> FloatArray:
+        """Return the cost of a touch and all that follows it."""
+        kinds, lates, speeds = np.broadcast_arrays(kind, late, speed)
+        found = np.full(kinds.shape, NEVER)
+        end = self._late[-1]
+        for number, rows in enumerate(self._rows):
+            nodes = self.table.speed[rows]
+            with np.errstate(invalid="ignore"):
+                inside = (kinds == number) & (speeds >= nodes[0]) & (speeds <= nodes[-1])
+            if not inside.any():
+                continue
+            off = lates[inside]
+            i, p = _place(speeds[inside], nodes)
+            j, q = _place(np.clip(off, -end, end), self._late)
+            own = costs[rows]
+            found[inside] = (1.0 - p) * ((1.0 - q) * own[i, j] + q * own[i, j + 1]) + p * (
+                (1.0 - q) * own[i + 1, j] + q * own[i + 1, j + 1]
+            )
+            # Too late is worse the later it is, so that lost time is made up for.
+            found[inside] += NEVER * np.maximum(np.abs(off) - end, 0.0) / self.limits.arrival
+        return found
+
+    def best(
+        self,
+        kind: IntArray,
+        late: FloatArray,
+        speed: FloatArray,
+        wait: FloatArray,
+        after: IntArray,
+        front: FloatArray,
+        front_error: FloatArray,
+        done: Done | None = None,
+    ) -> tuple[IntArray, FloatArray, Choice]:
+        """Return number and cost of the best way for some touches (M,), and where each leads.
+
+        Parameters
+        ----------
+        kind, late, speed : array, shape (M,)
+            How the touches come; lateness in s, speed in m/s.
+        wait : array, shape (M,)
+            Time from this dot to the next one, s.
+        after : int array, shape (M,)
+            Number of dots between the next one and a rest.
+        front, front_error : array, shape (M,)
+            By how much the front of the pack lies farther away, and how well this is known, in parts of the
+            way from backstop to pack.
+        done : Done, optional
+            What has been done by then, where the throw alone is to be decided.
+        """
+        choice = Choice(self.fronts, kind, speed, front)
+        if done is not None:
+            choice.settle(done.force)
+        later = late[:, np.newaxis] + choice.next_touch - wait[:, np.newaxis]
+        cost = self.dot_cost(choice.force, late[:, np.newaxis]) + self.effort(choice.of("release"))
+        cost = cost + choice.by_speed(self._doubt)
+        unsure = np.flatnonzero(front_error > KNOWN)
+        if unsure.size:
+            cost[unsure] += self._front_doubt(choice, unsure, front_error[unsure])
+        for number in np.unique(after).tolist():
+            own = after == number
+            cost[own] += _DISCOUNT * self.ahead(
+                self.table.next_kind[np.newaxis, :],
+                later[own],
+                choice.next_speed[own],
+                self.costs(number),
+            )
+        if done is not None:
+            open_ways = self.table.back == done.back[:, np.newaxis]
+            open_ways &= self.table.fire > done.time[:, np.newaxis]
+            cost = np.where(open_ways, cost, np.inf)
+        cost = np.where(np.isnan(cost), np.inf, cost)
+        way = np.argmin(cost, axis=1)
+        return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice
+
+    def _doubts(self) -> FloatArray:
+        """Return what it costs that the speed of a touch is known only so well, for all ways, (T, A).
+
+        A way counts as steep as it is anywhere near: beside a jump, where it has one bounce more or less, the
+        table between the speeds says little.
+        """
+        table = self.table
+        found = np.zeros(table.next_touch.shape)
+        for rows in self._rows:
+            speeds, touch = table.speed[rows], table.next_touch[rows]
+            slope = np.abs(np.gradient(touch, speeds, axis=0))
+            steps = np.nan_to_num(np.abs(np.diff(touch, axis=0)) / np.diff(speeds)[:, np.newaxis])
+            steepest = maximum_filter1d(steps, 2 * _NEAR, axis=0, mode="constant")
+            around = np.vstack([steepest, steepest[-1:]])
+            # At the end of what is possible there is no slope to either side.
+            slope = np.nan_to_num(np.maximum(slope, around), nan=_STEEPEST)
+            found[rows] = np.square(slope * _SPEED_DOUBT / self.limits.arrival)
+        return found
+
+    def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
+        """Return what it costs some touches that the front of the pack is known only so well, (M, A)."""
+        fronts = self.fronts
+        below, share = choice.below[rows], choice.share[rows, np.newaxis]
+
+        def of(values: FloatArray) -> FloatArray:
+            found: FloatArray = (1.0 - share) * values[below] + share * values[below + 1]
+            return found
+
+        weaker = error[:, np.newaxis] * of(fronts.front_force)
+        force = choice.force[rows]
+        zero = np.zeros(1)
+        both = 0.5 * (self.dot_cost(force + weaker, zero) + self.dot_cost(force - weaker, zero))
+        ends = fronts.tables[0].next_touch, fronts.tables[-1].next_touch
+        slope = np.nan_to_num((ends[1] - ends[0]) / (OFFSETS[-1] - OFFSETS[0]))
+        late = error[:, np.newaxis] * of(slope) / self.limits.arrival
+        return both - self.dot_cost(force, zero) + np.square(late)
+
+    def costs(self, number: int) -> FloatArray:
+        """Return the cost of a touch and all that follows, (T, lateness), some dots before a rest."""
+        while len(self._costs) <= min(number, _ROUNDS):
+            self._costs.append(self._one_more(self._costs[-1]))
+        return self._costs[min(number, _ROUNDS)]
+
+    def _resting(self) -> FloatArray:
+        left = np.where(np.isnan(self.landing.left), _FAST, self.landing.left)
+        force = np.where(np.isnan(self.landing.force), 0.0, self.landing.force)
+        rest = self.dot_cost(force[:, np.newaxis], self._late[np.newaxis, :])
+        return np.minimum(rest + np.square(left / _FAST)[:, np.newaxis], NEVER)
+
+    def _one_more(self, costs: FloatArray) -> FloatArray:
+        table = self.table
+        late = self._late[:, np.newaxis]
+        new = np.full_like(costs, NEVER)
+        for row, ways in enumerate(self._known):
+            if not ways.size:
+                continue
+            later = late + table.next_touch[row, ways] - self.period
+            cost = self.dot_cost(table.force[row, ways], late) + self._efforts[row, ways]
+            cost = cost + _DISCOUNT * self.ahead(
+                table.next_kind[ways], later, table.next_speed[row, ways], costs
+            )
+            new[row] = np.minimum(cost.min(axis=1), NEVER)
+        return new
+
+
+class Choice:
+    """Where all ways lead from touches (M,) whose speed and front lie between those of the tables."""
+
+    def __init__(self, fronts: Fronts, kind: IntArray, speed: FloatArray, front: FloatArray) -> None:
+        self._fronts = fronts
+        self.below, self.share = between(fronts.table, kind, speed)
+        self.nearer, self.farther = between_fronts(front)
+        self.force = self.of("force")
+        self.next_touch = self.of("next_touch")
+        self.next_speed = self.of("next_speed")
+
+    def settle(self, force: FloatArray) -> None:
+        """Replace where the ways lead by where they do after dots (M,) of some force, in parts.
+
+        What belongs to the middle one of the forces of the tables is shifted; the others lead nowhere.
+        """
+        table = self._fronts.table
+        shape = len(self.below), len(np.unique(table.back)), FORCES, -1
+        own = self.force.reshape(shape)
+        apart = own[:, :, -1] - own[:, :, 0]
+        away = force[:, np.newaxis, np.newaxis] - own[:, :, FORCES // 2]
+        for name in ("next_touch", "next_speed"):
+            values = getattr(self, name).reshape(shape)
+            change = values[:, :, -1] - values[:, :, 0]
+            # Where no push is needed the forces are the same, and so is all that follows.
+            shift = np.divide(change, apart, out=np.zeros_like(change), where=apart != 0.0) * away
+            settled = np.full_like(values, np.nan)
+            settled[:, :, FORCES // 2] = values[:, :, FORCES // 2] + np.nan_to_num(shift)
+            setattr(self, name, settled.reshape(self.force.shape))
+
+    def by_speed(self, values: FloatArray) -> FloatArray:
+        """Interpolate an array (T, A) of the nominal hammer to (M, A)."""
+        share = self.share[:, np.newaxis]
+        found: FloatArray = (1.0 - share) * values[self.below] + share * values[self.below + 1]
+        return found
+
+    def of_way(self, values: FloatArray, way: IntArray) -> FloatArray:
+        """Interpolate an array (T, A) of the nominal hammer for one way each, to (M,)."""
+        found: FloatArray = (1.0 - self.share) * values[self.below, way] + self.share * values[
+            self.below + 1, way
+        ]
+        return found
+
+    def of(self, name: str) -> FloatArray:
+        """Interpolate arrays (T, A) of all tables to (M, A)."""
+        tables = [getattr(table, name) for table in self._fronts.tables]
+        found = np.empty((len(self.below), tables[MIDDLE].shape[1]))
+        for number, (near, far) in enumerate(itertools.pairwise(tables)):
+            rows = np.flatnonzero(self.nearer == number)
+            if rows.size:
+                found[rows] = self._blend(near, far, rows, slice(None))
+        return found
+
+    def at(self, name: str, way: IntArray) -> FloatArray:
+        """Interpolate arrays (T, A) of all tables for one way each, to (M,)."""
+        tables = [getattr(table, name) for table in self._fronts.tables]
+        found = np.empty(len(self.below))
+        for number, (near, far) in enumerate(itertools.pairwise(tables)):
+            rows = np.flatnonzero(self.nearer == number)
+            if rows.size:
+                found[rows] = self._blend(near, far, rows, way[rows])
+        return found
+
+    def _blend(self, near: FloatArray, far: FloatArray, rows: IntArray, way: Any) -> FloatArray:
+        below, share, farther = self.below[rows], self.share[rows], self.farther[rows]
+        if isinstance(way, slice):
+            share, farther = share[:, np.newaxis], farther[:, np.newaxis]
+        low = (1.0 - share) * near[below, way] + share * near[below + 1, way]
+        high = (1.0 - share) * far[below, way] + share * far[below + 1, way]
+        found: FloatArray = (1.0 - farther) * low + farther * high
+        return found
+
+
+def between(table: SwingTable, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the row of the table below some touches (M,), and the share of the one above."""
+    below, share = np.zeros(len(kind), np.int64), np.zeros(len(kind))
+    for number in range(int(table.kind.max()) + 1):
+        rows = np.flatnonzero(table.kind == number)
+        own = kind == number
+        i, p = _place(np.clip(speed[own], table.speed[rows[0]], table.speed[rows[-1]]), table.speed[rows])
+        below[own], share[own] = rows[0] + i, p
+    return below, share
+
+
+def _place(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the node below each value, and the share of the one above; nodes are evenly spaced."""
+    place = (values - nodes[0]) / (nodes[1] - nodes[0])
+    below = np.clip(place.astype(np.int64), 0, len(nodes) - 2)
+    return below, place - below

@@ -1,0 +1,443 @@
+"""Bursts of least work: the swing drive of the discussion of Hendriks (1983).
+
+"More energy might have to be expended in the first dot, but subsequent dots would be printed by keeping the
+actuator moving as in a parametric oscillator (swing). In the limit, the only energy to be expended should be
+the energy absorbed by the ribbon/paper pack."
+
+The burst is planned slot by slot, each from the state in which the one before leaves the armature: the coil
+brakes it on its way back from the paper, holds it off the backstop, and throws it again, so that the dot has
+the force asked for at its time. After the last dot the coil lets it down on the backstop.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
+
+import numpy as np
+
+from printhammer.control.least_work.bound import Bound, bound
+from printhammer.control.least_work.coil_force import CoilForce
+from printhammer.control.least_work.pulses import PulsePlan
+from printhammer.control.least_work.search import Task, landing_current, printing_current
+from printhammer.control.least_work.slot import SlotState
+from printhammer.drive.input import read_count, read_number, read_positive
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.shapes import Sampled
+from printhammer.errors import InputError, PrinthammerError
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of, rate_of
+from printhammer.run.ledger import stored_energy
+from printhammer.run.problem import TOLERANCE
+from printhammer.run.simulate import CYCLE, simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy.typing as npt
+    import xarray as xr
+
+    from printhammer.control.least_work.supply import SupplyCheck
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.coil_work import CoilWork
+    from printhammer.run.contacts import Contact
+    from printhammer.run.ledger import Ledger
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
+
+FORCE: Final = 0.9
+"""Least force of an adequate dot, in parts of that of the single pulse."""
+
+SPACING: Final = 0.6
+"""Time between the nodes of the current unless told otherwise, in parts of the time in which a single pulse
+indents the pack; a period holds a whole number of them."""
+
+MOST_DOTS: Final = 1000
+
+Least = Literal["positive work", "heat"]
+LEASTS: Final = get_args(Least)
+"""What is made least: the positive work of the coil, or its heat, which goes by the squared current."""
+
+SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
+"""Relative changes of the current under which a burst is looked at unless told otherwise."""
+
+Shape = Literal["free", "pulses"]
+SHAPES: Final = get_args(Shape)
+"""What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths."""
+
+_PAST_PEAK: Final = 1.2
+_SPARE: Final = 5e-4
+_LEAD: Final = 2.0
+_LANDING: Final = 5.0
+_FEWEST, _MOST = 8, 96
+_OVERLAP: Final = 0.01
+_SETTLED: Final = 1e-2
+
+
+class NoBurstError(PrinthammerError):
+    """No current within the bounds was found that prints the burst."""
+
+
+@dataclass(frozen=True)
+class LeastWork:
+    """A burst that prints adequate dots with least work, rest to rest.
+
+    Attributes
+    ----------
+    hammer : Hammer
+        The hammer.
+    drive : PulseSequence
+        The current that was found, fired slot by slot.
+    motion : Motion
+        The whole burst under that drive, at the tolerance of the ledger, until it has settled out.
+    rate : float
+        Dots per second, Hz.
+    count : int
+        Number of dots asked for.
+    force : float
+        Least force asked for, in parts of that of the single pulse.
+    largest, slew : float
+        Bounds on the current, A, and on its slope, A/s, of either sign.
+    least : str
+        What was made least, see `LEASTS`.
+    shape : str
+        What the current was allowed to be, see `SHAPES`; of pulses `slew` is no bound.
+    slots : array, shape (count,)
+        Times at which the dots were to touch, s.
+    single : Nominal
+        The dot of the single pulse.
+    single_work : CoilWork
+        What the coil does for one single pulse, rest to rest.
+    bound : Bound
+        Least positive work whatever the current.
+    tolerance : float
+        Of the integration.
+    """
+
+    hammer: Hammer
+    drive: PulseSequence = field(repr=False)
+    motion: Motion = field(repr=False)
+    rate: float
+    count: int
+    force: float
+    largest: float
+    slew: float
+    least: Least
+    shape: Shape
+    slots: FloatArray = field(repr=False)
+    single: Nominal = field(repr=False)
+    single_work: CoilWork = field(repr=False)
+    bound: Bound
+    tolerance: float
+
+    @property
+    def nodes(self) -> tuple[list[float], list[float]]:
+        """Times, s, and currents, A, of the nodes, between which the current runs in straight lines.
+
+        Raises
+        ------
+        InputError
+            The burst is made of pulses, which have no nodes.
+        """
+        if self.shape != "free":
+            raise InputError(f"shape = {self.shape!r}: the current has no nodes, expected a free one")
+        times, values = [0.0], [0.0]
+        for at, waveform in zip(self.drive.times.tolist(), self.drive.waveforms, strict=True):
+            assert isinstance(waveform, Sampled)
+            # The last sample only prolongs the one before, until the next firing cuts it off.
+            times += [at + offset for offset in waveform.times[1:-1].tolist()]
+            values += waveform.values[1:-1].tolist()
+        return times, values
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """Contacts with the pack, in order."""
+        return tuple(contact for contact in self.motion.contacts if contact.surface == "pack")
+
+    @property
+    def forces(self) -> FloatArray:
+        """Largest force of each contact with the pack, in parts of that of the single pulse."""
+        return np.array([contact.peak_force or 0.0 for contact in self.contacts]) / self.single.force
+
+    @property
+    def adequate(self) -> int:
+        """Number of dots whose force reaches the one asked for; 0 where there are more or fewer contacts."""
+        if len(self.contacts) != self.count:
+            return 0
+        return int((self.forces >= self.force).sum())
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Touch of each dot less its slot, s; empty where there are more or fewer contacts than dots."""
+        if len(self.contacts) != self.count:
+            return np.zeros(0)
+        return np.array([contact.t_in for contact in self.contacts]) - self.slots
+
+    @property
+    def ledger(self) -> Ledger:
+        """The energy ledger of the burst."""
+        return self.motion.energy
+
+    @property
+    def work(self) -> CoilWork:
+        """The work of the coil over the burst."""
+        return self.motion.coil_work
+
+    @property
+    def net_ratio(self) -> float:
+        """Net work of the coil over the energy that the pack absorbs, 1 in the limit; NaN without a dot."""
+        return self._over(self.work.net)
+
+    @property
+    def positive_ratio(self) -> float:
+        """Positive work of the coil over the energy that the pack absorbs."""
+        return self._over(self.work.positive)
+
+    @property
+    def bound_ratio(self) -> float:
+        """Least positive work whatever the current, over the energy that the pack absorbs."""
+        return self._over(self.bound.burst(self.count))
+
+    @property
+    def single_ratio(self) -> float:
+        """Net work for one single pulse, rest to rest, over the energy that the pack absorbs of it."""
+        return self.single_work.net / self.single.pack_loss
+
+    def _over(self, work: float) -> float:
+        absorbed = self.ledger.pack_loss
+        return work / absorbed if absorbed > 0.0 else math.nan
+
+    @cached_property
+    def rest_time(self) -> float:
+        """Time from which on less than a hundredth of what a dot costs the pack is left in motion, s."""
+        motion, hammer = self.motion, self.hammer
+        rest = stored_energy(hammer, rest_state(hammer))
+        stored = np.array([stored_energy(hammer, x) for x in motion.x.tolist()])
+        energy = 0.5 * hammer.mass * motion.v**2 + stored - rest
+        moving = np.flatnonzero(energy > _SETTLED * self.single.pack_loss)
+        return float(motion.t[min(int(moving[-1]) + 1, motion.t.size - 1)]) if moving.size else 0.0
+
+    def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
+        """Run the same drive with every current larger or smaller by given parts of it."""
+        from printhammer.control.least_work.supply import supply_check
+
+        return supply_check(self, changes)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return motion and current over time, dots over their number; provenance in the attributes."""
+        from printhammer.control.least_work.tables import least_work_dataset
+
+        return least_work_dataset(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw motion, current, power and ledger; returns a matplotlib figure."""
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.control.energy").plot(self, **options)
+
+
+def least_work(
+    hammer: Hammer,
+    rate: float | str = 1000.0,
+    *,
+    dots: SupportsIndex = 8,
+    force: float = FORCE,
+    largest: float | str = 2.0,
+    slew: float | None = None,
+    least: Least = "positive work",
+    shape: Shape = "free",
+    spacing: float | str | None = None,
+    tolerance: float = 1e-9,
+    progress: Callable[[int, int], None] | None = None,
+) -> LeastWork:
+    """Find the current that prints a burst of adequate dots with least work, rest to rest.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        A hammer with magnet, spring, pack, backstop and waveform.
+    rate : float or str, optional
+        Dots per second, Hz, or text with a unit.
+    dots : int, optional
+        Number of dots.
+    force : float, optional
+        Least force of a dot in parts of that of the single pulse.
+    largest : float or str, optional
+        Largest current of either sign, A, or text with a unit.
+    slew : float, optional
+        Largest slope of the current of either sign, A/s; by default the steepest rise of the waveform of the
+        hammer.
+    least : str, optional
+        "positive work" of the coil, or its "heat".
+    shape : str, optional
+        "free": any current within the bounds; "pulses": pulses of the hammer, of which times and widths are
+        sought, see `printhammer.control.least_work.pulses`. `slew` and `spacing` do not matter then.
+    spacing : float or str, optional
+        Time between nodes of the current, s, or text with a unit, rounded so that a period holds a whole
+        number of them; by default `SPACING` of the time in which a single pulse indents the pack.
+    tolerance : float, optional
+        As for `printhammer.simulate`, in the search; what it found is run at the tolerance of the ledger.
+    progress : callable, optional
+        Called with the number of slots planned and of all, the landing among them.
+
+    Returns
+    -------
+    LeastWork
+        The drive, its motion and its ledger.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above, or the hammer lacks a part or does not print.
+    NoBurstError
+        No current within the bounds was found.
+    """
+    period = 1.0 / rate_of(rate)
+    count = read_count(dots, "dots")
+    if count > MOST_DOTS:
+        raise InputError(f"dots = {count}, expected at most {MOST_DOTS}")
+    share, top = read_positive(force, "1", "force"), read_positive(largest, "A", "largest")
+    if share > 2.0:
+        raise InputError(f"force = {share!r}, expected at most 2 times that of the single pulse")
+    if least not in LEASTS:
+        raise InputError(f"least = {least!r}, expected one of {', '.join(LEASTS)}")
+    if shape not in SHAPES:
+        raise InputError(f"shape = {shape!r}, expected one of {', '.join(SHAPES)}")
+    apart = None if spacing is None else read_positive(spacing, "s", "spacing")
+    for part in ("magnet", "spring", "backstop", "pack"):
+        if getattr(hammer, part) is None:
+            raise InputError(f"{hammer.path}: the hammer has no {part}, expected one with all parts")
+    waveform = pulse_of(hammer)
+    if waveform.quantity != "current":
+        raise InputError(f"{hammer.path}: the waveform is a force, expected a current, which does work")
+    steepest = steepest_rise(waveform) if slew is None else read_number(slew, "A/s", "slew")
+    if shape == "pulses":
+        steepest = math.inf
+    elif slew is None and not math.isfinite(steepest):
+        raise InputError(
+            f"{hammer.path}: the waveform jumps, expected slew, the steepest slope of the current"
+        )
+    elif not (math.isfinite(steepest) and steepest > 0.0):
+        raise InputError(
+            f"slew = {steepest!r} A/s, expected a positive number, the steepest slope of a current"
+        )
+    single = nominal(hammer)
+    alone = simulate(hammer, PulseTrain(waveform), points=2)
+    limits = bound(hammer, single, share, top)
+    wanted = share * (1.0 + _SPARE) * single.force
+    task = Task(
+        hammer, CoilForce(hammer, top), top, steepest, wanted, limits.loading, least == "heat", tolerance
+    )
+    indenting = _loading_time(alone)
+    apart = SPACING * indenting if apart is None else apart
+    past, flight = _PAST_PEAK * indenting, single.flight_time
+    plan: _Plan | PulsePlan
+    if shape == "free":
+        plan = _Plan(task, period, past, apart, flight)
+    else:
+        lead = max(period, _LEAD * flight + past)
+        plan = PulsePlan(task, waveform, period, past, lead, _LANDING * flight, rest_state(hammer))
+    what = f"current of at most {top:g} A and {steepest:.4g} A/s was found that prints"
+    if shape == "pulses":
+        what = f"pulses of at most {top:g} A were found that print"
+    for slot in range(count):
+        if not plan.add_dot():
+            raise NoBurstError(
+                f"no {what} dot {slot + 1} of {count} with {share:g} of the force of the single pulse at"
+                f" {1.0 / period:.6g} Hz"
+            )
+        if progress is not None:
+            progress(slot + 1, count + 1)
+    plan.land()
+    if progress is not None:
+        progress(count + 1, count + 1)
+    drive = plan.drive()
+    motion = simulate(hammer, drive, duration=drive.end + CYCLE, tolerance=TOLERANCE, ledger=True)
+    return LeastWork(
+        hammer=hammer,
+        drive=drive,
+        motion=motion,
+        rate=1.0 / period,
+        count=count,
+        force=share,
+        largest=top,
+        slew=steepest,
+        least=least,
+        shape=shape,
+        slots=np.array(plan.touches),
+        single=single,
+        single_work=alone.coil_work,
+        bound=limits,
+        tolerance=tolerance,
+    )
+
+
+def steepest_rise(waveform: Waveform) -> float:
+    """Return the steepest slope of a waveform while its value moves away from zero, A/s; may be infinite."""
+    edges = waveform.segments()[:, 0]
+    value = waveform.value(np.minimum(edges, np.nextafter(waveform.support, 0.0)))
+    before = waveform.value(np.nextafter(edges, -np.inf))
+    jumps = np.abs(value) - np.abs(before)
+    if jumps[:-1].max() > 1e-6 * waveform.peak:
+        return math.inf
+    fine = np.concatenate([np.linspace(low, high, 257)[:-1] for low, high in itertools.pairwise(edges)])
+    step = 1e-6 * float(np.diff(edges).min())
+    slopes = (np.abs(waveform.value(fine + step)) - np.abs(waveform.value(fine))) / step
+    return float(slopes.max())
+
+
+def _loading_time(motion: Motion) -> float:
+    first = next(contact for contact in motion.contacts if contact.surface == "pack")
+    return first.t_peak - first.t_in
+
+
+class _Plan:
+    """The currents found so far, and the state in which they leave the armature."""
+
+    def __init__(self, task: Task, period: float, past: float, spacing: float, flight: float) -> None:
+        self._task = task
+        self._past = past
+        self._nodes = min(max(round(period / spacing), _FEWEST), _MOST)
+        self._step = period / self._nodes
+        self._lead = max(self._nodes, math.ceil((_LEAD * flight + past) / self._step))
+        self._landing = max(_FEWEST, math.ceil(_LANDING * flight / self._step))
+        self._state = SlotState(rest_state(task.hammer), 0.0, -1, 0.0, 0.0)
+        self._currents: list[FloatArray] = []
+        self.touches: list[float] = []
+
+    def add_dot(self) -> bool:
+        """Plan one more dot; False where no current was found."""
+        nodes = self._nodes if self._currents else self._lead
+        duration = nodes * self._step
+        before = self._currents[-1] if len(self._currents) > 1 else None
+        found = printing_current(self._task, self._state, duration, duration - self._past, nodes, before)
+        if found is None:
+            return False
+        self._state = self._task.end(self._state, found, duration)
+        self._currents.append(found)
+        self.touches.append(sum(c.size for c in self._currents) * self._step - self._past)
+        return True
+
+    def land(self) -> None:
+        """Plan the landing."""
+        found = landing_current(self._task, self._state, self._landing * self._step, self._landing)
+        self._currents.append(found)
+
+    def drive(self) -> PulseSequence:
+        """Return the whole current, fired slot by slot; the last one ends with the landing."""
+        *slots, last, landing = self._currents
+        waveforms, times, begin, node = [], [], 0.0, 0
+        for current in (*slots, np.concatenate([last, landing])):
+            # Each lasts a little longer than its slot and is cut off, so that no rounding leaves a gap.
+            values = np.concatenate([[begin], current, current[-1:]])
+            offsets = np.append(np.arange(current.size + 1), current.size + _OVERLAP) * self._step
+            waveforms.append(Sampled.from_samples(offsets, values, interpolation="linear"))
+            times.append(node * self._step)
+            node += current.size
+            begin = float(current[-1])
+        return PulseSequence(waveforms, times, overlap="replace")

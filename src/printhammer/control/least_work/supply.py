@@ -1,0 +1,82 @@
+"""How a burst of least work fares when the supply gives another current than it was planned for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.run.ensemble import Ensemble
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.control.least_work.burst import LeastWork
+    from printhammer.support.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class SupplyCheck:
+    """One burst with every current larger or smaller: arrays of shape (n,).
+
+    Attributes
+    ----------
+    changes : array
+        Relative change of every current: 0.03 for 3 % more.
+    adequate : int array
+        Number of dots in their slots with the force asked for, and without extra contacts.
+    weakest : array
+        Force of the weakest dot, in parts of that of the single pulse; 0 where one is lost.
+    spread : array
+        Largest deviation of a touch from its slot, s; NaN where a dot is lost.
+    status : str array
+        How the runs ended.
+    """
+
+    changes: FloatArray
+    adequate: npt.NDArray[np.int64]
+    weakest: FloatArray
+    spread: FloatArray
+    status: npt.NDArray[np.str_]
+
+
+def supply_check(found: LeastWork, changes: npt.ArrayLike) -> SupplyCheck:
+    """Run the drive of a burst with every current changed, in one ensemble.
+
+    Parameters
+    ----------
+    found : LeastWork
+        The burst.
+    changes : array
+        Relative changes of the current, each above -1.
+
+    Raises
+    ------
+    InputError
+        A change is not a finite number above -1.
+    """
+    factors = 1.0 + np.atleast_1d(np.asarray(changes, dtype=np.float64))
+    if factors.ndim != 1 or not (np.isfinite(factors) & (factors > 0.0)).all():
+        raise InputError(f"changes = {changes!r}, expected relative changes of the current above -1")
+    drives = [found.drive.scaled(factor) for factor in factors.tolist()]
+    result = Ensemble(found.hammer, drives, found.motion.end).run(dots=True, engine="plain")
+    dots = result.dots
+    assert dots is not None
+    touched = np.where(dots.struck, dots.fired_at + dots.flight_time, np.inf)
+    away = np.abs(touched[:, :, np.newaxis] - found.slots)
+    # The dot of a slot is the touch nearest to it, wherever its pulse was fired.
+    which = away.argmin(axis=1)
+    late = away.min(axis=1)
+    rows = np.arange(len(drives))[:, np.newaxis]
+    made = late < 0.5 / found.rate
+    force = np.where(made, np.nan_to_num(dots.peak_force[rows, which]) / found.single.force, 0.0)
+    good = made & (dots.extra_contacts[rows, which] == 0) & (force >= found.force)
+    return SupplyCheck(
+        changes=factors - 1.0,
+        adequate=good.sum(axis=1),
+        weakest=force.min(axis=1),
+        spread=np.where(made.all(axis=1), late.max(axis=1), np.nan),
+        status=np.array(result.status_names, "U16"),
+    )

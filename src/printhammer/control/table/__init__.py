@@ -1,0 +1,1 @@
+"""Compensation tables: feedforward of pulse width and firing time by the history of a dot."""

@@ -1,0 +1,295 @@
+"""Tune a compensation table for a hammer: every dot like a dot from rest, whatever was printed before it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.control.table.drive import LARGEST_CURRENT, clearance, print_pulse
+from printhammer.control.table.histories import checked_size, entries_of, histories, number_of
+from printhammer.control.table.polish import (
+    ROUNDS,
+    VALUES,
+    Work,
+    polish,
+    subset,
+)
+from printhammer.control.table.refine import refined, table_of
+from printhammer.control.table.search import SPACING, chosen, spaced
+from printhammer.control.table.single import Single, single_of
+from printhammer.drive.input import read_count, read_positive
+from printhammer.errors import InputError
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from printhammer.control.table.compensation import CompensationTable
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+FIRST: Final = 100.0
+"""Lowest rate of a table over all rates, Hz: every dot is printed from rest."""
+
+STEP: Final = 5.0
+"""Step between the rates of such a table, Hz."""
+
+SPREAD: Final = (
+    Perturbation(current=0.03),
+    Perturbation(current=-0.03),
+    Perturbation(travel=10e-6),
+    Perturbation(travel=-10e-6),
+)
+"""By how much the hammers differ on which ways to fire a dot are compared, and a robust table is tuned."""
+
+_USABLE: Final = 0.9
+_POOR: Final = 0.5
+_AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)
+
+
+def tune(
+    hammer: Hammer,
+    *,
+    rate: float | str | None = None,
+    rates: Sequence[float | str] | None = None,
+    history: SupportsIndex = 2,
+    reach: SupportsIndex = 2,
+    limits: Limits | None = None,
+    brake: bool = True,
+    robust: bool = False,
+    largest_current: float | str = LARGEST_CURRENT,
+    tolerance: float = DISPLAY_TOLERANCE,
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> CompensationTable:
+    """Tune a compensation table: pulse width and advance as a function of the last gaps between dots.
+
+    A dot made like a dot from rest leaves the hammer as every such dot does. So its pulse is a function of
+    the time since the dot before, as long as that one was made right; longer histories put right what is
+    left. For each history, width and advance are found by Newton's method so that force and arrival of the
+    last dot of patterns with that history are those of the single pulse. Mostly there is more than one way
+    to do it: before a rebound or after it, with one or another brake pulse that takes some of the rebound
+    away, or without. The one is taken in which a row of such dots stays nearest to the single pulse on
+    hammers with 3 % more and less current and 10 um more and less travel, counting what this hammer itself
+    does eight times. No dot is fired before the armature has left the pack of the one before.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        A hammer with a pack, a backstop and a current waveform that has a width.
+    rate, rates : float or str, or sequence of them, optional
+        Slots per second, Hz, or text with a unit; by default rates from 100 Hz, at which every dot is printed
+        from rest, to the highest one at which the table keeps to the limits, `STEP` apart, and closer where
+        the way to fire a dot changes.
+    history : int, optional
+        Number of gaps that a history holds, 1 to 4.
+    reach : int, optional
+        Longest gap that counts, slots.
+    limits : Limits, optional
+        By which deviations are measured.
+    brake : bool, optional
+        Whether brake pulses may be used.
+    robust : bool, optional
+        Tune width and advance on the hammers that differ as well, for the least mean square of all, instead
+        of on this hammer alone.
+    largest_current : float or str, optional
+        Bound on the current, A, or text with a unit.
+    tolerance : float, optional
+        As for `printhammer.simulate`; by default that for pictures.
+    threads : int, optional
+        By default as many as there are cores; the table does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of steps done and of all, at most.
+
+    Returns
+    -------
+    CompensationTable
+        With the worst deviation of each entry; it is not promised to be within the limits.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; a hammer that does not print or does not settle; a rate at
+        which no pulse prints a dot one slot after another.
+    """
+    gaps, far = checked_size(read_count(history, "history"), read_count(reach, "reach"))
+    bounds = Limits() if limits is None else limits
+    largest = read_positive(largest_current, "A", "largest_current")
+    pulse, widest = print_pulse(hammer, largest)
+    single = single_of(hammer, pulse, tolerance)
+    if rate is not None and rates is not None:
+        raise InputError("rate and rates are given, expected one of them")
+    asked = [rate] if rate is not None else rates
+    grid = _all_rates(single) if asked is None else _given_rates(asked)
+    hammers = [hammer, *([perturbed(hammer, by) for by in SPREAD] if robust else [])]
+    spread = _spread(hammer)
+    nodes = len(spaced(_periods(grid, far, single), SPACING))
+    # Once a time at which ways are looked for, once a step of Newton's method, with and without long rows.
+    steps = _Steps(progress, nodes + 3 + 2 * (ROUNDS + 1) * gaps)
+    shape = 0, entries_of(gaps, far)
+    blank = Work(
+        rates=grid[:0],
+        gaps=gaps,
+        reach=far,
+        **{name: np.zeros(shape) for name in VALUES},
+        hammers=hammers,
+        spread=spread,
+        pulse=pulse,
+        widest=widest,
+        wait=clearance(pulse, widest, largest),
+        single=single,
+        limits=bounds,
+        tolerance=tolerance,
+        threads=threads,
+    )
+    work = _tuned(blank, grid, brake, steps, open_ended=asked is None)
+    if asked is not None:
+        _tune_again(work, blank, brake, steps)
+    lost = np.flatnonzero(~np.isfinite(work.deviation.max(axis=1)))
+    if asked is None:
+        work = refined(subset(work, np.arange(_kept(work))), largest, steps, brake=brake)
+    elif lost.size:
+        speed = float(grid[lost[0]])
+        raise InputError(
+            f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before,"
+            " expected a lower rate"
+        )
+    return table_of(work, largest)
+
+
+def _spread(hammer: Hammer) -> list[Hammer]:
+    """Return the hammers that differ a little, as far as the laws of the hammer let them."""
+    found = []
+    for by in SPREAD:
+        with suppress(InputError):
+            found.append(perturbed(hammer, by))
+    return found
+
+
+class _Steps:
+    """Tell how far the work is."""
+
+    def __init__(self, progress: Callable[[int, int], None] | None, total: int) -> None:
+        self._progress, self._total, self._done = progress, total, 0
+
+    def __call__(self) -> None:
+        self._done += 1
+        if self._progress is not None:
+            self._progress(min(self._done, self._total), self._total)
+
+
+def _all_rates(single: Single) -> FloatArray:
+    """Return rates from that at which all is rest to one at which the armature is not back from the pack."""
+    lowest = STEP * np.floor(1.0 / (single.settled * STEP))
+    return np.array([FIRST, *np.arange(lowest, 1.0 / single.left, STEP).tolist()])
+
+
+def _given_rates(asked: Sequence[float | str]) -> FloatArray:
+    if isinstance(asked, str) or len(asked) == 0:
+        raise InputError(f"rates = {asked!r}, expected a list of rates, at least one")
+    found = np.array([read_positive(rate, "Hz", "rate") for rate in asked])
+    if (np.diff(found) <= 0.0).any():
+        raise InputError(f"rates = {list(asked)!r}, expected ascending rates")
+    return found
+
+
+def _tune_again(work: Work, blank: Work, brake: bool, steps: Callable[[], None]) -> None:
+    """Tune rates once more that are not good enough, with ways from times around theirs; changes the rows."""
+    poor = np.flatnonzero(~(work.deviation.max(axis=1) <= _POOR))
+    if not poor.size:
+        return
+    again = _tuned(blank, work.rates[poor], brake, steps, open_ended=False, around=_AROUND)
+    better = again.deviation.max(axis=1) < work.deviation[poor].max(axis=1)
+    for name in VALUES:
+        getattr(work, name)[poor[better]] = getattr(again, name)[better]
+
+
+def _tuned(
+    blank: Work,
+    rates: FloatArray,
+    brake: bool,
+    steps: Callable[[], None],
+    *,
+    open_ended: bool,
+    around: FloatArray | None = None,
+) -> Work:
+    """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
+
+    Parameters
+    ----------
+    blank : Work
+        What is asked, without rows.
+    rates : array
+        Of the rows, Hz.
+    brake : bool
+        Whether brake pulses may be used.
+    steps : callable
+        Called after each step of the work.
+    open_ended : bool
+        Whether rates at which nothing comes near are left out.
+    around : array, optional
+        How far from the times between dots ways are looked for as well, s.
+    """
+    own: Any = blank.pulse
+    shape = rates.size, entries_of(blank.gaps, blank.reach)
+    blanks: dict[str, Any] = {name: np.zeros(shape) for name in VALUES}
+    work = replace(blank, rates=rates, **blanks)
+    work.width[:] = own.width
+    every = np.arange(1, work.reach + 1) / rates[:, np.newaxis]
+    periods = _periods(rates, work.reach, work.single)
+    if around is not None:
+        others = (periods[:, np.newaxis] + around).ravel()
+        longest, shortest = work.single.settled, periods.min(initial=np.inf) + around.min()
+        periods = np.unique([*periods, *others[(others <= longest) & (others > max(shortest, 0.0))]])
+    there, ways = chosen(work, periods, brake=brake, told=steps)
+    for gap, columns in _columns(work).items():
+        for row, period in enumerate(every[:, gap - 1].tolist()):
+            if period > work.single.settled:
+                continue
+            place = int(np.searchsorted(there, period))
+            if place == there.size or there[place] != period:
+                work.deviation[row, columns] = np.inf
+                continue
+            work.advance[row, columns] = period - ways.fired[place]
+            work.width[row, columns] = ways.width[place]
+            work.brake_delay[row, columns] = ways.delay[place]
+            work.brake_width[row, columns] = ways.brake[place]
+    found = np.isfinite(work.deviation.max(axis=1))
+    if open_ended and not found.all():
+        # A table without given rates ends below the first at which no pulse comes near.
+        work = subset(work, np.arange(int(np.argmin(found))))
+        found = found[: work.rates.size]
+    good = subset(work, np.flatnonzero(found))
+    if found.any():
+        polish(good, steps)
+    for name in VALUES:
+        getattr(work, name)[found] = getattr(good, name)
+    return work
+
+
+def _periods(rates: FloatArray, reach: int, single: Single) -> FloatArray:
+    """Return all times between dots, s, within which the hammer does not come to rest, ascending."""
+    every = np.arange(1, reach + 1) / rates[:, np.newaxis]
+    return np.unique(every[every <= single.settled])
+
+
+def _columns(work: Work) -> dict[int, list[int]]:
+    """Return the numbers of the histories that begin with a gap; the first one is rest before that."""
+    every = histories(work.gaps, work.reach)
+    return {
+        gap: [number_of(one, work.reach) for one in every if one[0] == gap]
+        for gap in range(1, work.reach + 1)
+    }
+
+
+def _kept(work: Work) -> int:
+    """Return how many rates keep well to the limits, from the lowest on."""
+    bad = np.flatnonzero(~(work.deviation.max(axis=1) <= _USABLE))
+    if bad.size and bad[0] == 0:
+        raise InputError("the table does not keep to the limits at any rate, expected a hammer that prints")
+    return int(bad[0]) if bad.size else work.rates.size

@@ -1,0 +1,173 @@
+"""Tables as files: what is written is read back; what is no table is refused in one sentence."""
+
+import dataclasses
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.control.table.by_hand import by_hand
+
+import printhammer as ph
+from printhammer.control.table.compensation import COLUMNS, CompensationTable
+from printhammer.control.table.files import csv_text, json_text, load_table, read_table, table_dataset
+from printhammer.control.table.header import header_text
+from printhammer.control.table.histories import histories, number_of
+
+TEXTS = {".csv": csv_text, ".json": json_text}
+
+
+def same(one: CompensationTable, other: CompensationTable) -> bool:
+    heads = ("hammer", "fingerprint", "gaps", "reach", "largest_current")
+    return all(getattr(one, name) == getattr(other, name) for name in heads) and all(
+        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
+        for name in ("rates", *COLUMNS, "deviation")
+    )
+
+
+@pytest.mark.parametrize("suffix", TEXTS)
+def test_read_back_from_disk(suffix: str, tmp_path: Path) -> None:
+    table = by_hand()
+    table.save(tmp_path / f"table{suffix}")
+    assert same(load_table(tmp_path / f"table{suffix}"), table)
+
+
+@given(
+    gaps=st.integers(1, 3),
+    reach=st.integers(1, 3),
+    late=st.floats(-1e-4, 1e-4),
+    suffix=st.sampled_from(sorted(TEXTS)),
+)
+@settings(max_examples=30, deadline=None)
+def test_read_back_to_the_last_bit(gaps: int, reach: int, late: float, suffix: str) -> None:
+    table = by_hand(gaps=gaps, reach=reach)
+    table = by_hand(gaps=gaps, reach=reach, advance=table.advance + late / 3.0)
+    assert same(read_table(TEXTS[suffix](table), suffix), table)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sentence"),
+    [
+        (
+            "# printhammer compensation table, format 1",
+            "# format 7",
+            "first line = .*expected '# printhammer",
+        ),
+        ("# gaps = 2", "# gaps = 9", "history = 9, expected a whole number from 1 to 4"),
+        ("# gaps = 2", "# gapes = 2", "'gapes' is not known"),
+        ("# reach = 2", "# reach = two", "reach = 'two': expected a text or a number"),
+        ("# reach = 2", '# reach = "2"', "reach = '2', expected a whole number"),
+        ("# reach = 2\n", "", "reach is missing"),
+        ("# reach = 2", "# reach = 2\n# reach = 2", "reach is given twice"),
+        ("largest_current = 2.0", "largest_current = -1", "largest_current = -1 A, expected a positive"),
+        ("rate [Hz],gap 1", "rate [kHz],gap 1", "columns = .*expected rate \\[Hz\\]"),
+        ("800.0,rest,rest", "-800.0,rest,rest", "row 1: rate = -800.0 Hz, expected a positive number"),
+        ("800.0,rest,rest", "fast,rest,rest", "row 1: rate = 'fast', expected a number"),
+        ("800.0,1,rest", "800.0,7,rest", "row 2: gap = '7', expected 'rest' or a whole number from 1 to 2"),
+        ("800.0,1,rest", "800.0,rest,1", "row 2: gaps = rest-1, expected only rest after a rest"),
+        ("800.0,1,rest", "800.0,rest,rest", "row 2: the history rest-rest is given twice"),
+        ("800.0,1,rest,", "800.0,1,rest,1.0,", "row 2: 9 cells, expected 8"),
+    ],
+)
+def test_bad_csv(before: str, after: str, sentence: str) -> None:
+    text = csv_text(by_hand())
+    assert before in text
+    with pytest.raises(ph.InputError, match=f"^table: {sentence}"):
+        read_table(text.replace(before, after, 1), ".csv")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "sentence"),
+    [
+        ("kind", "a poem", "kind = 'a poem', expected"),
+        ("format", 2, "format = 2, expected 1"),
+        ("units", {"rate": "kHz"}, "units = "),
+        ("entries", 3, "entries = 3, expected a list"),
+        ("entries", [], "the table has no rows"),
+        ("entries", [{"rate": 1.0}], "entry 1: gaps is missing"),
+        ("hammer", 5, "hammer = 5, expected a text"),
+        ("surprise", 1, "'surprise' is not known"),
+    ],
+)
+def test_bad_json(key: str, value: object, sentence: str) -> None:
+    data = json.loads(json_text(by_hand()))
+    with pytest.raises(ph.InputError, match=sentence):
+        read_table(json.dumps({**data, key: value}), ".json")
+
+
+def test_a_missing_row() -> None:
+    data = json.loads(json_text(by_hand()))
+    del data["entries"][3]
+    with pytest.raises(ph.InputError, match="the history 1-1 at 800 Hz is missing"):
+        read_table(json.dumps(data), ".json")
+
+
+def test_a_number_that_is_none() -> None:
+    data = json.loads(json_text(by_hand()))
+    data["entries"][0]["width"] = "wide"
+    with pytest.raises(ph.InputError, match="entry 1: width = 'wide', expected a number"):
+        read_table(json.dumps(data), ".json")
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "null"])
+def test_no_json_table(text: str) -> None:
+    with pytest.raises(ph.InputError, match="expected"):
+        read_table(text, ".json")
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(ph.InputError, match=r"ends in \.csv or \.json"):
+        load_table(tmp_path / "table.h")
+    with pytest.raises(ph.InputError, match="cannot be read"):
+        load_table(tmp_path / "table.csv")
+    (tmp_path / "table.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ph.InputError, match="UTF-8"):
+        load_table(tmp_path / "table.csv")
+
+
+def test_a_name_that_is_no_table(tmp_path: Path) -> None:
+    with pytest.raises(ph.InputError, match=r"expected a name that ends in one of \.csv, \.json, \.h, \.nc"):
+        by_hand().save(tmp_path / "table.txt")
+
+
+def test_dataset() -> None:
+    table = by_hand()
+    chart = table_dataset(table)
+    assert chart["width"].attrs["units"] == "s"
+    assert chart.attrs["fingerprint"] == table.fingerprint
+    assert chart["history"].values.tolist()[:2] == ["rest-rest", "1-rest"]
+    column = number_of((1, 0), 2)
+    assert np.array_equal(chart["advance"].sel(history="1-rest"), table.advance[:, column])
+
+
+def test_the_header_compiles_and_says_the_same(tmp_path: Path) -> None:
+    table = by_hand()
+    table.save(tmp_path / "table.h")
+    name = "printhammer_" + "".join(letter if letter.isalnum() else "_" for letter in table.hammer)
+    lines = ['#include "table.h"', "#include <stdio.h>", "int main(void) {"]
+    for history in histories(2, 2):
+        gaps = ", ".join(f"{gap or 9}u" for gap in history)
+        lines.append(f"  {{ unsigned gaps[2] = {{{gaps}}}; unsigned at = {name}_history(gaps);")
+        lines.append(
+            f'    printf("%u %d %d\\n", at, (int){name}_advance[1][at], (int){name}_width[1][at]); }}'
+        )
+    (tmp_path / "main.c").write_text("\n".join([*lines, "  return 0;", "}"]) + "\n")
+    command = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-o", "main", "main.c"]
+    # Only what is used is defined in such a header.
+    subprocess.run([*command, "-Wno-unused-const-variable"], cwd=tmp_path, check=True)
+    told = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout.split("\n")
+    for line, history in zip(told, histories(2, 2), strict=False):
+        column = number_of(history, 2)
+        wanted = column, round(1e9 * table.advance[1, column]), round(1e9 * table.width[1, column])
+        assert tuple(int(word) for word in line.split()) == wanted
+
+
+def test_odd_names_make_a_header_all_the_same() -> None:
+    text = header_text(dataclasses.replace(by_hand(), hammer='odd */ "name"\\\n', fingerprint="ab*/cd"))
+    assert "odd * /" in text
+    assert "abcd" in text
+    comments = text.count("/*")
+    assert text.count("*/") == comments

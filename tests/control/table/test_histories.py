@@ -1,0 +1,63 @@
+"""Histories of dots: numbers, patterns, and what a rest hides."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import printhammer as ph
+from printhammer.control.table.histories import (
+    REST,
+    checked_size,
+    entries_of,
+    histories,
+    histories_of,
+    number_of,
+    pattern_of,
+    plain,
+    shared_numbers,
+)
+
+SIZES = st.tuples(st.integers(1, 4), st.integers(1, 4))
+
+
+def test_of_a_pattern() -> None:
+    # Gaps 1, 1, 3 with a reach of 2: the last dot is printed from rest.
+    assert histories_of((4, 5, 6, 9), 2, 2).tolist() == [0, 3, 4, 0, 0]
+
+
+def test_a_rest_hides_what_lies_before() -> None:
+    assert plain((1, REST, 2)) == (1, REST, REST)
+    assert number_of((1, REST, 2), 2) == number_of((1, REST, REST), 2) == 9
+
+
+def test_slots_must_ascend() -> None:
+    with pytest.raises(ph.InputError, match="slots = "):
+        histories_of((3, 3), 1, 1)
+
+
+@pytest.mark.parametrize(("gaps", "reach"), [(0, 1), (5, 1), (1, 0), (1, 9), (True, 1)])
+def test_sizes_out_of_bounds(gaps: int, reach: int) -> None:
+    with pytest.raises(ph.InputError, match="expected a whole number from 1"):
+        checked_size(gaps, reach)
+
+
+@given(SIZES)
+def test_all_differ_and_all_numbers_are_shared_by_one(size: tuple[int, int]) -> None:
+    gaps, reach = size
+    every = histories(gaps, reach)
+    numbers = [number_of(history, reach) for history in every]
+    assert len(set(numbers)) == len(every) == sum(reach**known for known in range(gaps + 1))
+    shared = shared_numbers(gaps, reach)
+    assert len(shared) == entries_of(gaps, reach)
+    assert set(shared.tolist()) == set(numbers)
+    assert all(shared[number] == number for number in numbers)
+
+
+@given(SIZES, st.data())
+def test_the_last_dot_of_its_pattern_has_the_history(size: tuple[int, int], data: st.DataObject) -> None:
+    gaps, reach = size
+    history = data.draw(st.sampled_from(histories(gaps, reach)))
+    before = (reach + 1,) if REST in history else (1, 1)
+    for given_before in ((), before):
+        slots = pattern_of(history, given_before)
+        assert histories_of(slots, gaps, reach)[-2] == number_of(history, reach)
