@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import printhammer as ph
-from printhammer.control.feedback.comparison import Feedback
-from printhammer.control.feedback.comparison import FeedbackStrategy
+from printhammer.control.feedback.comparison import Feedback, FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.driver import driver_of
 from printhammer.printing.dots.strategy import Strategy, open_loop

@@ -6,6 +6,7 @@ corrected by what each stretch by itself shows, before errors can grow from cont
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.identify.shots.gauss_newton import Prior
     from printhammer.identify.shots.shooting import Chain, Shooting
     from printhammer.support.arrays import FloatArray
 
@@ -29,6 +29,25 @@ _LONGEST: Final = 0.3
 _HALVINGS: Final = 6
 _TRIES: Final = 2
 """Steps at one price."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the parameters beside the records: normal, (p - mean) with a covariance.
+
+    Attributes
+    ----------
+    which : int array, shape (k,)
+        Numbers of the parameters.
+    mean : array, shape (k,)
+        SI.
+    covariance : array, shape (k, k)
+        SI.
+    """
+
+    which: npt.NDArray[np.int64]
+    mean: FloatArray
+    covariance: FloatArray
 
 
 class Approach:

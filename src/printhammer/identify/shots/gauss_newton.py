@@ -19,7 +19,8 @@ from printhammer.identify.residuals import (
     outliers_of,
     spikes_of,
 )
-from printhammer.identify.shots.approach import Approach
+from printhammer.identify.result import Profile, student
+from printhammer.identify.shots.approach import Approach, Prior
 from printhammer.identify.shots.identifiable import singular
 
 if TYPE_CHECKING:
@@ -44,28 +45,12 @@ _FLOOR: Final = 1e-7
 """Noise in strokes below which no sensor is, so that nothing lies too far off."""
 _LEAST: Final = 1e-16
 """Noise, m, by which exact data are weighted."""
+_REACH: Final = 3.0
+_POINTS: Final = 7
+"""How far a profile goes, in standard errors, and its points."""
 _LOST: Final = 1e-7
 """Singular values over the largest that rounding has lost."""
 _NO_MOTION: Final = "the hammer does not move so that the records could be compared with it"
-
-
-@dataclass(frozen=True, eq=False)
-class Prior:
-    """What is known of the parameters beside the records: normal, (p - mean) with a covariance.
-
-    Attributes
-    ----------
-    which : int array, shape (k,)
-        Numbers of the parameters.
-    mean : array, shape (k,)
-        SI.
-    covariance : array, shape (k, k)
-        SI.
-    """
-
-    which: npt.NDArray[np.int64]
-    mean: FloatArray
-    covariance: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,6 +295,49 @@ class GaussNewton:
             cost=float(here.residuals @ here.residuals),
         )
 
+    def profile(self, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
+        """Return how much worse the fit becomes where one parameter is held at other values.
+
+        The noise is taken as found at the solution; where there is no fit, or the constant would change its sign,
+        the profile ends.
+
+        Parameters
+        ----------
+        solution : Solution
+            The solution of the fit.
+        which : int
+            Number of the parameter.
+        degrees_of_freedom : float
+            Of the estimate of the noise.
+
+        Returns
+        -------
+        Profile
+            With the interval of 95 %.
+        """
+        error = float(np.sqrt(solution.covariance[which, which]))
+        best = solution.values[which]
+        held = np.zeros(len(solution.values), bool)
+        held[which] = True
+        found = {best: 0.0}
+        for side in (-1.0, 1.0):
+            values, states = solution.values, solution.states
+            for number in range(1, _POINTS // 2 + 1):
+                place = best + side * _REACH * error * number / (_POINTS // 2)
+                if place * best <= 0.0:
+                    break
+                start = values.copy()
+                start[which] = place
+                try:
+                    other = self.solve(start, states, held=held, noise=solution)
+                except InputError:
+                    break
+                found[place] = max(other.cost - solution.cost, 0.0)
+                values, states = other.values, other.states
+        places = np.array(sorted(found))
+        increase = np.array([found[place] for place in places])
+        return Profile(places, increase, _interval(places, increase, best, student(degrees_of_freedom)))
+
 
 @dataclass(frozen=True, eq=False)
 class _Weighted:
@@ -338,3 +366,11 @@ def _solved(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, Floa
 def _gap(chains: Sequence[Chain], units: FloatArray) -> float:
     """Return the largest gap, in strokes and typical speeds."""
     return max((float(np.abs(chain.gaps / units).max()) for chain in chains if chain.gaps.size), default=0.0)
+
+
+def _interval(places: FloatArray, increase: FloatArray, best: float, reach: float) -> tuple[float, float]:
+    """Return where the root of the increase, which is nearly straight, passes a number of standard errors."""
+    roots = np.sqrt(increase) * np.sign(places - best)
+    low = float(np.interp(-reach, roots, places)) if roots[0] < -reach else -np.inf
+    high = float(np.interp(reach, roots, places)) if roots[-1] > reach else np.inf
+    return low, high

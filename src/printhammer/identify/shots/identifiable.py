@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.result import Profile, student
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
     from printhammer.support.arrays import FloatArray
 
 _DEGENERATE: Final = 1e5
@@ -23,8 +21,6 @@ _WEAK: Final = 0.1
 """Standard error of a constant, in units of its value, that is weakly determined."""
 _SHARE: Final = 0.02
 """Part of a constant in a direction, over the largest, from which on it is named."""
-_REACH: Final = 3.0
-_POINTS: Final = 7
 
 
 def condition_number(design: FloatArray) -> float:
@@ -98,60 +94,6 @@ def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
     """Return which constants are weakly determined."""
     errors = np.sqrt(np.diag(covariance))
     return [int(i) for i in np.flatnonzero(errors > _WEAK * np.abs(values))]
-
-
-def profile(fit: GaussNewton, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
-    """Return how much worse the fit becomes where one parameter is held at other values.
-
-    The noise is taken as found at the solution; where there is no fit, or the constant would change its sign,
-    the profile ends.
-
-    Parameters
-    ----------
-    fit : GaussNewton
-        The fit.
-    solution : Solution
-        Its solution.
-    which : int
-        Number of the parameter.
-    degrees_of_freedom : float
-        Of the estimate of the noise.
-
-    Returns
-    -------
-    Profile
-        With the interval of 95 %.
-    """
-    error = float(np.sqrt(solution.covariance[which, which]))
-    best = solution.values[which]
-    held = np.zeros(len(solution.values), bool)
-    held[which] = True
-    found = {best: 0.0}
-    for side in (-1.0, 1.0):
-        values, states = solution.values, solution.states
-        for number in range(1, _POINTS // 2 + 1):
-            place = best + side * _REACH * error * number / (_POINTS // 2)
-            if place * best <= 0.0:
-                break
-            start = values.copy()
-            start[which] = place
-            try:
-                other = fit.solve(start, states, held=held, noise=solution)
-            except InputError:
-                break
-            found[place] = max(other.cost - solution.cost, 0.0)
-            values, states = other.values, other.states
-    places = np.array(sorted(found))
-    increase = np.array([found[place] for place in places])
-    return Profile(places, increase, _interval(places, increase, best, student(degrees_of_freedom)))
-
-
-def _interval(places: FloatArray, increase: FloatArray, best: float, reach: float) -> tuple[float, float]:
-    """Return where the root of the increase, which is nearly straight, passes a number of standard errors."""
-    roots = np.sqrt(increase) * np.sign(places - best)
-    low = float(np.interp(-reach, roots, places)) if roots[0] < -reach else -np.inf
-    high = float(np.interp(reach, roots, places)) if roots[-1] > reach else np.inf
-    return low, high
 
 
 def would_be_found(

@@ -13,10 +13,10 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.identify.lowpass import time_constant
 from printhammer.identify.result import Fit, FittedConstant
-from printhammer.identify.shots.gauss_newton import GaussNewton, Prior, Solution
+from printhammer.identify.shots.approach import Prior
+from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
 from printhammer.identify.shots.identifiable import (
     condition_number,
-    profile,
     refuse_degenerate,
     tied_constants,
     weak,
@@ -312,7 +312,7 @@ def _result(
         lines=np.concatenate([shot.lines for shot in shots]),
         given=given,
         indistinct=tuple(tied_constants(keys, values, covariance)),
-        profiles={keys[which]: profile(fit, solution, which, degrees) for which in weak(values, covariance)},
+        profiles={keys[which]: fit.profile(solution, which, degrees) for which in weak(values, covariance)},
         rejected=rejected,
         p_value=p_value,
         notes=tuple(notes),
