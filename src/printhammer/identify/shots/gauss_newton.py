@@ -298,8 +298,8 @@ class GaussNewton:
     def profile(self, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
         """Return how much worse the fit becomes where one parameter is held at other values.
 
-        The noise is taken as found at the solution; where there is no fit, or the constant would change its sign,
-        the profile ends.
+        The noise is taken as found at the solution; where there is no fit, or the constant would change its
+        sign, the profile ends.
 
         Parameters
         ----------
