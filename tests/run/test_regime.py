@@ -18,6 +18,20 @@ def test_period_and_rate(hammer: ph.Hammer) -> None:
     assert regime.value("rate") == 800.0
 
 
+def test_a_rate_and_its_period_are_the_same_firing_times_to_the_last_bit(hammer: ph.Hammer) -> None:
+    rates = [1234.0, 700.0, *np.random.default_rng(14).uniform(1.0, 5000.0, 500).tolist()]
+    for rate in rates:
+        train = ph.PulseTrain(hammer.waveform, rate=rate, pulses=2000)
+        for other in (
+            ph.PulseTrain(hammer.waveform, period=1.0 / rate, pulses=2000),
+            ph.Burst(hammer.waveform, rate=rate, pulses=2000),
+            Regime.of(hammer, rate=rate).pulses(2000),
+            Regime.of(hammer, period=1.0 / rate).with_("rate", rate).pulses(2000),
+        ):
+            assert np.array_equal(train.times, other.times)
+            assert other.period == train.period
+
+
 def test_a_regime_stands_for_itself(hammer: ph.Hammer) -> None:
     regime = ph.Regime.of(hammer, rate="1 kHz", phase=0.25)
     assert ph.Regime.of(regime) is regime

@@ -107,7 +107,8 @@ def even_times(
     steps = np.arange(count, dtype=np.float64)
     if rate is not None:
         often = read_positive(rate, "Hz", "rate")
-        return steps / often, ("rate", often), period_of_rate(often)
+        spacing = period_of_rate(often)
+        return steps * spacing, ("rate", often), spacing
     if period is None:
         raise InputError("a train of pulses is expected to have a rate or a period")
     spacing = read_positive(period, "s", "period")
