@@ -7,7 +7,7 @@ from printhammer.results import Result
 
 
 def strobe(hammer: Hammer) -> Result:
-    from printhammer.chaos.strobe import strobe
+    from printhammer.chaos.strobe.points import strobe
 
     return strobe(hammer, period=1.3e-3, points=5, verdict=False)
 

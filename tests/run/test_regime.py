@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
+from printhammer.chaos import strobes
 from printhammer.drive.waveforms.shapes import HalfSine
 from printhammer.run.regime import Regime
 
@@ -15,6 +16,50 @@ def test_period_and_rate(hammer: ph.Hammer) -> None:
     assert regime.with_("period", 1e-3).rate == 1000.0
     assert regime.value("period") == 1.25e-3
     assert regime.value("rate") == 800.0
+
+
+def test_a_rate_and_its_period_are_the_same_firing_times_to_the_last_bit(hammer: ph.Hammer) -> None:
+    rates = [1234.0, 700.0, *np.random.default_rng(14).uniform(1.0, 5000.0, 500).tolist()]
+    for rate in rates:
+        train = ph.PulseTrain(hammer.waveform, rate=rate, pulses=2000)
+        for other in (
+            ph.PulseTrain(hammer.waveform, period=1.0 / rate, pulses=2000),
+            ph.Burst(hammer.waveform, rate=rate, pulses=2000),
+            Regime.of(hammer, rate=rate).pulses(2000),
+            Regime.of(hammer, period=1.0 / rate).with_("rate", rate).pulses(2000),
+        ):
+            assert np.array_equal(train.times, other.times)
+            assert other.period == train.period
+
+
+def test_a_regime_stands_for_itself(hammer: ph.Hammer) -> None:
+    regime = ph.Regime.of(hammer, rate="1 kHz", phase=0.25)
+    assert ph.Regime.of(regime) is regime
+    assert ph.Regime.of(regime, phase=0.5) == ph.Regime.of(hammer, period=1e-3, phase=0.5)
+    assert regime.at_firings == ph.Regime.of(hammer, rate=1000.0)
+    with pytest.raises(ph.InputError, match="a regime is given, expected no rate or overlap beside it"):
+        ph.Regime.of(regime, rate=1000.0, overlap="replace")
+
+
+def test_verbs_take_a_regime_and_make_it_of_the_short_form(hammer: ph.Hammer) -> None:
+    regime = ph.Regime.of(hammer, rate=1234.0, phase=0.25)
+    short = {"rate": 1234.0, "phase": 0.25}
+    points = [ph.strobe(one, points=5, verdict=False, **how) for one, how in ((regime, {}), (hammer, short))]
+    assert np.array_equal(points[0].x, points[1].x)
+    assert np.array_equal(points[0].t, regime.pulses(6).times[:5] + 0.25 * regime.period)
+    (many,) = strobes([regime], points=5, verdict=False)
+    assert np.array_equal(many.x, points[0].x)
+    assert ph.section(regime, touches=12).t.tolist() == ph.section(hammer, touches=12, **short).t.tolist()
+    intervals = [
+        ph.impact_train(ph.section(regime)),
+        ph.impact_train(regime),
+        ph.impact_train(hammer, **short),
+    ]
+    assert len({train.fano for train in intervals}) == 1
+    assert ph.zero_one(regime).k == ph.zero_one(hammer, **short).k
+    assert ph.recurrence(regime).rate > 0.0
+    with pytest.raises(ph.InputError, match="points are given, expected no rate beside them"):
+        ph.zero_one(points[0], rate=1e3)
 
 
 def test_constants_of_the_hammer(hammer: ph.Hammer) -> None:

@@ -62,6 +62,15 @@ def read_positive(value: float | str, si: str, name: str) -> float:
     return number
 
 
+def period_of_rate(rate: float | str) -> float:
+    """Read a rate, Hz, and return its period, s, which is what trains are fired with.
+
+    Firing k of a train is at k times its period, so that a rate and its period mean the same firing times
+    to the last bit.
+    """
+    return 1.0 / read_positive(rate, "Hz", "rate")
+
+
 def read_start(value: float | str) -> float:
     """Read the time of a first firing, s; errors as for `read_number`, or it is negative."""
     number = read_number(value, "s", "start")
@@ -98,7 +107,8 @@ def even_times(
     steps = np.arange(count, dtype=np.float64)
     if rate is not None:
         often = read_positive(rate, "Hz", "rate")
-        return steps / often, ("rate", often), 1.0 / often
+        spacing = period_of_rate(often)
+        return steps * spacing, ("rate", often), spacing
     if period is None:
         raise InputError("a train of pulses is expected to have a rate or a period")
     spacing = read_positive(period, "s", "period")

@@ -1,24 +1,31 @@
-"""Regime: what is repeated, a hammer and its periodic drive, with every constant in reach by name."""
+"""Regime: this hammer, fired like this, for ever; with every constant in reach by name.
+
+The k-th firing of a train is at k times its period; a rate is its period said in another way, 1 / rate.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self, TypedDict
 
 import numpy as np
 
-from printhammer.drive.input import read_positive
+from printhammer.drive.input import period_of_rate, read_number, read_positive
 from printhammer.drive.trains import PulseTrain, SineForce
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.run.window import window_of
 from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
     from printhammer.run.window import Window
     from printhammer.support.arrays import FloatArray
 
@@ -27,6 +34,17 @@ RATE: Final = "rate"
 _WAVEFORM: Final = "waveform."
 _DRIVE: Final = "drive."
 _FORCE: Final = ("amplitude", "phase")
+
+
+class Firing(TypedDict, total=False):
+    """What a verb takes beside a hammer to say how it is fired; see `Regime.of`."""
+
+    period: float | str | None
+    rate: float | str | None
+    waveform: Waveform | None
+    drive: Drive | None
+    overlap: Overlap | None
+    phase: float | None
 
 
 @dataclass(frozen=True)
@@ -45,6 +63,8 @@ class Regime:
         An endless force such as `printhammer.SineForce`; None for a train of pulses.
     overlap : str
         "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
+    phase : float
+        Part of the period between a firing and the section at which states are looked at.
     """
 
     hammer: Hammer
@@ -52,24 +72,26 @@ class Regime:
     waveform: Waveform | None = None
     drive: Drive | None = None
     overlap: Overlap = "add"
+    phase: float = 0.0
 
     @classmethod
     def of(
         cls,
-        hammer: Hammer,
+        hammer: Hammer | Regime,
         *,
         period: float | str | None = None,
         rate: float | str | None = None,
         waveform: Waveform | None = None,
         drive: Drive | None = None,
-        overlap: Overlap = "add",
-    ) -> Self:
-        """Make a regime.
+        overlap: Overlap | None = None,
+        phase: float | None = None,
+    ) -> Regime:
+        """Return the regime that the arguments of a verb mean.
 
         Parameters
         ----------
-        hammer : Hammer
-            The hammer.
+        hammer : Hammer or Regime
+            The hammer. A regime stands for itself, and takes no other argument beside it than a phase.
         period, rate : float or str
             Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is taken as
             well.
@@ -79,32 +101,39 @@ class Regime:
             Instead of a waveform, period and rate: an endless force, whose own period counts.
         overlap : str, optional
             "add" or "replace".
+        phase : float, optional
+            Part of the period between a firing and the section, from 0 up to but not including 1.
 
         Raises
         ------
         InputError
-            There is nothing to fire, a period or rate is not positive or not the only one of the two, or the
-            drive is no endless force with a period.
+            There is nothing to fire, a period or rate is not positive or not the only one of the two, the
+            drive is no endless force with a period, or the phase is none.
         """
+        part = 0.0 if phase is None else read_phase(phase)
+        if isinstance(hammer, Regime):
+            named = ("period", "rate", "waveform", "drive", "overlap")
+            values = (period, rate, waveform, drive, overlap)
+            given = [name for name, value in zip(named, values, strict=True) if value is not None]
+            if given:
+                raise InputError(f"a regime is given, expected no {' or '.join(given)} beside it")
+            return hammer if phase is None else replace(hammer, phase=part)
+        overlap = "add" if overlap is None else overlap
         if drive is not None:
             if period is not None or rate is not None or waveform is not None:
                 raise InputError("drive is given, expected no period, rate or waveform beside it")
             if drive.period is None or math.isfinite(drive.waveform.support):
                 raise InputError(f"drive = {drive!r}, expected an endless force with a period")
-            return cls(hammer, float(drive.period), None, drive, overlap)
+            return cls(hammer, float(drive.period), None, drive, overlap, part)
         if (period is None) == (rate is None):
             raise InputError("period and rate: expected one of them, the time between firings or its inverse")
         if waveform is None and hammer.waveform is None:
             raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
-        time = (
-            read_positive(period, "s", "period")
-            if period is not None
-            else 1.0 / read_positive(rate if rate is not None else 0.0, "Hz", "rate")
-        )
-        found = cls(hammer, time, waveform, None, overlap)
+        time = period_of_rate(rate) if rate is not None else read_positive(period or 0.0, "s", "period")
+        regime = cls(hammer, time, waveform, None, overlap, part)
         # Refuses what no train can fire: an endless waveform, an unknown rule for overlapping pulses.
-        found.train(1)
-        return found
+        regime.pulses(1)
+        return regime
 
     @property
     def fired(self) -> Waveform:
@@ -135,6 +164,17 @@ class Regime:
             return 1
         return math.ceil(self.fired.support / self.period) + 1
 
+    @property
+    def at_firings(self) -> Self:
+        """The same, looked at when it is fired."""
+        return self if self.phase == 0.0 else replace(self, phase=0.0)
+
+    def pulses(self, count: int) -> Drive:
+        """Return a drive of so many pulses from time 0 on, with none before; or the endless force."""
+        if self.drive is not None:
+            return self.drive
+        return PulseTrain(self.fired, period=self.period, pulses=count, overlap=self.overlap)
+
     def train(self, firings: int) -> tuple[Drive, float]:
         """Return a drive that looks the same at so many firings and after them, and the time of the first, s.
 
@@ -144,14 +184,15 @@ class Regime:
         if self.drive is not None:
             return self.drive, float(self.drive.times[0])
         before = self.memory
-        train = PulseTrain(self.fired, period=self.period, pulses=before + firings + 2, overlap=self.overlap)
+        train = self.pulses(before + firings + 2)
         return train, float(train.times[before])
 
-    def moments(self, train: Drive, firings: int, phase: float) -> FloatArray:
+    def moments(self, train: Drive, firings: int, phase: float | None = None) -> FloatArray:
         """Return the times of the sections, s, shape (firings + 1,), in a train made by `train`.
 
-        A section lies `phase` periods after each firing.
+        A section lies `phase` periods after each firing, by default the phase of the regime.
         """
+        phase = self.phase if phase is None else phase
         if self.drive is not None:
             return np.asarray(train.times[0] + self.period * (np.arange(firings + 1) + phase))
         first = self.memory
@@ -201,8 +242,9 @@ class Regime:
             There is no number of that name, or the value is not possible.
         """
         if name in (PERIOD, RATE):
-            number = read_positive(value, "s" if name == PERIOD else "Hz", name)
-            return self._with_period(number if name == PERIOD else 1.0 / number)
+            return self._with_period(
+                period_of_rate(value) if name == RATE else read_positive(value, "s", name)
+            )
         self.value(name)
         if name.startswith(_DRIVE):
             return self._with_force(**{self._of_force(name): float(value)})
@@ -247,3 +289,71 @@ class Regime:
     def _of_waveform(self, name: str) -> str:
         field = name.removeprefix(_WAVEFORM)
         return field if self.waveform is not None and field in quantities(type(self.waveform)) else ""
+
+
+def read_phase(phase: float) -> float:
+    """Read a part of the period.
+
+    Raises
+    ------
+    InputError
+        It is not from 0 up to but not including 1.
+    """
+    part = read_number(phase, "1", "phase")
+    if not 0.0 <= part < 1.0:
+        raise InputError(f"phase = {phase!r}, expected a part of the period from 0 up to but not including 1")
+    return part
+
+
+def regimes_of(
+    hammers: Hammer | Regime | Sequence[Hammer | Regime],
+    periods: Sequence[float | str] | npt.ArrayLike | None = None,
+    drives: Sequence[Drive] | None = None,
+    *,
+    waveform: Waveform | None = None,
+    overlap: Overlap | None = None,
+    phase: float | None = None,
+) -> list[Regime]:
+    """Return the regimes of many trains.
+
+    Parameters
+    ----------
+    hammers : Hammer or Regime, or sequence of them
+        One for all trains, or one for each; regimes take no other argument beside them than a phase.
+    periods : sequence, optional
+        Times between firings, s or text with a unit, one for each train, or a single one for all hammers.
+    drives : sequence of Drive, optional
+        Instead of periods: endless forces.
+    waveform, overlap, phase
+        As for `Regime.of`, for all trains.
+
+    Raises
+    ------
+    InputError
+        As for `Regime.of`, or numbers of hammers and periods that do not fit together.
+    """
+    many = [hammers] if isinstance(hammers, Hammer | Regime) else list(hammers)
+    fired: list[tuple[Any, Drive | None]] = [(None, drive) for drive in drives or ()]
+    if drives is None and periods is None and many and all(isinstance(one, Regime) for one in many):
+        fired = [(None, None)]
+    elif drives is None:
+        if periods is None:
+            raise InputError("periods are missing, expected the times between the firings of each train, s")
+        fired = [(period, None) for period in (periods if np.ndim(periods) else [periods])]  # type: ignore[union-attr]
+        if not fired:
+            raise InputError("periods: expected at least one time between firings, s")
+    count = max(len(many), len(fired)) if many and fired else 0
+    for name, number in (("hammers", len(many)), ("periods" if drives is None else "drives", len(fired))):
+        if number not in (1, count):
+            raise InputError(f"{name}: {number} are given, expected 1 or {count}")
+    return [
+        Regime.of(
+            many[i % len(many)],
+            period=fired[i % len(fired)][0],
+            drive=fired[i % len(fired)][1],
+            waveform=waveform,
+            overlap=overlap,
+            phase=phase,
+        )
+        for i in range(count)
+    ]

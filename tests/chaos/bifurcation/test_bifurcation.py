@@ -47,7 +47,6 @@ def diagram(
         values=np.array(values),
         directions=tuple(verdicts),
         firing=np.arange(1, 17),
-        phase=0.0,
         x=points,
         v=np.zeros_like(points),
         branch=np.zeros(points.shape, np.int8),

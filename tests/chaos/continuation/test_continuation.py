@@ -151,7 +151,7 @@ def test_an_orbit_brings_its_own_train(branch: Branch) -> None:
 
 
 def test_a_slope_is_a_difference_of_images(hammer: "ph.Hammer", branch: Branch) -> None:
-    family = RegimeFamily(branch.regime, "rate", 1, 0.0, 1e-13)
+    family = RegimeFamily(branch.regime, "rate", 1, 1e-13)
     state = np.array([branch.x[3, 0], branch.v[3, 0]])
     rate = 1.0 / float(branch.values[3])
     value = family(state, rate)

@@ -9,14 +9,15 @@ from printhammer.chaos.strobe.scan import CLOSER, LARGEST_MULTIPLIER, largest_mu
 from printhammer.chaos.strobe.train import Train, run_trains
 from printhammer.chaos.strobe.verdict import AGREEMENT, LAST
 from printhammer.run.problem import TOLERANCE
+from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
     import printhammer as ph
 
 
 def multiplier(hammer: "ph.Hammer", period: float, count: int) -> float:
-    train = Train.of(hammer, period, 200)
-    (states,), _ = run_trains([train], np.arange(100, 201), 0.0, TOLERANCE, None)
+    train = Train.of(Regime.of(hammer, period=period), 200)
+    (states,), _ = run_trains([train], np.arange(100, 201), TOLERANCE, None)
     return largest_multiplier(train, states, count, TOLERANCE)
 
 

@@ -12,7 +12,6 @@ from scipy.spatial import cKDTree
 from printhammer.chaos.bifurcation.columns import OK, cycles_of, run_columns
 from printhammer.chaos.strobe.train import Train, exponents_of
 from printhammer.chaos.strobe.verdict import SIGNIFICANT
-from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -159,7 +158,7 @@ class Attractors:
         begin = columns.last[row : row + 1]
         if math.isnan(begin[0, 0]):
             return None
-        longer = run_columns([self.regime], begin, SETTLING + CLOUD, SETTLING, 0.0, self.tolerance, threads=1)
+        longer = run_columns([self.regime], begin, SETTLING + CLOUD, SETTLING, self.tolerance, threads=1)
         if longer.status[0] != OK:
             return None
         cycles, _ = self._cycles(longer)
@@ -169,12 +168,8 @@ class Attractors:
         x, v, branch, _memory = longer.last[0].tolist()
         if branch >= 0.0:
             return None
-        regime = self.regime
         window = (_BEFORE + 1, _BEFORE + CLOUD)
-        drive = regime.drive or PulseTrain(
-            regime.fired, period=regime.period, pulses=window[1] + 2, overlap=regime.overlap
-        )
-        train = Train(regime.hammer, drive, regime.period, (x, v))
+        train = Train(self.regime, self.regime.pulses(window[1] + 2), (x, v))
         (exponent,) = exponents_of([train], window, self.tolerance, threads=1)
         if not (exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error):
             return None

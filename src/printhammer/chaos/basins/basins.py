@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
@@ -30,10 +30,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -128,20 +126,16 @@ class Basins:
 
 
 def basins(
-    hammer: Hammer,
+    hammer: Hammer | Regime,
     *,
-    period: float | str | None = None,
-    rate: float | str | None = None,
     x: Range | None = None,
     v: Range | None = None,
     firings: SupportsIndex = FIRINGS,
     rounds: SupportsIndex = ROUNDS,
-    waveform: Waveform | None = None,
-    drive: Drive | None = None,
-    overlap: Overlap = "add",
     tolerance: float = TOLERANCE,
     threads: int | None = None,
     progress: Progress | None = None,
+    **firing: Unpack[Firing],
 ) -> Basins:
     """Find out which initial states lead to which attractor.
 
@@ -151,10 +145,9 @@ def basins(
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
-    period, rate, waveform, drive, overlap
-        As for `printhammer.strobe`.
+    hammer : Hammer or Regime
+        The hammer; or the hammer with all that `firing` says of it. States are those at a firing, whatever
+        the phase.
     x, v : tuple, optional
         Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, the
         two ends among them; by default the window of `printhammer.run.window` and 128.
@@ -168,6 +161,8 @@ def basins(
         By default as many as there are cores; the result does not depend on it.
     progress : callable, optional
         Called now and then with the number of rounds of cells done and of all that are known of so far.
+    **firing
+        How the hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -179,7 +174,7 @@ def basins(
     InputError
         An argument is not what is described above.
     """
-    regime = Regime.of(hammer, period=period, rate=rate, waveform=waveform, drive=drive, overlap=overlap)
+    regime = Regime.of(hammer, **firing).at_firings
     check_tolerance(tolerance)
     count, most = read_count(firings, "firings"), read_count(rounds, "rounds")
     if count < _FEWEST:
@@ -251,7 +246,6 @@ def _decided(
                 states[rows],
                 firings,
                 transient,
-                0.0,
                 tolerance,
                 threads=threads,
                 progress=tell,

@@ -20,7 +20,6 @@ from printhammer.chaos.bifurcation.columns import (
     usable,
 )
 from printhammer.chaos.strobe.train import Train, exponents_of
-from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,10 +45,7 @@ def train_from(regime: Regime, state: tuple[float, float], points: int) -> Train
     """Return a train that goes on from a state at a firing, for its exponent."""
     _first, last = window_of_exponent(points)
     # What is left of the pulses before is left out: it is the same for all neighbouring motions.
-    drive = regime.drive or PulseTrain(
-        regime.fired, period=regime.period, pulses=last + 2, overlap=regime.overlap
-    )
-    return Train(regime.hammer, drive, regime.period, state)
+    return Train(regime, regime.pulses(last + 2), state)
 
 
 class DiagramBuilder:
@@ -60,7 +56,7 @@ class DiagramBuilder:
         regime: Regime,
         name: str,
         ways: tuple[str, ...],
-        counts: tuple[int, int, float, float],
+        counts: tuple[int, int, float],
         begin: State,
         threads: int | None,
         progress: Progress | None,
@@ -201,7 +197,7 @@ class DiagramBuilder:
         found = exponents_of(
             [train for _row, train in trains],
             window_of_exponent(self.points),
-            self.counts[3],
+            self.counts[2],
             threads=self.threads,
             progress=lambda done, _all: self.tell(begun + done),
         )

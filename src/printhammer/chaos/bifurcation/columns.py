@@ -10,7 +10,6 @@ import numpy as np
 
 from printhammer.chaos.strobe.train import HELD_BRANCHES
 from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
-from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.start import check_branch, initial_state
@@ -106,7 +105,6 @@ def run_columns(
     states: FloatArray,
     firings: int,
     transient: int,
-    phase: float,
     tolerance: float,
     *,
     threads: int | None = None,
@@ -124,8 +122,6 @@ def run_columns(
         fired before (`FROM_REST`).
     firings, transient : int
         Number of firings, and of those at the beginning that are left out.
-    phase : float
-        Part of the period between a firing and its state.
     tolerance, threads, progress
         As for `printhammer.Ensemble`.
 
@@ -153,7 +149,7 @@ def run_columns(
             part = _run(
                 [regimes[row] for row in some],
                 states[some],
-                (firings, transient, phase, tolerance),
+                (firings, transient, tolerance),
                 threads,
                 tell,
             )
@@ -165,19 +161,19 @@ def run_columns(
 def _run(
     regimes: Sequence[Regime],
     states: FloatArray,
-    counts: tuple[int, int, float, float],
+    counts: tuple[int, int, float],
     threads: int | None,
     progress: Progress,
 ) -> Columns:
     """Run trains that begin alike: all from rest, all inside the pack, or all elsewhere."""
-    firings, transient, phase, tolerance = counts
+    firings, transient, tolerance = counts
     rest = bool(np.isnan(states[0, 0]))
     # Cells of a basin share one regime, columns of a diagram have one each.
     known = {id(regime): regime for regime in regimes}
     made = {key: _train(regime, firings, rest) for key, regime in known.items()}
     trains = [made[id(regime)] for regime in regimes]
     moments = [
-        np.append(times[transient:-1] + phase * regime.period, times[-1])
+        np.append(times[transient:-1] + regime.phase * regime.period, times[-1])
         for regime, (_drive, times) in zip(regimes, trains, strict=True)
     ]
     width = 4 if states[0, 2] >= 0.0 else 2
@@ -220,9 +216,7 @@ def _run(
 def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
     """Return a drive, and the times of its firings from the first to the one after all that are asked for."""
     if rest and regime.drive is None:
-        drive: Drive = PulseTrain(
-            regime.fired, period=regime.period, pulses=firings + 2, overlap=regime.overlap
-        )
+        drive = regime.pulses(firings + 2)
         return drive, drive.times[: firings + 1]
     drive, _ = regime.train(firings)
     return drive, regime.moments(drive, firings, 0.0)

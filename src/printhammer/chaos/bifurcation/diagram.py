@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, Unpack, get_args
 
 import numpy as np
 
 from printhammer.chaos.bifurcation.builder import DiagramBuilder
 from printhammer.chaos.bifurcation.columns import FROM_REST, TOLERANCE
-from printhammer.chaos.strobe.map import check_phase
 from printhammer.chaos.strobe.verdict import SIGNIFICANT
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import PERIOD, RATE, Regime
 from printhammer.run.start import initial_state
@@ -28,10 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.chaos.bifurcation.windows import Route, Window
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -72,7 +69,7 @@ class Bifurcation:
     Attributes
     ----------
     regime : Regime
-        Hammer and periodic drive; the parameter has other values in each column.
+        Hammer, periodic drive and phase; the parameter has other values in each column.
     parameter : str
         What is changed, see `printhammer.run.regime.Regime.with_`.
     values : array, shape (C,)
@@ -81,8 +78,6 @@ class Bifurcation:
         Of "from rest", "up" and "down": how the state at the start came about.
     firing : int array, shape (P,)
         Numbers of the firings of the points; the first of a train is number 1.
-    phase : float
-        Part of the period between a firing and its point.
     x, v : array, shape (D, C, P)
         Displacement, m, and velocity, m/s; NaN where a run did not get.
     branch : int8 array, shape (D, C, P)
@@ -110,7 +105,6 @@ class Bifurcation:
     values: FloatArray = field(repr=False)
     directions: tuple[str, ...]
     firing: npt.NDArray[np.int64] = field(repr=False)
-    phase: float
     x: FloatArray = field(repr=False)
     v: FloatArray = field(repr=False)
     branch: npt.NDArray[np.int8] = field(repr=False)
@@ -122,6 +116,11 @@ class Bifurcation:
     levels: npt.NDArray[np.int64] = field(repr=False)
     carried: int
     tolerance: float
+
+    @property
+    def phase(self) -> float:
+        """Part of the period between a firing and its point."""
+        return self.regime.phase
 
     @property
     def verdicts(self) -> npt.NDArray[np.str_]:
@@ -161,20 +160,14 @@ class Bifurcation:
 
 
 def bifurcation(
-    hammer: Hammer,
+    hammer: Hammer | Regime,
     *,
     periods: npt.ArrayLike | None = None,
     rates: npt.ArrayLike | None = None,
     parameter: str | None = None,
     values: npt.ArrayLike | None = None,
-    period: float | str | None = None,
-    rate: float | str | None = None,
-    waveform: Waveform | None = None,
-    drive: Drive | None = None,
-    overlap: Overlap = "add",
     firings: SupportsIndex = FIRINGS,
     transient: SupportsIndex = TRANSIENT,
-    phase: float = 0.0,
     direction: Direction = "from rest",
     state: tuple[float, float] | None = None,
     refine: SupportsIndex = REFINE,
@@ -182,26 +175,21 @@ def bifurcation(
     tolerance: float = TOLERANCE,
     threads: int | None = None,
     progress: Progress | None = None,
+    **firing: Unpack[Firing],
 ) -> Bifurcation:
     """Compute a bifurcation diagram of a hammer under a periodic drive.
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
+    hammer : Hammer or Regime
+        The hammer; or the hammer with all that `firing` says of it.
     periods, rates : array, optional
         Times between firings, s, or firings per second, Hz, ascending.
     parameter, values : str and array, optional
         Instead: the name of any constant, such as "backstop.damping" or "waveform.amplitude", and its
         values, SI, ascending; see `printhammer.run.regime.Regime.with_`.
-    period, rate : float or str, optional
-        With a parameter: the time between firings, s, or its inverse, Hz.
-    waveform, drive, overlap
-        As for `printhammer.strobe`; a drive is an endless force.
     firings, transient : int, optional
         Firings at each value, and how many of these are left out at the beginning.
-    phase : float, optional
-        Part of the period between a firing and its point, from 0 up to but not including 1.
     direction : str, optional
         "from rest": every train begins at rest, with nothing fired before. "up", "down": it begins where the
         train at the value before, or after, ended, with the pulses before under way; the first begins at
@@ -219,6 +207,8 @@ def bifurcation(
         By default as many as there are cores; the diagram does not depend on it.
     progress : callable, optional
         Called now and then with the number of trains done and of all that are known of so far.
+    **firing
+        How the hammer is fired, as for `printhammer.Regime.of`; period or rate only with another parameter.
 
     Returns
     -------
@@ -233,26 +223,21 @@ def bifurcation(
     InterruptedDiagram
         A KeyboardInterrupt, with what was done.
     """
-    name, grid, regime = _parameter(
-        hammer,
-        (periods, rates, parameter, values),
-        (period, rate),
-        {"waveform": waveform, "drive": drive, "overlap": overlap},
-    )
+    name, grid, regime = _parameter(hammer, (periods, rates, parameter, values), firing)
     count, skipped = read_count(firings, "firings"), _whole(transient, "transient")
     if count - skipped < 2:
         raise InputError(f"transient = {transient!r}, expected at least 2 fewer than the {count} firings")
     if direction not in DIRECTIONS:
         raise InputError(f"direction = {direction!r}, expected one of {', '.join(DIRECTIONS)}")
-    part, halvings = check_phase(phase), _whole(refine, "refine")
+    halvings = _whole(refine, "refine")
     check_tolerance(tolerance)
     ways = ("up", "down") if direction == "both" else (direction,)
     if len(grid) * len(ways) * (count - skipped) > MOST_STATES:
         raise InputError(f"{len(grid)} values, expected at most {MOST_STATES} states in a diagram")
     begin = FROM_REST
     if state is not None:
-        begin = (*initial_state(hammer, state), -1.0, 0.0)
-    work = DiagramBuilder(regime, name, ways, (count, skipped, part, tolerance), begin, threads, progress)
+        begin = (*initial_state(regime.hammer, state), -1.0, 0.0)
+    work = DiagramBuilder(regime, name, ways, (count, skipped, tolerance), begin, threads, progress)
     try:
         work.base(grid)
         for level in range(1, halvings + 1):
@@ -269,14 +254,13 @@ def _result(work: DiagramBuilder) -> Bifurcation:
     order = np.argsort(work.values, kind="stable")
     rows = (len(work.ways) * order + np.arange(len(work.ways))[:, np.newaxis]).astype(np.int64)
     table = work.table
-    firings, transient, phase, tolerance = work.counts
+    firings, transient, tolerance = work.counts
     return Bifurcation(
         regime=work.regime,
         parameter=work.name,
         values=work.values[order],
         directions=work.ways,
         firing=np.arange(transient + 1, firings + 1),
-        phase=phase,
         x=table.columns.x[rows],
         v=table.columns.v[rows],
         branch=table.columns.branch[rows],
@@ -292,10 +276,9 @@ def _result(work: DiagramBuilder) -> Bifurcation:
 
 
 def _parameter(
-    hammer: Hammer,
+    hammer: Hammer | Regime,
     given: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
-    timing: tuple[float | str | None, float | str | None],
-    options: dict[str, Any],
+    firing: Firing,
 ) -> tuple[str, FloatArray, Regime]:
     """Return the name of the parameter, its values, and the regime in which it is changed."""
     periods, rates, parameter, values = given
@@ -305,14 +288,13 @@ def _parameter(
         raise InputError("parameter and values: expected both of them, or neither")
     name = parameter or (PERIOD if periods is not None else RATE)
     grid = _ascending(values if values is not None else periods if periods is not None else rates, name)
-    timed = name in (PERIOD, RATE)
-    if timed and timing != (None, None):
-        raise InputError(f"period and rate: expected none of them beside the values of {name!r}")
-    if timed and options["drive"] is None:
-        options = {**options, name: float(grid[0])}
-    else:
-        options = {**options, "period": timing[0], "rate": timing[1]}
-    regime = Regime.of(hammer, **options)
+    if name in (PERIOD, RATE):
+        if firing.get("period") is not None or firing.get("rate") is not None:
+            raise InputError(f"period and rate: expected none of them beside the values of {name!r}")
+        if isinstance(hammer, Hammer) and firing.get("drive") is None:
+            first = float(grid[0])
+            firing = {**firing, "period": first} if name == PERIOD else {**firing, "rate": first}
+    regime = Regime.of(hammer, **firing)
     regime.value(name)
     return name, grid, regime
 

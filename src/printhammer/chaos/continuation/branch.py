@@ -37,7 +37,7 @@ class Branch:
     Attributes
     ----------
     regime : Regime
-        Hammer and periodic drive at the start.
+        Hammer and periodic drive at the start, and phase of the section.
     parameter : str
         The constant: "period", "rate", or the dotted key of one of the hammer, the waveform or the drive.
     unit : str
@@ -46,8 +46,6 @@ class Branch:
         Values between which the branch was followed.
     firings : int
         Number of firings after which the orbits repeat.
-    phase : float
-        Part of the period between a firing and the section.
     tolerance : float
         Of the integration.
     values : array, shape (N,)
@@ -82,7 +80,6 @@ class Branch:
     unit: str
     bounds: tuple[float, float]
     firings: int
-    phase: float
     tolerance: float
     values: FloatArray = field(repr=False)
     x: FloatArray = field(repr=False)
@@ -107,6 +104,11 @@ class Branch:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    @property
+    def phase(self) -> float:
+        """Part of the period between a firing and the section."""
+        return self.regime.phase
 
     @property
     def stable(self) -> npt.NDArray[np.bool_]:
@@ -171,7 +173,7 @@ class Branch:
 
         regime = self.regime.with_(self.parameter, float(self.values[number]))
         state = self.curve.nodes[number].state
-        return orbit(regime, state, firings=self.firings, phase=self.phase, tolerance=self.tolerance)
+        return orbit(regime, state, firings=self.firings, tolerance=self.tolerance)
 
     def doubled(
         self, event: BranchEvent, *, most: SupportsIndex = MOST, threads: int | None = None
@@ -196,7 +198,7 @@ class Branch:
             raise InputError(f"event = {event.kind!r}, expected a period doubling of this branch")
         from printhammer.chaos.continuation.tracer import Tracer
 
-        work = Tracer(self.regime, self.parameter, self.bounds, self.phase, self.tolerance, threads)
+        work = Tracer(self.regime, self.parameter, self.bounds, self.tolerance, threads)
         return work.doubled(self.firings, event, read_count(most, "most"))
 
     def to_dataset(self) -> xr.Dataset:

@@ -9,7 +9,7 @@ first grazing, and the stop says so.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, SupportsIndex
+from typing import TYPE_CHECKING, Final, SupportsIndex, Unpack
 
 import numpy as np
 
@@ -17,18 +17,17 @@ from printhammer.chaos.continuation.arclength import Steps
 from printhammer.chaos.continuation.branch import MOST, Branch
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds, unit_of
 from printhammer.chaos.orbits.orbit import Orbit
-from printhammer.chaos.orbits.search import orbits_of
-from printhammer.chaos.strobe.map import MAP_TOLERANCE, check_phase
+from printhammer.chaos.orbits.search import orbits
+from printhammer.chaos.strobe.map import MAP_TOLERANCE
+from printhammer.chaos.strobe.points import strobes
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -39,46 +38,38 @@ _SETTLE: Final = 500
 
 
 def continuation(
-    start: Hammer | Orbit,
+    start: Hammer | Regime | Orbit,
     parameter: str,
     bounds: tuple[float | str, float | str],
     *,
-    period: float | str | None = None,
-    rate: float | str | None = None,
     firings: SupportsIndex | None = None,
     state: tuple[float, float] | None = None,
-    phase: float | None = None,
-    waveform: Waveform | None = None,
-    drive: Drive | None = None,
-    overlap: Overlap = "add",
     most: SupportsIndex = MOST,
     steps: Steps | None = None,
     tolerance: float = MAP_TOLERANCE,
     threads: int | None = None,
     progress: Progress | None = None,
+    **firing: Unpack[Firing],
 ) -> Branch:
     """Follow a periodic orbit of a hammer through the values of one constant.
 
     Parameters
     ----------
-    start : Hammer or Orbit
-        A periodic orbit from `printhammer.orbits`; or a hammer, whose orbit is that near `state`, or else
-        that to which a train from rest settles, or else the first that a search finds.
+    start : Hammer, Regime or Orbit
+        A periodic orbit from `printhammer.orbits`; or a regime, or a hammer with all that `firing` says of
+        it, whose orbit is that near `state`, or else that to which a train from rest settles, or else the
+        first that a search finds. The armature must not be on its way out of the pack at the phase of the
+        section.
     parameter : str
         "period", "rate", or the dotted key of a constant of the hammer, such as "backstop.damping", of the
         waveform or of an endless force, such as "waveform.amplitude" or "drive.amplitude".
     bounds : tuple
         Least and largest value, SI or text with a unit.
-    period, rate, waveform, drive, overlap
-        Of a hammer: as for `printhammer.strobe`.
     firings : int, optional
-        Of a hammer: number of firings after which the orbit repeats; by default that to which the train
-        settles, and 1 where it does not or a state is given.
+        Of a hammer or regime: number of firings after which the orbit repeats; by default that to which the
+        train settles, and 1 where it does not or a state is given.
     state : tuple of float, optional
-        Of a hammer: displacement, m, and velocity, m/s, at a section, near the orbit.
-    phase : float, optional
-        Part of the period between a firing and the section; by default that of the orbit, or 0. The armature
-        must not be on its way out of the pack there.
+        Of a hammer or regime: displacement, m, and velocity, m/s, at a section, near the orbit.
     most : int, optional
         Number of steps in either direction.
     steps : Steps, optional
@@ -90,6 +81,8 @@ def continuation(
         By default as many as there are cores; the branch does not depend on it.
     progress : callable, optional
         Called now and then with the number of steps that are done and the largest that may be.
+    **firing
+        How the hammer is fired, as for `printhammer.Regime.of`; beside an orbit at most its own phase.
 
     Returns
     -------
@@ -105,17 +98,17 @@ def continuation(
     """
     check_tolerance(tolerance)
     if isinstance(start, Orbit):
-        if any(given is not None for given in (period, rate, waveform, drive, state, firings)):
+        fired = [value for name, value in firing.items() if name not in ("phase", "overlap")]
+        if any(given is not None for given in (*fired, state, firings)):
             raise InputError("an orbit is given, expected no period, rate, waveform, drive, firings or state")
         if not start.ok:
             raise InputError(f"the orbit to start from is none: {start.status}")
         regime, point, count = start.regime, np.array(start.section), start.firings
-        part = start.phase
-        if phase is not None and phase != part:
-            raise InputError(f"phase = {phase!r}, expected that of the orbit, {part!r}, or none")
+        phase = firing.get("phase")
+        if phase is not None and phase != start.phase:
+            raise InputError(f"phase = {phase!r}, expected that of the orbit, {start.phase!r}, or none")
     else:
-        regime = Regime.of(start, period=period, rate=rate, waveform=waveform, drive=drive, overlap=overlap)
-        part = check_phase(0.0 if phase is None else phase)
+        regime = Regime.of(start, **firing)
         ends, own = read_bounds(regime, parameter, bounds), regime.value(parameter)
         if not ends[0] <= own <= ends[1]:
             raise InputError(
@@ -124,40 +117,33 @@ def continuation(
             )
         given = None if firings is None else read_count(firings, "firings")
         if state is None:
-            point, count, part = _found(regime, part, given, phase is not None, threads)
+            fixed = isinstance(start, Regime) or firing.get("phase") is not None
+            regime, point, count = _orbit_to_start_from(regime, given, fixed, threads)
         else:
             point, count = np.array(state, dtype=np.float64), given or 1
-    work = Tracer(regime, parameter, read_bounds(regime, parameter, bounds), part, tolerance, threads)
+    work = Tracer(regime, parameter, read_bounds(regime, parameter, bounds), tolerance, threads)
     chosen = steps or Steps(most=read_count(most, "most"), precision=PRECISION)
     return work.branch(point, count, chosen, progress)
 
 
-def _found(
-    regime: Regime, phase: float, firings: int | None, phase_given: bool, threads: int | None
-) -> tuple[FloatArray, int, float]:
-    """Return a state of the orbit to start from, its number of firings, and the phase of its section."""
-    from printhammer.chaos.strobe.points import strobes
-
-    (seen,) = strobes(
-        regime.hammer,
-        None if regime.drive is not None else [regime.period],
+def _orbit_to_start_from(
+    regime: Regime, firings: int | None, phase_given: bool, threads: int | None
+) -> tuple[Regime, FloatArray, int]:
+    """Return the regime at the phase of an orbit of it, a state of the orbit and its number of firings."""
+    (settled,) = strobes(
+        regime,
         points=1,
         transient=_SETTLE,
-        phase=phase,
-        waveform=regime.waveform,
-        drives=None if regime.drive is None else [regime.drive],
-        overlap=regime.overlap,
         firings=(_SETTLE // 2, _SETTLE),
         threads=threads,
     )
-    judged = None if seen.verdict is None or not seen.ok else seen.verdict.period
-    if judged is not None and firings in (None, judged):
-        return np.array([seen.x[0], seen.v[0]]), judged, phase
+    period = None if settled.verdict is None or not settled.ok else settled.verdict.period
+    if period is not None and firings in (None, period):
+        return regime, np.array([settled.x[0], settled.v[0]]), period
     many = firings or 1
-    search = orbits_of(regime, longest=many, threads=threads)
-    for orbit in search:
-        if orbit.firings == many and (orbit.phase == phase or not phase_given):
-            return np.array(orbit.section), many, orbit.phase
+    for orbit in orbits(regime, longest=many, threads=threads):
+        if orbit.firings == many and (orbit.phase == regime.phase or not phase_given):
+            return orbit.regime, np.array(orbit.section), many
     raise InputError(
         f"the train from rest at a period of {regime.period:.9g} s settles to no orbit of {many} firings, and"
         " a search finds none, expected a state or an orbit to start from"

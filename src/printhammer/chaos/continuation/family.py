@@ -132,22 +132,19 @@ class RegimeFamily:
     Parameters
     ----------
     regime : Regime
-        Hammer and periodic drive.
+        Hammer, periodic drive and phase of the section.
     name : str
         Of the constant, see `printhammer.run.regime.Regime.with_`.
     firings : int
         Number of periods.
-    phase : float
-        Part of the period between a firing and the section.
     tolerance : float
         Error allowed in one step of a run.
     """
 
-    def __init__(self, regime: Regime, name: str, firings: int, phase: float, tolerance: float) -> None:
+    def __init__(self, regime: Regime, name: str, firings: int, tolerance: float) -> None:
         self.regime = regime
         self.name = name
         self.firings = firings
-        self.phase = phase
         self.tolerance = tolerance
 
     def __call__(self, state: FloatArray, parameter: float) -> MapValue:
@@ -170,7 +167,7 @@ class RegimeFamily:
             if not usable(hammer, *image.tolist()):
                 return MapValue.none(2, _IN_PACK)
         else:
-            found = image_of(regime, state, self.firings, self.phase, self.tolerance, contacts=False)
+            found = image_of(regime, state, self.firings, self.tolerance, contacts=False)
             if not found.ok:
                 return MapValue.none(2, _IN_PACK if found.status == IN_PACK else found.status)
             image, jacobian = found.state, found.jacobian
@@ -204,7 +201,7 @@ class RegimeFamily:
 
     def with_firings(self, firings: int) -> RegimeFamily:
         """Return the same map with another number of periods."""
-        return RegimeFamily(self.regime, self.name, firings, self.phase, self.tolerance)
+        return RegimeFamily(self.regime, self.name, firings, self.tolerance)
 
     def _slope(self, state: FloatArray, parameter: float, image: FloatArray) -> FloatArray | None:
         step = _SPACING * (abs(parameter) or 1.0)
@@ -230,14 +227,14 @@ class RegimeFamily:
 
     def _problem(self, regime: Regime, state: FloatArray) -> tuple[Problem, float]:
         train, _ = regime.train(self.firings)
-        moments = regime.moments(train, self.firings, self.phase)
+        moments = regime.moments(train, self.firings)
         start = initial_state(regime.hammer, (float(state[0]), float(state[1])))
         problem = Problem(regime.hammer, train, start, float(moments[0]), self.tolerance)
         return problem, float(moments[-1])
 
     def _passage(self, problem: Problem, record: Record, end: float) -> Passage:
         period = (end - problem.start) / self.firings
-        zero = problem.start - self.phase * period
+        zero = problem.start - self.regime.phase * period
         touches = _touches(problem.hammer, record, zero, end - problem.start)
         return Passage(touches, period, self.firings)
 
@@ -248,7 +245,7 @@ class RegimeFamily:
         record = problem.run(end)
         increments = increments_of(problem, record)
         forces = np.full(self.firings, np.nan)
-        zero = problem.start - self.phase * regime.period
+        zero = problem.start - regime.phase * regime.period
         for contact in contacts_of(problem, record, increments, rigid_backstop(regime)):
             if contact.surface == "pack" and not contact.initial and contact.peak_force is not None:
                 fired = math.floor((contact.t_in - zero) / regime.period) % self.firings

@@ -17,9 +17,9 @@ import numpy as np
 from printhammer.chaos.continuation.arclength import Steps
 from printhammer.chaos.continuation.branch import MOST, Branch
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
-from printhammer.chaos.orbits.search import orbits_of
+from printhammer.chaos.orbits.search import orbits
 from printhammer.chaos.strobe.map import MAP_TOLERANCE
-from printhammer.drive.input import read_count, read_positive
+from printhammer.drive.input import period_of_rate, read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.run.regime import RATE, Regime
 from printhammer.support.threads import in_threads, thread_count
@@ -115,14 +115,14 @@ class InterruptedBranches(KeyboardInterrupt):
 
 
 def regimes(
-    hammer: Hammer,
+    hammer: Hammer | Regime,
     rates: tuple[float | str, float | str],
     *,
     longest: SupportsIndex = 3,
     seeds: SupportsIndex = SEEDS,
     doublings: SupportsIndex = 0,
     waveform: Waveform | None = None,
-    overlap: Overlap = "add",
+    overlap: Overlap | None = None,
     most: SupportsIndex = MOST,
     tolerance: float = MAP_TOLERANCE,
     threads: int | None = None,
@@ -132,8 +132,8 @@ def regimes(
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
+    hammer : Hammer or Regime
+        The hammer; or a regime of it, whose own rate plays no part.
     rates : tuple
         Least and largest rate, Hz or text with a unit.
     longest : int, optional
@@ -143,7 +143,7 @@ def regimes(
     doublings : int, optional
         How often the orbits born at period doublings are followed as well.
     waveform, overlap
-        As for `printhammer.strobe`.
+        Of a hammer: as for `printhammer.Regime.of`.
     most : int, optional
         Number of steps of a branch in either direction.
     tolerance : float, optional
@@ -175,11 +175,12 @@ def regimes(
     steps = Steps(most=read_count(most, "most"), precision=PRECISION)
     collected = _Collected((low, high), steps, tolerance, threads)
     many = read_count(longest, "longest")
+    period = None if isinstance(hammer, Regime) else period_of_rate(low)
+    start = Regime.of(hammer, period=period, waveform=waveform, overlap=overlap)
     with collected.kept_at_interrupt():
         for k in range(count):
             rate = low + (high - low) * (k + 0.5) / count
-            regime = Regime.of(hammer, rate=rate, waveform=waveform, overlap=overlap)
-            search = orbits_of(regime, longest=many, threads=threads)
+            search = orbits(start.with_(RATE, rate), longest=many, threads=threads)
             if not search.found:
                 collected.refused.append(f"at {rate:.9g} Hz {search.message}")
             collected.add(list(search.found))
@@ -265,7 +266,7 @@ class _Collected:
                 orbit = orbits[i]
                 bounds = read_bounds(orbit.regime, RATE, self.bounds)
                 try:
-                    branch = Tracer(orbit.regime, RATE, bounds, orbit.phase, self.tolerance, 1).branch(
+                    branch = Tracer(orbit.regime, RATE, bounds, self.tolerance, 1).branch(
                         np.array(orbit.section), orbit.firings, self.steps, None
                     )
                 except InputError as error:
@@ -330,7 +331,7 @@ def _on(branch: Branch, value: float, state: FloatArray) -> bool:
     half_widths = branch.regime.window.half_widths
     values = branch.values
     between = np.flatnonzero((values[:-1] - value) * (values[1:] - value) <= 0.0)
-    work = Tracer(branch.regime, branch.parameter, branch.bounds, branch.phase, branch.tolerance, 1)
+    work = Tracer(branch.regime, branch.parameter, branch.bounds, branch.tolerance, 1)
     for i in between:
         for k in range(branch.firings):
             # A rough look at the chord first, then the orbit itself.

@@ -14,12 +14,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
 from printhammer.chaos.continuation.arclength import MapValue, Steps, follow
+from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, torus_test
+from printhammer.chaos.continuation.continuation import continuation
 from printhammer.chaos.continuation.tracer import read_bounds, unit_of
 from printhammer.chaos.strobe.map import image_of
 from printhammer.chaos.strobe.train import Train
@@ -35,9 +37,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.chaos.continuation.arclength import Curve, Stop
-    from printhammer.chaos.continuation.branch import Branch
     from printhammer.chaos.continuation.events import BranchEvent
-    from printhammer.run.regime import Regime
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing, Regime
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -185,25 +187,30 @@ class StabilityChart:
 
 
 def stability_chart(
-    branch: Branch,
+    branch: Branch | Regime | Hammer,
     second: str,
     bounds: tuple[float | str, float | str],
     *,
+    first: tuple[str, float | str, float | str] | None = None,
     grid: tuple[int, int] = GRID,
     most: SupportsIndex = MOST,
     threads: int | None = None,
     progress: Progress | None = None,
+    **firing: Unpack[Firing],
 ) -> StabilityChart:
     """Follow the limits of stability of a branch through a second constant.
 
     Parameters
     ----------
-    branch : Branch
-        From `printhammer.continuation`, usually in the rate; its constant is the first one, in its bounds.
+    branch : Branch, Regime or Hammer
+        From `printhammer.continuation`, usually in the rate; its constant is the first one, in its bounds. Of
+        a regime, or of a hammer with all that `firing` says of it, the branch along `first` is followed.
     second : str
         The second constant, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple
         Its least and largest value, SI or text with a unit.
+    first : tuple, optional
+        Of a regime or hammer: the first constant, its least and its largest value.
     grid : tuple of int, optional
         Numbers of values of the two constants at which trains from rest are judged; (0, 0) for none.
     most : int, optional
@@ -212,6 +219,8 @@ def stability_chart(
         By default as many as there are cores; the chart does not depend on it.
     progress : callable, optional
         Called now and then with the number of curves that are done and of all.
+    **firing
+        How a hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -224,6 +233,13 @@ def stability_chart(
     InputError
         An argument is not what is described above, or both constants are the same.
     """
+    if isinstance(branch, Branch):
+        if first is not None or firing:
+            raise InputError("a branch is given, expected no first constant and no firing beside it")
+    elif first is None:
+        raise InputError("first is missing, expected the first constant with its least and largest value")
+    else:
+        branch = continuation(branch, first[0], first[1:], threads=threads, **firing)
     regime = branch.regime
     if second == branch.parameter:
         raise InputError(f"second = {second!r}, expected another constant than that of the branch")
@@ -363,9 +379,7 @@ class _Chart:
                     regime = branch.regime.with_(self.second, other).with_(branch.parameter, float(whole[2]))
                 except InputError as error:
                     return str(error)
-                image = image_of(
-                    regime, whole[:2], branch.firings, branch.phase, branch.tolerance, contacts=False
-                )
+                image = image_of(regime, whole[:2], branch.firings, branch.tolerance, contacts=False)
                 if not image.ok or not np.isfinite(image.jacobian).all():
                     return image.status if not image.ok else "no derivative"
                 found.append((image.state, image.jacobian))
@@ -408,17 +422,7 @@ def _grid(
     for row, value in enumerate(axes[1]):
         moved = regime.with_(second, float(value))
         here = [moved.with_(branch.parameter, float(first)) for first in axes[0]]
-        trains = [
-            Train.of(
-                one.hammer,
-                None if one.drive is not None else one.period,
-                _FIRINGS,
-                waveform=one.waveform,
-                drive=one.drive,
-                overlap=one.overlap,
-            )
-            for one in here
-        ]
+        trains = [Train.of(one.at_firings, _FIRINGS) for one in here]
         settled[row] = _periods(trains, threads)
     return axes, settled
 
@@ -430,7 +434,7 @@ def _periods(trains: list[Train], threads: int | None) -> npt.NDArray[np.int64]:
     if not trains:
         return np.zeros(0, np.int64)
     chosen = np.arange(_FIRINGS - _JUDGED + 1, _FIRINGS + 1)
-    states, _ = run_trains(trains, chosen, 0.0, _GRID_TOLERANCE, None, threads=threads)
+    states, _ = run_trains(trains, chosen, _GRID_TOLERANCE, None, threads=threads)
     found = []
     for train, seen in zip(trains, states, strict=True):
         period = period_of(seen.distances(train)) if seen.status == "ok" else -1

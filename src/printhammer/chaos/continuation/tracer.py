@@ -93,17 +93,16 @@ class Tracer:
         regime: Regime,
         parameter: str,
         bounds: tuple[float, float],
-        phase: float,
         tolerance: float,
         threads: int | None,
     ) -> None:
         self.regime, self.parameter, self.bounds = regime, parameter, bounds
-        self.phase, self.tolerance, self.threads = phase, tolerance, threads
+        self.tolerance, self.threads = tolerance, threads
         self.scales = np.append(regime.window.half_widths, (bounds[1] - bounds[0]) / _PARTS)
 
     def family(self, firings: int) -> RegimeFamily:
         """Return the strobe map over so many firings."""
-        return RegimeFamily(self.regime, self.parameter, firings, self.phase, self.tolerance)
+        return RegimeFamily(self.regime, self.parameter, firings, self.tolerance)
 
     def branch(self, state: FloatArray, firings: int, steps: Steps, progress: Progress | None) -> Branch:
         """Return the branch through an orbit."""
@@ -275,7 +274,6 @@ class Tracer:
             unit=unit_of(self.regime, self.parameter),
             bounds=self.bounds,
             firings=family.firings,
-            phase=self.phase,
             tolerance=self.tolerance,
             values=np.array([node.parameter for node in nodes]),
             x=states[:, :, 0],

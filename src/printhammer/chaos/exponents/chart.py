@@ -12,10 +12,10 @@ import numpy as np
 from printhammer.chaos.exponents.lyapunov import FIRINGS, TRANSIENT, exponents_of_train
 from printhammer.chaos.strobe.points import transient_of
 from printhammer.chaos.strobe.train import Train
-from printhammer.drive.input import read_count, read_positive
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.hammer.hammer import Hammer
 from printhammer.run.problem import TOLERANCE
+from printhammer.run.regime import regimes_of
 from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -109,13 +111,13 @@ class LyapunovChart:
 
 
 def lyapunovs(
-    hammers: Hammer | Sequence[Hammer],
-    periods: Sequence[float | str] | npt.ArrayLike,
+    hammers: Hammer | Regime | Sequence[Hammer | Regime],
+    periods: Sequence[float | str] | npt.ArrayLike | None = None,
     *,
     firings: SupportsIndex = FIRINGS,
     transient: SupportsIndex = TRANSIENT,
     waveform: Waveform | None = None,
-    overlap: Overlap = "add",
+    overlap: Overlap | None = None,
     tolerance: float = TOLERANCE,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -124,11 +126,9 @@ def lyapunovs(
 
     Parameters
     ----------
-    hammers : Hammer or sequence of Hammer
-        One for all trains, or one for each.
-    periods : sequence
-        Times between firings, s or text with a unit, one for each train.
-    firings, transient, waveform, overlap, tolerance
+    hammers, periods, waveform, overlap
+        Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
+    firings, transient, tolerance
         As for `lyapunov`, for all trains.
     threads : int, optional
         By default as many as there are cores; the results do not depend on it.
@@ -145,18 +145,9 @@ def lyapunovs(
     InputError
         As for `lyapunov`, or numbers of hammers and periods that do not fit together.
     """
-    given: list[Any] = list(periods) if np.ndim(periods) else [periods]  # type: ignore[arg-type]
-    spacings = [read_positive(period, "s", "period") for period in given]
-    if not spacings:
-        raise InputError("periods: expected at least one time between firings, s")
-    many = [hammers] * len(spacings) if isinstance(hammers, Hammer) else list(hammers)
-    if len(many) != len(spacings):
-        raise InputError(f"hammers: {len(many)} are given, expected 1 or {len(spacings)}")
     counts = read_count(firings, "firings"), transient_of(transient)
-    trains = [
-        Train.of(hammer, spacing, sum(counts) + 1, waveform=waveform, overlap=overlap)
-        for hammer, spacing in zip(many, spacings, strict=True)
-    ]
+    regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
+    trains = [Train.of(regime.at_firings, sum(counts) + 1) for regime in regimes]
     # Only a row is kept of each train, so that memory does not grow with their length.
     rows: dict[int, dict[str, Any]] = {}
     begun: dict[int, Strobe] = {}

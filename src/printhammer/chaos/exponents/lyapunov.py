@@ -11,29 +11,29 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
 from printhammer.chaos.exponents.zero_one import FEWEST, ZeroOne, zero_one
-from printhammer.chaos.strobe.points import Strobe, transient_of
+from printhammer.chaos.strobe.points import strobe_of, transient_of
 from printhammer.chaos.strobe.train import States, Train
 from printhammer.chaos.strobe.verdict import SIGNIFICANT, verdict
 from printhammer.derivatives.states import standard_error, strobe_exponent
-from printhammer.drive.input import read_count, read_positive
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.run.problem import TOLERANCE
+from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
+    from printhammer.chaos.strobe.points import Strobe
     from printhammer.chaos.strobe.verdict import Verdict
     from printhammer.derivatives.states import Exponent
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
 
 FIRINGS: Final = 1000
@@ -185,17 +185,13 @@ class Lyapunov:
 
 
 def lyapunov(
-    hammer: Hammer,
+    hammer: Hammer | Regime,
     *,
-    period: float | str | None = None,
-    rate: float | str | None = None,
     firings: SupportsIndex = FIRINGS,
     transient: SupportsIndex = TRANSIENT,
-    waveform: Waveform | None = None,
-    drive: Drive | None = None,
-    overlap: Overlap = "add",
     state: tuple[float, float] | None = None,
     tolerance: float = TOLERANCE,
+    **firing: Unpack[Firing],
 ) -> Lyapunov:
     """Return the Lyapunov exponents of a train, with error bars, and the 0-1 test as a second opinion.
 
@@ -207,18 +203,19 @@ def lyapunov(
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
-    period, rate : float or str
-        Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is taken as well.
+    hammer : Hammer or Regime
+        The hammer; or the hammer with all that `firing` says of it. Growth is taken from firing to firing,
+        whatever the phase.
     firings : int, optional
         Number of firings over which growth counts.
     transient : int, optional
         Number of firings left out before them.
-    waveform, drive, overlap, state
-        As for `printhammer.strobe`.
+    state : tuple of float, optional
+        Displacement, m, and velocity, m/s, at the first firing; by default the rest state.
     tolerance : float, optional
         As for `printhammer.simulate`.
+    **firing
+        How the hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -230,19 +227,8 @@ def lyapunov(
     InputError
         An argument is not what is described above, or the hammer has no waveform or no rest state.
     """
-    if drive is None and (period is None) == (rate is None):
-        raise InputError("period and rate: expected one of them, the time between firings or its inverse")
-    if drive is not None and (period is not None or rate is not None or waveform is not None):
-        raise InputError("drive is given, expected no period, rate or waveform beside it")
-    spacing = None
-    if period is not None:
-        spacing = read_positive(period, "s", "period")
-    elif rate is not None:
-        spacing = 1.0 / read_positive(rate, "Hz", "rate")
     counts = read_count(firings, "firings"), transient_of(transient)
-    train = Train.of(
-        hammer, spacing, sum(counts) + 1, waveform=waveform, drive=drive, overlap=overlap, state=state
-    )
+    train = Train.of(Regime.of(hammer, **firing).at_firings, sum(counts) + 1, state)
     return exponents_of_train(train, counts, tolerance)
 
 
@@ -349,18 +335,5 @@ def _points(train: Train, first: int, last: int, found: Exponent, tolerance: flo
         status=found.status,
     )
     stopped = "" if found.ok else found.status
-    return Strobe(
-        hammer=train.hammer,
-        drive=train.drive,
-        period=train.period,
-        phase=0.0,
-        firing=firing,
-        t=states.t,
-        x=states.x,
-        v=states.v,
-        branch=states.branch,
-        memory=states.memory,
-        status=found.status,
-        tolerance=tolerance,
-        verdict=verdict(states.distances(train), (first, last), tolerance, found, stopped),
-    )
+    judged = verdict(states.distances(train), (first, last), tolerance, found, stopped)
+    return strobe_of(train, firing, states, tolerance, judged)

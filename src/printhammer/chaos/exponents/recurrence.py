@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.chaos.strobe.points import Strobe
+from printhammer.chaos.strobe.points import Strobe, points_of
 from printhammer.chaos.strobe.verdict import AGREEMENT
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
+    from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
 MOST: Final = 4096
@@ -114,7 +115,7 @@ class Recurrence:
 
 
 def recurrence(
-    states: npt.ArrayLike | Strobe,
+    states: npt.ArrayLike | Strobe | Regime,
     *,
     threshold: float | None = None,
     rate: float | None = None,
@@ -126,9 +127,9 @@ def recurrence(
 
     Parameters
     ----------
-    states : array or Strobe
+    states : array, Strobe or Regime
         One row for each state, or one number; at most 4096. Of strobe points: displacement, velocity
-        and memory of the pack.
+        and memory of the pack. Of a regime a thousand points are taken, after a thousand firings.
     threshold : float, optional
         Largest distance of states that count as the same, in units of the scales. The distance is the largest
         difference of a component.
@@ -155,9 +156,10 @@ def recurrence(
         Too many or too few states, states not finite, such as those of a strobe whose run ended early; both a
         threshold and a rate; scales that do not fit.
     """
-    rows, units = _rows(states, scales)
+    points = points_of(states, {})
+    rows, units = _rows(points, scales)
     # Of a train that has settled only the noise of the arithmetic differs.
-    floor = AGREEMENT if isinstance(states, Strobe) and scales is None else 0.0
+    floor = AGREEMENT if isinstance(points, Strobe) and scales is None else 0.0
     count = len(rows)
     apart, least = read_count(theiler, "theiler"), read_count(shortest, "shortest")
     if apart >= count:

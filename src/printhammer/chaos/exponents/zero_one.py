@@ -18,11 +18,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
-from printhammer.chaos.strobe.points import Strobe
+from printhammer.chaos.strobe.points import Strobe, points_of
 from printhammer.chaos.strobe.verdict import AGREEMENT
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing, Regime
     from printhammer.support.arrays import FloatArray
 
 ANGLES: Final = 100
@@ -161,11 +163,12 @@ class ZeroOne:
 
 
 def zero_one(
-    series: npt.ArrayLike | Strobe,
+    series: npt.ArrayLike | Strobe | Regime | Hammer,
     *,
     resolution: float | None = None,
     angles: SupportsIndex = ANGLES,
     seed: int = SEED,
+    **firing: Unpack[Firing],
 ) -> ZeroOne:
     """Return what the 0-1 test says of a series, or of the displacements at the points of a strobe.
 
@@ -181,8 +184,9 @@ def zero_one(
 
     Parameters
     ----------
-    series : array or Strobe
-        At least 100 numbers; or strobe points, whose displacements are taken.
+    series : array, Strobe, Regime or Hammer
+        At least 100 numbers; or strobe points, whose displacements are taken; or a regime, or a hammer and
+        how it is fired, of which a thousand points are, after a thousand firings.
     resolution : float, optional
         Amplitude up to which changes count as none, in the unit of the series. By default 1e-12 of the
         largest absolute value; for strobe points what also counts as agreement there, 1e-6 of the half-width
@@ -191,6 +195,8 @@ def zero_one(
         Number of random angles.
     seed : int, optional
         Of the angles.
+    **firing
+        How a hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -204,14 +210,15 @@ def zero_one(
         negative.
     """
     many = read_count(angles, "angles")
+    points = points_of(series, firing)
     stopped = ""
-    if isinstance(series, Strobe):
-        numbers = np.asarray(series.x, dtype=np.float64)
-        least = AGREEMENT * float(series.window.half_widths[0])
+    if isinstance(points, Strobe):
+        numbers = np.asarray(points.x, dtype=np.float64)
+        least = AGREEMENT * float(points.window.half_widths[0])
         if not np.isfinite(numbers).all():
-            stopped = f"the run ended early: {series.status}"
+            stopped = f"the run ended early: {points.status}"
     else:
-        numbers = _numbers(series)
+        numbers = _numbers(points)
         least = 1e-12 * float(np.abs(numbers).max(initial=0.0))
     if numbers.size < FEWEST:
         raise InputError(f"series: {numbers.size} numbers, expected at least {FEWEST}")

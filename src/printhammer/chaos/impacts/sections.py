@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, Unpack, get_args
 
 import numpy as np
 
 from printhammer.chaos.strobe.points import transient_of
 from printhammer.chaos.strobe.train import Train
-from printhammer.drive.input import MOST_PULSES, read_count, read_positive
+from printhammer.drive.input import MOST_PULSES, read_count
 from printhammer.errors import InputError
-from printhammer.hammer.hammer import Hammer
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
+from printhammer.run.regime import Regime, regimes_of
 from printhammer.run.start import initial_state
 from printhammer.run.touches import touches_of
 from printhammer.support.threads import in_threads, thread_count
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -166,40 +168,36 @@ class Section:
 
 
 def section(
-    hammer: Hammer,
+    hammer: Hammer | Regime,
     *,
     surface: Surface = "backstop",
-    period: float | str | None = None,
-    rate: float | str | None = None,
     touches: SupportsIndex = TOUCHES,
     transient: SupportsIndex = 0,
     firings: SupportsIndex | None = None,
-    waveform: Waveform | None = None,
-    drive: Drive | None = None,
-    overlap: Overlap = "add",
     state: tuple[float, float] | None = None,
     tolerance: float = TOLERANCE,
+    **firing: Unpack[Firing],
 ) -> Section:
     """Return the state of a hammer at each touch of its backstop, or of the pack.
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
+    hammer : Hammer or Regime
+        The hammer; or the hammer with all that `firing` says of it. Its phase plays no part.
     surface : str, optional
         "backstop" or "pack".
-    period, rate : float or str
-        Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is taken as well.
     touches : int, optional
         Number of touches.
     transient : int, optional
         Number of firings left out before the first touch.
     firings : int, optional
         Number of firings after which to give up looking; by default ten for each touch asked for.
-    waveform, drive, overlap, state
-        As for `printhammer.strobe`.
+    state : tuple of float, optional
+        Displacement, m, and velocity, m/s, at the first firing; by default the rest state.
     tolerance : float, optional
         As for `printhammer.simulate`.
+    **firing
+        How the hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -212,33 +210,22 @@ def section(
         An argument is not what is described above; the hammer has no such surface, no waveform or no rest
         state.
     """
-    if drive is None and (period is None) == (rate is None):
-        raise InputError("period and rate: expected one of them, the time between firings or its inverse")
-    if drive is not None and (period is not None or rate is not None or waveform is not None):
-        raise InputError("drive is given, expected no period, rate or waveform beside it")
-    spacing = None
-    if period is not None:
-        spacing = read_positive(period, "s", "period")
-    elif rate is not None:
-        spacing = 1.0 / read_positive(rate, "Hz", "rate")
     counts = _counts(touches, transient, firings)
     check_tolerance(tolerance)
-    train = Train.of(
-        hammer, spacing, counts[1] + counts[2], waveform=waveform, drive=drive, overlap=overlap, state=state
-    )
+    train = Train.of(Regime.of(hammer, **firing), counts[1] + counts[2], state)
     return _section(train, surface, counts, tolerance)
 
 
 def sections(
-    hammers: Hammer | Sequence[Hammer],
-    periods: Sequence[float | str] | npt.ArrayLike,
+    hammers: Hammer | Regime | Sequence[Hammer | Regime],
+    periods: Sequence[float | str] | npt.ArrayLike | None = None,
     *,
     surface: Surface = "backstop",
     touches: SupportsIndex = TOUCHES,
     transient: SupportsIndex = 0,
     firings: SupportsIndex | None = None,
     waveform: Waveform | None = None,
-    overlap: Overlap = "add",
+    overlap: Overlap | None = None,
     tolerance: float = TOLERANCE,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -247,11 +234,9 @@ def sections(
 
     Parameters
     ----------
-    hammers : Hammer or sequence of Hammer
-        One for all trains, or one for each.
-    periods : sequence
-        Times between firings, s or text with a unit, one for each train.
-    surface, touches, transient, firings, waveform, overlap, tolerance
+    hammers, periods, waveform, overlap
+        Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
+    surface, touches, transient, firings, tolerance
         As for `section`, for all trains.
     threads : int, optional
         By default as many as there are cores; the touches do not depend on it.
@@ -268,17 +253,10 @@ def sections(
     InputError
         As for `section`, or numbers of hammers and periods that do not fit together.
     """
-    given: list[Any] = list(periods) if np.ndim(periods) else [periods]  # type: ignore[arg-type]
-    spacings = [read_positive(period, "s", "period") for period in given]
-    many = [hammers] * len(spacings) if isinstance(hammers, Hammer) else list(hammers)
-    if len(many) != len(spacings):
-        raise InputError(f"hammers: {len(many)} are given, expected 1 or {len(spacings)}")
     counts = _counts(touches, transient, firings)
     check_tolerance(tolerance)
-    trains = [
-        Train.of(hammer, spacing, counts[1] + counts[2], waveform=waveform, overlap=overlap)
-        for hammer, spacing in zip(many, spacings, strict=True)
-    ]
+    regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
+    trains = [Train.of(regime, counts[1] + counts[2]) for regime in regimes]
     found: dict[int, Section] = {}
 
     def work(begin: int, end: int) -> None:

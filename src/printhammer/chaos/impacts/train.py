@@ -11,19 +11,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
-from printhammer.chaos.impacts.sections import Section
+from printhammer.chaos.impacts.sections import Section, section
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
 
 BINS: Final = 60
@@ -131,18 +133,20 @@ class ImpactTrain:
 
 
 def impact_train(
-    touches: Section | npt.ArrayLike,
+    touches: Section | Regime | Hammer | npt.ArrayLike,
     *,
     window: float | str | None = None,
     bins: SupportsIndex = BINS,
     lags: SupportsIndex = LAGS,
+    **firing: Unpack[Firing],
 ) -> ImpactTrain:
     """Return the statistics of the impacts of a section, or of a series of times.
 
     Parameters
     ----------
-    touches : Section or array
-        From `printhammer.section`, or times of impacts, s, ascending; at least nine.
+    touches : Section, Regime, Hammer or array
+        From `printhammer.section`; or a regime, or a hammer and how it is fired, of which that is taken; or
+        times of impacts, s, ascending. At least nine.
     window : float or str, optional
         Length of the windows for the Fano factor, s, or text with a unit; by default ten periods of the
         drive, or ten mean intervals where there is none. In a window of one period every train that prints
@@ -151,6 +155,8 @@ def impact_train(
         Number of bins of the histogram, between the shortest and the longest interval.
     lags : int, optional
         Largest lag of the autocorrelation; no more than a quarter of the intervals is taken.
+    **firing
+        How a hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -162,6 +168,10 @@ def impact_train(
     InputError
         There are too few times, they are not ascending or not finite; a window that is not positive.
     """
+    if isinstance(touches, Regime | Hammer):
+        touches = section(touches, **firing)
+    elif firing:
+        raise InputError(f"times are given, expected no {' or '.join(firing)} beside them")
     source = touches if isinstance(touches, Section) else None
     times = _times(touches.t if isinstance(touches, Section) else touches, source)
     intervals = np.diff(times)

@@ -51,15 +51,12 @@ class Records:
 
     Attributes
     ----------
-    phase : float
-        Of the section.
     states : array, shape (M, n, 2)
         Displacement, m, and velocity, m/s; NaN where a run did not get.
     usable : bool array, shape (M, n)
         Whether that is the whole state.
     """
 
-    phase: float
     states: FloatArray
     usable: npt.NDArray[np.bool_]
 
@@ -70,15 +67,12 @@ class Guess:
 
     Attributes
     ----------
-    phase : float
-        Of the section.
     states : array, shape (m, 2)
         States at the starts of the segments.
     firings : int array, shape (m,)
         Number of firings in each.
     """
 
-    phase: float
     states: FloatArray
     firings: npt.NDArray[np.int64]
 
@@ -121,12 +115,12 @@ def record(
     table = result.strobes
     assert table is not None
     found = []
-    for phase, own in moments.items():
+    for own in moments.values():
         columns = np.searchsorted(times, own)
         x, v, branch = (part[:, columns] for part in (table.x, table.v, table.branch))
         out = (x > front_with_memory(regime.hammer)) & (v <= 0.0)
         usable = np.isfinite(x) & ~np.isin(branch, WITH_MEMORY) & ~out
-        found.append(Records(phase, np.stack([x, v], axis=2), usable))
+        found.append(Records(np.stack([x, v], axis=2), usable))
     return found
 
 
@@ -237,17 +231,13 @@ def close_returns(records: Records, period: int, most: int, scales: FloatArray) 
     return found
 
 
-def joined(
-    shorter: Sequence[Closing], phase: float, period: int, most: int, scales: FloatArray
-) -> list[Guess]:
+def joined(shorter: Sequence[Closing], period: int, most: int, scales: FloatArray) -> list[Guess]:
     """Return guesses made of two shorter orbits, one run through after the other.
 
     Parameters
     ----------
     shorter : sequence of Closing
         Orbits of fewer firings.
-    phase : float
-        Of the section.
     period : int
         Number of firings.
     most : int
@@ -269,7 +259,7 @@ def joined(
             here, there = (int(place) for place in np.unravel_index(np.argmin(gaps), gaps.shape))
             states = [np.roll(one.states, -here, axis=0), np.roll(other.states, -there, axis=0)]
             firings = [np.roll(one.firings, -here), np.roll(other.firings, -there)]
-            guess = Guess(phase, np.concatenate(states), np.concatenate(firings))
+            guess = Guess(np.concatenate(states), np.concatenate(firings))
             found.append((float(gaps[here, there]), guess))
     return [guess for _gap, guess in sorted(found, key=lambda pair: pair[0])[:most]]
 
@@ -287,4 +277,4 @@ def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
 def _guess(records: Records, member: int, first: int, period: int) -> Guess:
     starts = np.flatnonzero(records.usable[member, first : first + period])
     lengths = np.diff(np.append(starts, period))
-    return Guess(records.phase, records.states[member, first + starts], lengths.astype(np.int64))
+    return Guess(records.states[member, first + starts], lengths.astype(np.int64))

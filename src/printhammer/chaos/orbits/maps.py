@@ -36,17 +36,15 @@ class ExactMaps:
     Parameters
     ----------
     regime : Regime
-        Hammer and periodic drive.
-    phase : float
-        Of the section.
+        Hammer, periodic drive and phase of the section.
     tolerance : float
         Of the integration.
     threads : int, optional
         By default as many as there are cores.
     """
 
-    def __init__(self, regime: Regime, phase: float, tolerance: float, threads: int | None = None) -> None:
-        self.regime, self.phase, self.tolerance = regime, phase, tolerance
+    def __init__(self, regime: Regime, tolerance: float, threads: int | None = None) -> None:
+        self.regime, self.tolerance = regime, tolerance
         self.threads = thread_count(threads)
 
     def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
@@ -55,9 +53,7 @@ class ExactMaps:
 
         def work(begin: int, end: int) -> None:
             for i in range(begin, end):
-                image = image_of(
-                    self.regime, states[i], int(firings[i]), self.phase, self.tolerance, contacts=False
-                )
+                image = image_of(self.regime, states[i], int(firings[i]), self.tolerance, contacts=False)
                 found.states[i], found.jacobians[i] = image.state, image.jacobian
                 found.smooth[i] = image.smooth
                 found.reasons[i] = CLOSED if image.ok else image.status
@@ -72,9 +68,7 @@ class FastMaps:
     Parameters
     ----------
     regime : Regime
-        Hammer and periodic drive.
-    phase : float
-        Of the section.
+        Hammer, periodic drive and phase of the section.
     tolerance : float
         Of the integration.
     longest : int
@@ -83,12 +77,10 @@ class FastMaps:
         By default as many as there are cores; the images do not depend on it.
     """
 
-    def __init__(
-        self, regime: Regime, phase: float, tolerance: float, longest: int, threads: int | None = None
-    ) -> None:
+    def __init__(self, regime: Regime, tolerance: float, longest: int, threads: int | None = None) -> None:
         self.regime, self.tolerance, self.threads = regime, tolerance, threads
         self.drive, _ = regime.train(longest)
-        self.moments = regime.moments(self.drive, longest, phase)
+        self.moments = regime.moments(self.drive, longest)
         self.scales = regime.window.half_widths
 
     def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:

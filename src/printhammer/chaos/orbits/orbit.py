@@ -50,7 +50,7 @@ class Orbit:
     Attributes
     ----------
     regime : Regime
-        Hammer and periodic drive.
+        Hammer and periodic drive, and phase of the section at which the orbit was found.
     firings : int
         Number of firings after which the motion repeats, and no smaller number.
     x, v : array, shape (firings,)
@@ -59,8 +59,6 @@ class Orbit:
         Code of the mode of motion there, a place in `printhammer.run.ensemble.MODE_NAMES`.
     memory : array, shape (firings,)
         Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0.
-    phase : float
-        Phase of the section at which the orbit was found: part of the period after the first of the firings.
     section : array, shape (2,)
         Displacement, m, and velocity, m/s, there.
     multipliers : complex array, shape (2,)
@@ -91,7 +89,6 @@ class Orbit:
     v: FloatArray
     branch: npt.NDArray[np.int64] = field(repr=False)
     memory: FloatArray = field(repr=False)
-    phase: float = field(repr=False)
     section: FloatArray = field(repr=False)
     multipliers: npt.NDArray[np.complex128]
     smooth: bool
@@ -107,6 +104,11 @@ class Orbit:
     def ok(self) -> bool:
         """Whether there is such an orbit."""
         return self.status == _OK
+
+    @property
+    def phase(self) -> float:
+        """Part of the period of the drive from the first of the firings to the section."""
+        return self.regime.phase
 
     @property
     def period(self) -> float:
@@ -184,7 +186,7 @@ class Orbit:
         """
         if not self.ok:
             raise ValueError(f"there is no such orbit: {self.status}")
-        return _Run(self.regime, self.section, self.phase, self.firings, self.tolerance).motion
+        return _Run(self.regime, self.section, self.firings, self.tolerance).motion
 
     def to_dataset(self) -> xr.Dataset:
         """Return the orbit as a Dataset over its firings, with units and provenance in the attributes."""
@@ -198,7 +200,7 @@ class Orbit:
         return import_module("printhammer.figures.chaos.orbits").plot_orbit(self, **options)
 
 
-def no_orbit(regime: Regime, firings: int, phase: float, tolerance: float, status: str) -> Orbit:
+def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orbit:
     """Return an orbit that there is none of, and why."""
     none = np.full(firings, np.nan)
     return Orbit(
@@ -208,7 +210,6 @@ def no_orbit(regime: Regime, firings: int, phase: float, tolerance: float, statu
         v=none.copy(),
         branch=np.full(firings, -1),
         memory=none.copy(),
-        phase=phase,
         section=np.full(2, np.nan),
         multipliers=np.full(2, complex(math.nan, math.nan)),
         smooth=False,
@@ -222,37 +223,35 @@ def no_orbit(regime: Regime, firings: int, phase: float, tolerance: float, statu
     )
 
 
-def orbit_of(regime: Regime, closing: Closing, phase: float, tolerance: float) -> Orbit:
+def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
     """Return all about an orbit that Newton's method has closed.
 
     Parameters
     ----------
     regime : Regime
-        Hammer and periodic drive.
+        Hammer, periodic drive and phase of the section.
     closing : Closing
         The orbit.
-    phase : float
-        Of its section.
     tolerance : float
         Of the integration.
     """
     firings = int(closing.firings.sum())
     if not closing.closed:
-        return no_orbit(regime, firings, phase, tolerance, closing.reason)
+        return no_orbit(regime, firings, tolerance, closing.reason)
     first = int(np.lexsort((closing.states[:, 1], closing.states[:, 0]))[0])
     start = closing.states[first]
-    run = _Run(regime, start, phase, firings, tolerance)
+    run = _Run(regime, start, firings, tolerance)
     if run.record.status_name != _OK:
-        return no_orbit(regime, firings, phase, tolerance, run.record.status_name)
+        return no_orbit(regime, firings, tolerance, run.record.status_name)
     returned = run.record.nodes[-1, 1:3]
     residual = float(np.abs((returned - start) / regime.window.half_widths).max())
     jacobians = np.roll(closing.jacobians, -first, axis=0)
     multipliers = multipliers_of(jacobians)
     # What Newton's method left open grows on the way round.
     if not residual <= CLOSES * max(1.0, abs(multipliers[0])):
-        return no_orbit(regime, firings, phase, tolerance, "does not close when re-integrated as a whole")
+        return no_orbit(regime, firings, tolerance, "does not close when re-integrated as a whole")
     states = run.at_firings()
-    contacts, dots = _contacts_and_dots(regime, start, phase, firings, tolerance)
+    contacts, dots = _contacts_and_dots(regime, start, firings, tolerance)
     none = np.full(2, complex(math.nan, math.nan))
     return Orbit(
         regime=regime,
@@ -261,7 +260,6 @@ def orbit_of(regime: Regime, closing: Closing, phase: float, tolerance: float) -
         v=states[:, 1].copy(),
         branch=states[:, 2].astype(np.int64),
         memory=states[:, 3].copy(),
-        phase=phase,
         section=start.copy(),
         multipliers=multipliers if closing.smooth else none,
         smooth=closing.smooth,
@@ -297,12 +295,10 @@ def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
 class _Run:
     """Some periods of the drive from a section on, in a train that has fired before."""
 
-    def __init__(
-        self, regime: Regime, start: FloatArray, phase: float, periods: int, tolerance: float
-    ) -> None:
-        self.regime, self.phase, self.periods = regime, phase, periods
+    def __init__(self, regime: Regime, start: FloatArray, periods: int, tolerance: float) -> None:
+        self.regime, self.periods = regime, periods
         self.train, self.fired_at = regime.train(periods)
-        self.sections = regime.moments(self.train, periods, phase)
+        self.sections = regime.moments(self.train, periods)
         state = (float(start[0]), float(start[1]))
         self.problem = Problem(regime.hammer, self.train, state, float(self.sections[0]), tolerance)
         self.record = self.problem.run(float(self.sections[-1]))
@@ -320,18 +316,18 @@ class _Run:
         The first of them is that before the section, or at it.
         """
         firings = self.regime.moments(self.train, self.periods, 0.0)
-        marks = firings[:-1] if self.phase == 0.0 else firings[1:]
+        marks = firings[:-1] if self.regime.phase == 0.0 else firings[1:]
         marks = np.concatenate([self.sections[:1], marks])
         found = follow(self.problem, marks, np.eye(3), renormalise=False).found[1:, :4]
-        return found if self.phase == 0.0 else np.roll(found, 1, axis=0)
+        return found if self.regime.phase == 0.0 else np.roll(found, 1, axis=0)
 
 
 def _contacts_and_dots(
-    regime: Regime, start: FloatArray, phase: float, firings: int, tolerance: float
+    regime: Regime, start: FloatArray, firings: int, tolerance: float
 ) -> tuple[tuple[Contact, ...], tuple[Dot, ...]]:
     """Return what begins in one period of an orbit; its run goes on until all of that has ended."""
-    skipped = 0 if phase == 0.0 or regime.drive is not None else 1
-    run = _Run(regime, start, phase, firings + skipped + 1, tolerance)
+    skipped = 0 if regime.phase == 0.0 or regime.drive is not None else 1
+    run = _Run(regime, start, firings + skipped + 1, tolerance)
     motion, period = run.motion, firings * regime.period
     # Under an endless force there is no firing to begin with, and the period begins at the section.
     begin = run.fired_at + skipped * regime.period if regime.drive is None else float(run.sections[0])

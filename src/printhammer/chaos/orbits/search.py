@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from printhammer.chaos.orbits.guesses import PHASES, close_returns, first_state,
 from printhammer.chaos.orbits.maps import ExactMaps, FastMaps
 from printhammer.chaos.orbits.newton import Closing, close_orbits
 from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, no_orbit, orbit_of
-from printhammer.chaos.strobe.map import MAP_TOLERANCE, check_phase
+from printhammer.chaos.strobe.map import MAP_TOLERANCE
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.run.problem import TOLERANCE, check_tolerance
@@ -27,10 +27,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.chaos.orbits.guesses import Guess, Records
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -146,19 +144,15 @@ class Orbits:
 
 
 def orbits(
-    hammer: Hammer,
+    hammer: Hammer | Regime,
     *,
-    period: float | str | None = None,
-    rate: float | str | None = None,
     longest: SupportsIndex = LONGEST,
     starts: SupportsIndex = STARTS,
     guesses: SupportsIndex = GUESSES,
-    waveform: Waveform | None = None,
-    drive: Drive | None = None,
-    overlap: Overlap = "add",
     tolerance: float = MAP_TOLERANCE,
     threads: int | None = None,
     progress: Progress | None = None,
+    **firing: Unpack[Firing],
 ) -> Orbits:
     """Search for the periodic orbits of a hammer under a periodic drive, stable and unstable.
 
@@ -168,10 +162,8 @@ def orbits(
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
-    period, rate : float or str
-        Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is taken as well.
+    hammer : Hammer or Regime
+        The hammer; or the hammer with all that `firing` says of it. The search chooses the phase itself.
     longest : int, optional
         Largest number of firings of an orbit, at most 64.
     starts : int, optional
@@ -179,18 +171,14 @@ def orbits(
     guesses : int, optional
         Number of guesses for each number of firings; at most as many again are made of shorter orbits that
         are known by then.
-    waveform : Waveform, optional
-        What every firing does; by default the waveform of the hammer.
-    drive : Drive, optional
-        Instead of a waveform, period and rate: an endless force such as `printhammer.SineForce`.
-    overlap : str, optional
-        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
     tolerance : float, optional
         Error allowed in one step of the runs that the orbits are found with in the end.
     threads : int, optional
         By default as many as there are cores.
     progress : callable, optional
         Called now and then with the amount of work that is done and of all.
+    **firing
+        How the hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -202,29 +190,7 @@ def orbits(
     InputError
         An argument is not what is described above.
     """
-    regime = Regime.of(hammer, period=period, rate=rate, waveform=waveform, drive=drive, overlap=overlap)
-    return orbits_of(
-        regime,
-        longest=longest,
-        starts=starts,
-        guesses=guesses,
-        tolerance=tolerance,
-        threads=threads,
-        progress=progress,
-    )
-
-
-def orbits_of(
-    regime: Regime,
-    *,
-    longest: SupportsIndex = LONGEST,
-    starts: SupportsIndex = STARTS,
-    guesses: SupportsIndex = GUESSES,
-    tolerance: float = MAP_TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> Orbits:
-    """Search for the periodic orbits of a regime; see `orbits`."""
+    regime = Regime.of(hammer, **firing)
     most, several = read_count(longest, "longest"), read_count(guesses, "guesses")
     count = read_count(starts, "starts")
     if most > MOST_FIRINGS:
@@ -239,7 +205,7 @@ def orbit(
     state: npt.ArrayLike,
     *,
     firings: SupportsIndex = 1,
-    phase: float = 0.0,
+    phase: float | None = None,
     tolerance: float = MAP_TOLERANCE,
     threads: int | None = None,
 ) -> Orbit:
@@ -254,8 +220,8 @@ def orbit(
     firings : int, optional
         Number of firings after which the motion is to repeat.
     phase : float, optional
-        Part of the period between a firing and the section. The armature must not be on its way out of the
-        pack there, where the state has a memory.
+        Instead of that of the regime. The armature must not be on its way out of the pack there, where the
+        state has a memory.
     tolerance : float, optional
         Error allowed in one step of the runs.
     threads : int, optional
@@ -272,7 +238,7 @@ def orbit(
     InputError
         An argument is not what is described above.
     """
-    count, part = read_count(firings, "firings"), check_phase(phase)
+    regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     check_tolerance(tolerance)
     found = np.asarray(state, dtype=np.float64)
     if found.shape != (2,) or not np.isfinite(found).all():
@@ -283,7 +249,7 @@ def orbit(
         raise InputError(f"firings = {count}, expected at most {MOST_FIRINGS}")
     scales = regime.window.half_widths
     states, images = [found], None
-    exact = ExactMaps(regime, part, tolerance, threads)
+    exact = ExactMaps(regime, tolerance, threads)
     for _ in range(count - 1):
         images = exact(states[-1][np.newaxis], np.ones(1, np.int64))
         if images.reasons[0] or not np.isfinite(images.states).all():
@@ -294,8 +260,8 @@ def orbit(
     guess = np.array(states[: len(segments)])
     (closing,) = close_orbits(exact, guess[np.newaxis], segments[np.newaxis], scales, **_LONE)
     if not closing.closed:
-        return no_orbit(regime, count, part, tolerance, closing.reason)
-    return orbit_of(regime, shortest(closing, scales), part, tolerance)
+        return no_orbit(regime, count, tolerance, closing.reason)
+    return orbit_of(regime, shortest(closing, scales), tolerance)
 
 
 def shortest(closing: Closing, scales: FloatArray) -> Closing:
@@ -344,12 +310,13 @@ class _Search:
         begun = np.vstack([rest, spread(self.regime, starts, seen.states[0])])
         records = record(self.regime, begun, 2 * self.longest, _LONG, self.threads)
         self._tell(1)
-        closed: list[tuple[float, Closing]] = []
+        closed: list[tuple[Regime, Closing]] = []
         for place, (phase, kept) in enumerate(zip(PHASES, records, strict=True)):
             inside = np.isfinite(records[0].states).all(axis=2) & ~records[0].usable
             if place and not inside.any():
                 continue
-            closed += [(phase, closing) for closing in self._phase(phase, kept)]
+            regime = replace(self.regime, phase=phase)
+            closed += [(regime, closing) for closing in self._through(regime, kept)]
         self._tell(self.all - self.done - 1)
         found = self._described(closed)
         self._tell(1)
@@ -369,13 +336,13 @@ class _Search:
         if self.progress is not None:
             self.progress(self.done, self.all)
 
-    def _phase(self, phase: float, records: Records) -> list[Closing]:
+    def _through(self, regime: Regime, records: Records) -> list[Closing]:
         """Return the different orbits through one section."""
-        fast = FastMaps(self.regime, phase, TOLERANCE, self.longest, self.threads)
+        fast = FastMaps(regime, TOLERANCE, self.longest, self.threads)
         different: list[Closing] = []
         for period in range(1, self.longest + 1):
             tried = close_returns(records, period, self.several, self.scales)
-            tried += joined(different, phase, period, self.several, self.scales)
+            tried += joined(different, period, self.several, self.scales)
             self.tried[period - 1] += len(tried)
             for closing in _closed(fast, tried, self.scales, _FAST):
                 if closing.closed:
@@ -383,7 +350,7 @@ class _Search:
                 else:
                     self.failures[closing.reason] += 1
             self._tell(1)
-        exact = ExactMaps(self.regime, phase, self.tolerance, self.threads)
+        exact = ExactMaps(regime, self.tolerance, self.threads)
         refined: list[Closing] = []
         for closing in _closed(exact, different, self.scales, _EXACT):
             if closing.closed:
@@ -403,14 +370,14 @@ class _Search:
                 return
         different.append(closing)
 
-    def _described(self, closed: Sequence[tuple[float, Closing]]) -> list[Orbit]:
+    def _described(self, closed: Sequence[tuple[Regime, Closing]]) -> list[Orbit]:
         """Return all about the orbits, without those that were found at another section too."""
         every: dict[int, Orbit] = {}
 
         def work(begin: int, end: int) -> None:
             for i in range(begin, end):
-                phase, closing = closed[i]
-                every[i] = orbit_of(self.regime, closing, phase, self.tolerance)
+                regime, closing = closed[i]
+                every[i] = orbit_of(regime, closing, self.tolerance)
 
         in_threads([work], [len(closed)], self.threads)
         found: list[Orbit] = []

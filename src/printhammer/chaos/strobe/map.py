@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
-__all__ = ["IN_PACK", "MAP_TOLERANCE", "Image", "Regime", "strobe_map", "strobe_maps", "strobe_slope"]
+__all__ = ["IN_PACK", "MAP_TOLERANCE", "Image", "strobe_map", "strobe_maps", "strobe_slope"]
 
 MAP_TOLERANCE: Final = 1e-13
 """Tolerance with which the map is computed: its noise limits how well a fixed point can be known."""
@@ -100,7 +100,7 @@ def strobe_map(
     state: npt.ArrayLike,
     *,
     firings: int = 1,
-    phase: float = 0.0,
+    phase: float | None = None,
     tolerance: float = MAP_TOLERANCE,
     contacts: bool = True,
 ) -> Image:
@@ -117,7 +117,7 @@ def strobe_map(
     firings : int, optional
         Number of periods.
     phase : float, optional
-        Part of the period between a firing and the section, from 0 up to but not including 1.
+        Instead of that of the regime.
     tolerance : float, optional
         Error allowed in one step of the run.
     contacts : bool, optional
@@ -133,14 +133,14 @@ def strobe_map(
     InputError
         An argument is not what is described above.
     """
-    count, part = read_count(firings, "firings"), check_phase(phase)
+    regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     check_tolerance(tolerance)
     found = np.asarray(state, dtype=np.float64)
     if found.shape != (2,) or not np.isfinite(found).all():
         raise InputError(
             f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
         )
-    return image_of(regime, found, count, part, tolerance, contacts=contacts)
+    return image_of(regime, found, count, tolerance, contacts=contacts)
 
 
 def strobe_maps(
@@ -148,7 +148,7 @@ def strobe_maps(
     states: npt.ArrayLike,
     *,
     firings: int = 1,
-    phase: float = 0.0,
+    phase: float | None = None,
     tolerance: float = MAP_TOLERANCE,
     contacts: bool = True,
     threads: int | None = None,
@@ -174,7 +174,7 @@ def strobe_maps(
     InputError
         As for `strobe_map`, or numbers of regimes and states that do not fit together.
     """
-    count, part = read_count(firings, "firings"), check_phase(phase)
+    count = read_count(firings, "firings")
     check_tolerance(tolerance)
     rows = np.asarray(states, dtype=np.float64)
     if rows.ndim != 2 or rows.shape[1] != 2 or not np.isfinite(rows).all():
@@ -182,11 +182,12 @@ def strobe_maps(
     many = [regimes] * len(rows) if isinstance(regimes, Regime) else list(regimes)
     if len(many) != len(rows):
         raise InputError(f"regimes: {len(many)} are given, expected 1 or {len(rows)}")
+    many = [Regime.of(regime, phase=phase) for regime in many]
     found: dict[int, Image] = {}
 
     def work(begin: int, end: int) -> None:
         for i in range(begin, end):
-            found[i] = image_of(many[i], rows[i], count, part, tolerance, contacts=contacts)
+            found[i] = image_of(many[i], rows[i], count, tolerance, contacts=contacts)
 
     in_threads([work], [len(rows)], thread_count(threads), progress)
     return [found[i] for i in range(len(rows))]
@@ -198,7 +199,7 @@ def strobe_slope(
     state: npt.ArrayLike,
     *,
     firings: int = 1,
-    phase: float = 0.0,
+    phase: float | None = None,
     tolerance: float = MAP_TOLERANCE,
 ) -> FloatArray:
     """Return the derivative of the image of a state with respect to one constant, shape (2,), SI.
@@ -243,25 +244,12 @@ def strobe_slope(
     return np.asarray((8.0 * (near[1] - near[0]) - (far[1] - far[0])) / (12.0 * spacing))
 
 
-def check_phase(phase: float) -> float:
-    """Return a phase of the period that is one.
-
-    Raises
-    ------
-    InputError
-        It is not from 0 up to but not including 1.
-    """
-    if not (math.isfinite(phase) and 0.0 <= phase < 1.0):
-        raise InputError(f"phase = {phase!r}, expected a part of the period from 0 up to but not including 1")
-    return float(phase)
-
-
 def image_of(
-    regime: Regime, state: FloatArray, firings: int, phase: float, tolerance: float, *, contacts: bool = True
+    regime: Regime, state: FloatArray, firings: int, tolerance: float, *, contacts: bool = True
 ) -> Image:
     """Do as `strobe_map` with arguments that are known to be right."""
     train, _ = regime.train(firings)
-    moments = regime.moments(train, firings, phase)
+    moments = regime.moments(train, firings)
     try:
         start = initial_state(regime.hammer, (float(state[0]), float(state[1])))
     except InputError:

@@ -8,18 +8,19 @@ law and its memory, the latest local maximum.
 from __future__ import annotations
 
 import operator
-from typing import TYPE_CHECKING, Any, SupportsIndex
+from typing import TYPE_CHECKING, Any, SupportsIndex, Unpack
 
 import numpy as np
 
 from printhammer.chaos.strobe.train import Train, run_trains
 from printhammer.chaos.strobe.verdict import FIRST, LAST
-from printhammer.drive.input import MOST_PULSES, read_count, read_number, read_positive
+from printhammer.drive.input import MOST_PULSES, read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import TOLERANCE
+from printhammer.run.regime import Regime, regimes_of
 from printhammer.run.window import window_of
 
 if TYPE_CHECKING:
@@ -27,16 +28,21 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
+    from printhammer.chaos.strobe.train import States
     from printhammer.chaos.strobe.verdict import Verdict
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.run.regime import Firing
     from printhammer.run.window import Window
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
 POINTS = 200
 """Number of points unless told otherwise, as in Fig. 11."""
+
+_SETTLED = 1000
+"""Points, and firings left out before them, of what is taken for settled."""
 
 
 class Strobe(Result):
@@ -94,41 +100,25 @@ class Strobe(Result):
 
 
 def strobe(
-    hammer: Hammer,
+    hammer: Hammer | Regime,
     *,
-    period: float | str | None = None,
-    rate: float | str | None = None,
     points: SupportsIndex = POINTS,
     transient: SupportsIndex = 0,
-    phase: float = 0.0,
-    waveform: Waveform | None = None,
-    drive: Drive | None = None,
-    overlap: Overlap = "add",
     state: tuple[float, float] | None = None,
     tolerance: float = TOLERANCE,
     verdict: bool = True,
+    **firing: Unpack[Firing],
 ) -> Strobe:
     """Return the state of a hammer once a period of its drive, and what kind of motion that is.
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
-    period, rate : float or str
-        Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is taken as well.
+    hammer : Hammer or Regime
+        The hammer; or the hammer with all that `firing` says of it.
     points : int, optional
         Number of points; by default 200, as in Fig. 11.
     transient : int, optional
         Number of firings left out before the first point.
-    phase : float, optional
-        Part of the period between a firing and its point, from 0 up to but not including 1.
-    waveform : Waveform, optional
-        What every firing does; by default the waveform of the hammer.
-    drive : Drive, optional
-        Instead of a waveform, period and rate: an endless force such as `printhammer.SineForce`, whose own
-        period counts.
-    overlap : str, optional
-        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
     state : tuple of float, optional
         Displacement, m, and velocity, m/s, at the first firing; by default the rest state.
     tolerance : float, optional
@@ -136,6 +126,9 @@ def strobe(
     verdict : bool, optional
         Whether to judge the motion, at the firings 1001 to 2000 whatever the points and their phase; see
         `printhammer.chaos.strobe.verdict`.
+    **firing
+        How the hammer is fired: period or rate, waveform, drive, overlap and phase of the points, as for
+        `printhammer.Regime.of`.
 
     Returns
     -------
@@ -147,26 +140,10 @@ def strobe(
     InputError
         An argument is not what is described above, or the hammer has no waveform or no rest state.
     """
-    periods = None
-    if drive is None:
-        if (period is None) == (rate is None):
-            raise InputError("period and rate: expected one of them, the time between firings or its inverse")
-        periods = [
-            read_positive(period, "s", "period")
-            if period is not None
-            else 1.0 / read_positive(rate if rate is not None else 0.0, "Hz", "rate")
-        ]
-    elif period is not None or rate is not None or waveform is not None:
-        raise InputError("drive is given, expected no period, rate or waveform beside it")
     (found,) = strobes(
-        hammer,
-        periods,
+        Regime.of(hammer, **firing),
         points=points,
         transient=transient,
-        phase=phase,
-        waveform=waveform,
-        drives=None if drive is None else [drive],
-        overlap=overlap,
         states=None if state is None else [state],
         tolerance=tolerance,
         verdict=verdict,
@@ -176,15 +153,15 @@ def strobe(
 
 
 def strobes(
-    hammers: Hammer | Sequence[Hammer],
+    hammers: Hammer | Regime | Sequence[Hammer | Regime],
     periods: Sequence[float | str] | npt.ArrayLike | None = None,
     *,
     points: SupportsIndex = POINTS,
     transient: SupportsIndex = 0,
-    phase: float = 0.0,
+    phase: float | None = None,
     waveform: Waveform | None = None,
     drives: Sequence[Drive] | None = None,
-    overlap: Overlap = "add",
+    overlap: Overlap | None = None,
     states: Sequence[tuple[float, float]] | npt.ArrayLike | None = None,
     tolerance: float = TOLERANCE,
     verdict: bool = True,
@@ -197,14 +174,10 @@ def strobes(
 
     Parameters
     ----------
-    hammers : Hammer or sequence of Hammer
-        One for all trains, or one for each.
-    periods : sequence
-        Times between firings, s or text with a unit, one for each train, or a single one for all hammers.
-    points, transient, phase, waveform, overlap, tolerance, verdict
+    hammers, periods, drives, waveform, overlap, phase
+        Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
+    points, transient, tolerance, verdict
         As for `strobe`, for all trains.
-    drives : sequence of Drive, optional
-        Instead of periods: endless forces.
     states : sequence, optional
         Displacement, m, and velocity, m/s, at the first firing of each train; by default the rest state.
     firings : tuple of int, optional
@@ -228,37 +201,21 @@ def strobes(
         As for `strobe`, or numbers of hammers, periods and states that do not fit together.
     """
     count, skipped = read_count(points, "points"), transient_of(transient)
-    part = read_number(phase, "1", "phase")
-    if not 0.0 <= part < 1.0:
-        raise InputError(f"phase = {phase!r}, expected a part of the period from 0 up to but not including 1")
     if not 1 <= firings[0] < firings[1]:
         raise InputError(f"firings = {firings!r}, expected the first and the last firing to judge, ascending")
     fired = max(count + skipped, firings[1] if verdict else 1)
-    wanted: list[float | None] = [None] * len(drives) if drives is not None else [*_periods(periods)]
-    many = [hammers] if isinstance(hammers, Hammer) else list(hammers)
-    rows = None if states is None else np.asarray(states, dtype=np.float64).reshape(-1, 2)
-    counts = [len(many), len(wanted), *([] if rows is None else [len(rows)])]
-    size = max(counts) if min(counts) else 0
-    for name, given in (("hammers", many), ("periods", wanted), ("states", rows)):
+    many = regimes_of(hammers, periods, drives, waveform=waveform, overlap=overlap, phase=phase)
+    rows = None if states is None else np.asarray(states, dtype=np.float64).reshape(-1, 2).tolist()
+    size = max(len(many), 0 if rows is None else len(rows)) if many and rows != [] else 0
+    for name, given in (("hammers and periods", many), ("states", rows)):
         if given is not None and len(given) not in (1, size):
             raise InputError(f"{name}: {len(given)} are given, expected 1 or {size}")
-    trains = [
-        Train.of(
-            many[i % len(many)],
-            wanted[i % len(wanted)],
-            fired,
-            waveform=waveform,
-            drive=None if drives is None else drives[i % len(drives)],
-            overlap=overlap,
-            state=None if rows is None else (float(rows[i % len(rows), 0]), float(rows[i % len(rows), 1])),
-        )
-        for i in range(size)
-    ]
+    begun = [None] if rows is None else [(x, v) for x, v in rows]
+    trains = [Train.of(many[i % len(many)], fired, begun[i % len(begun)]) for i in range(size)]
     chosen = np.arange(skipped + 1, skipped + count + 1)
     found, verdicts = run_trains(
         trains,
         chosen,
-        part,
         tolerance,
         firings if verdict else None,
         every_exponent=every_exponent,
@@ -266,23 +223,45 @@ def strobes(
         progress=progress,
     )
     return [
-        Strobe(
-            hammer=train.hammer,
-            drive=train.drive,
-            period=train.period,
-            phase=part,
-            firing=chosen,
-            t=states_found.t,
-            x=states_found.x,
-            v=states_found.v,
-            branch=states_found.branch,
-            memory=states_found.memory,
-            status=states_found.status,
-            tolerance=tolerance,
-            verdict=judged,
-        )
+        strobe_of(train, chosen, states_found, tolerance, judged)
         for train, states_found, judged in zip(trains, found, verdicts, strict=True)
     ]
+
+
+def points_of(series: Any, firing: Firing) -> Any:
+    """Return the settled strobe points of a regime, or of a hammer and how it is fired; else what is given.
+
+    Raises
+    ------
+    InputError
+        As for `strobe`; or points are given, and how to fire beside them.
+    """
+    if isinstance(series, Hammer | Regime):
+        return strobe(series, points=_SETTLED, transient=_SETTLED, verdict=False, **firing)
+    if firing:
+        raise InputError(f"points are given, expected no {' or '.join(firing)} beside them")
+    return series
+
+
+def strobe_of(
+    train: Train, firing: npt.NDArray[np.int64], states: States, tolerance: float, judged: Verdict | None
+) -> Strobe:
+    """Return the strobe points of a train, given its states at some firings and the verdict on it."""
+    return Strobe(
+        hammer=train.hammer,
+        drive=train.drive,
+        period=train.period,
+        phase=train.regime.phase,
+        firing=firing,
+        t=states.t,
+        x=states.x,
+        v=states.v,
+        branch=states.branch,
+        memory=states.memory,
+        status=states.status,
+        tolerance=tolerance,
+        verdict=judged,
+    )
 
 
 def transient_of(transient: SupportsIndex) -> int:
@@ -302,12 +281,3 @@ def transient_of(transient: SupportsIndex) -> int:
             f"transient = {transient!r}, expected a whole number of firings from 0 to {MOST_PULSES}"
         )
     return count
-
-
-def _periods(periods: Sequence[float | str] | npt.ArrayLike | None) -> list[float]:
-    if periods is None:
-        raise InputError("periods are missing, expected the times between the firings of each train, s")
-    given: list[Any] = list(periods) if np.ndim(periods) else [periods]  # type: ignore[arg-type]
-    if not given:
-        raise InputError("periods: expected at least one time between firings, s")
-    return [read_positive(period, "s", "period") for period in given]

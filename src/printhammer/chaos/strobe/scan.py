@@ -22,8 +22,8 @@ import numpy as np
 
 from printhammer.chaos.strobe.train import Train, exponents_of, run_trains
 from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, period_of, verdict
-from printhammer.drive.trains import PulseTrain
 from printhammer.run.problem import TOLERANCE
+from printhammer.run.regime import Regime
 from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
@@ -89,6 +89,7 @@ def scan(
         The hammer has no waveform or no rest state, or a period is not positive.
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64)).tolist()
+    regimes = [Regime.of(hammer, period=time) for time in times]
     found: dict[int, Verdict] = {}
 
     def tell() -> None:
@@ -97,14 +98,14 @@ def scan(
 
     for last in STAGES:
         left = [i for i in range(len(times)) if i not in found]
-        trains = [Train.of(hammer, times[i], last) for i in left]
+        trains = [Train.of(regimes[i], last) for i in left]
         window = (last // 2 + 1, last)
-        states, _ = run_trains(trains, np.arange(window[0], last + 1), 0.0, tolerance, None, threads=threads)
+        states, _ = run_trains(trains, np.arange(window[0], last + 1), tolerance, None, threads=threads)
         settled = _settled(trains, states, window, tolerance, threads)
         found |= {i: judged for i, judged in zip(left, settled, strict=True) if judged is not None}
         tell()
     left = [i for i in range(len(times)) if i not in found]
-    trains = [Train.of(hammer, times[i], LAST) for i in left]
+    trains = [Train.of(regimes[i], LAST) for i in left]
     found |= dict(zip(left, _followed(trains, tolerance, exponents, threads), strict=True))
     tell()
     return [found[i] for i in range(len(times))]
@@ -149,11 +150,9 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
     if _in_pack(train, states, -1):
         return np.inf
     # What is left of the pulses before is left out: it is the same for all neighbouring motions.
-    waveform, overlap = train.drive.waveform, train.drive.overlap
-    cycle = PulseTrain(waveform, period=train.period, pulses=period, overlap=overlap)
     found = tangent_map(
         train.hammer,
-        cycle,
+        train.regime.pulses(period),
         0.0,
         period * train.period,
         state=(float(states.x[-1]), float(states.v[-1])),
@@ -169,7 +168,7 @@ def _followed(
 ) -> list[Verdict]:
     """Return the verdicts on trains that are followed to the end."""
     judged = (FIRST, LAST)
-    states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), 0.0, tolerance, None, threads=threads)
+    states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), tolerance, None, threads=threads)
     distances = [found.distances(train) for found, train in zip(states, trains, strict=True)]
     stopped = ["" if found.status == "ok" else found.status for found in states]
     verdicts = {
@@ -199,6 +198,4 @@ def _in_pack(train: Train, states: States, row: int) -> bool:
 
 def _continued(train: Train, states: States, pulses: int) -> Train:
     """Return a train that starts at the first of some states, as if nothing had been fired before."""
-    waveform, overlap = train.drive.waveform, train.drive.overlap
-    drive = PulseTrain(waveform, period=train.period, pulses=pulses, overlap=overlap)
-    return Train(train.hammer, drive, train.period, (float(states.x[0]), float(states.v[0])))
+    return Train(train.regime, train.regime.pulses(pulses), (float(states.x[0]), float(states.v[0])))

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 
 from printhammer.chaos.strobe.verdict import period_of, repeats, verdict
-from printhammer.drive.trains import PulseTrain
-from printhammer.errors import InputError
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.window import window_of
 from printhammer.support.threads import in_threads, thread_count
@@ -22,10 +20,9 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.strobe.verdict import Verdict
     from printhammer.derivatives.states import Exponent
-    from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
@@ -38,57 +35,39 @@ HELD_BRANCHES: Final = {
 
 @dataclass(frozen=True)
 class Train:
-    """One hammer, fired again and again.
+    """A regime fired from a state on, with nothing fired before.
 
     Attributes
     ----------
-    hammer : Hammer
-        The hammer.
+    regime : Regime
+        Hammer and periodic drive.
     drive : Drive
-        The drive.
-    period : float
-        Time between firings, s.
+        So many pulses, or the endless force.
     state : tuple of float or None
         Displacement, m, and velocity, m/s, at time 0; None for the rest state.
     """
 
-    hammer: Hammer
+    regime: Regime
     drive: Drive
-    period: float
-    state: tuple[float, float] | None
+    state: tuple[float, float] | None = None
 
     @classmethod
-    def of(
-        cls,
-        hammer: Hammer,
-        period: float | None,
-        firings: int,
-        *,
-        waveform: Waveform | None = None,
-        drive: Drive | None = None,
-        overlap: Overlap = "add",
-        state: tuple[float, float] | None = None,
-    ) -> Self:
-        """Make a train of pulses, or of the periods of an endless force, for states up to a firing.
+    def of(cls, regime: Regime, firings: int, state: tuple[float, float] | None = None) -> Self:
+        """Make a train for states up to a firing.
 
         One more is fired: runs end there, so that no state depends on where that is.
-
-        Raises
-        ------
-        InputError
-            There is nothing to fire, or the drive is no endless force with a period.
         """
-        if drive is not None:
-            if drive.period is None or math.isfinite(drive.waveform.support):
-                raise InputError(f"drive = {drive!r}, expected an endless force with a period")
-            return cls(hammer, drive, drive.period, state)
-        fired = hammer.waveform if waveform is None else waveform
-        if fired is None:
-            raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
-        if period is None:
-            raise InputError("period is missing, expected the time between firings, s")
-        train = PulseTrain(fired, period=period, pulses=firings + 1, overlap=overlap)
-        return cls(hammer, train, period, state)
+        return cls(regime, regime.pulses(firings + 1), state)
+
+    @property
+    def hammer(self) -> Hammer:
+        """The hammer."""
+        return self.regime.hammer
+
+    @property
+    def period(self) -> float:
+        """Time between firings, s."""
+        return self.regime.period
 
     def times(self, firings: npt.NDArray[np.int64]) -> FloatArray:
         """Return the times of firings, s, the very first one being number 1."""
@@ -125,7 +104,6 @@ class States:
 def run_trains(
     trains: Sequence[Train],
     chosen: npt.NDArray[np.int64],
-    phase: float,
     tolerance: float,
     judged: tuple[int, int] | None,
     *,
@@ -140,9 +118,7 @@ def run_trains(
     trains : sequence of Train
         The trains.
     chosen : int array
-        Numbers of the firings whose states are wanted.
-    phase : float
-        Part of the period between a firing and its state.
+        Numbers of the firings whose states are wanted, each at the phase of its regime.
     tolerance : float
         Of the integration.
     judged : tuple of int or None
@@ -168,7 +144,7 @@ def run_trains(
             progress(done, total if judged is None else 2 * total)
 
     firings = np.arange(judged[0], judged[1] + 1) if judged is not None else np.zeros(0, np.int64)
-    own = [train.times(chosen) + phase * train.period for train in trains]
+    own = [train.times(chosen) + train.regime.phase * train.period for train in trains]
     theirs = [train.times(firings) for train in trains]
     every = [np.union1d(mine, other) for mine, other in zip(own, theirs, strict=True)]
     after = np.array([max(int(chosen.max(initial=1)), int(firings.max(initial=1))) + 1])
