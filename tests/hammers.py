@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.derivatives import constants
+from printhammer.derivatives import constants as constant_flow
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
 from printhammer.kernel.compile import specialise
 from printhammer.kernel.compile import variational as specialise_sensitivity
@@ -274,7 +274,7 @@ def interpreted() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Problem, "kernel", property(lambda problem: _plain(problem.laws)))
-        patch.setattr(constants, "with_sensitivity", _plain_sensitivity)
+        patch.setattr(constant_flow, "with_sensitivity", _plain_sensitivity)
         yield
 
 

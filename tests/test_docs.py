@@ -61,7 +61,7 @@ def test_every_equation_of_the_paper_has_file_constants_test_and_figure() -> Non
         assert re.search(r"^\| file \| `src/", section, re.MULTILINE)
         assert re.search(r"^\| constants? \| `", section, re.MULTILINE)
         assert re.search(r"^\| tests? \| `tests/", section, re.MULTILINE)
-        assert re.search(r"^\| figures? \| .*`src/printhammer/figures/figure\d+\.py`", section, re.MULTILINE)
+        assert re.search(r"^\| figures? \| .*`src/printhammer/figures/paper/\w+\.py`", section, re.MULTILINE)
 
 
 def test_every_public_name_is_in_the_reference() -> None:

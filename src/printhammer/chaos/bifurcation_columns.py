@@ -36,7 +36,8 @@ FROM_REST: Final[State] = (math.nan, math.nan, -1.0, 0.0)
 TOLERANCE: Final = 1e-9
 """Tolerance of diagrams and basins unless told otherwise: noise far below what a period is judged by.
 
-With `printhammer.run.ensemble.DISPLAY_TOLERANCE` weakly stable orbits never settle to within 1e-6 of the window.
+With `DISPLAY_TOLERANCE` of `printhammer.run.ensemble` weakly stable orbits never settle to within 1e-6 of the
+window.
 """
 
 OK: Final = "ok"

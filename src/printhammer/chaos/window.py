@@ -65,8 +65,8 @@ def window_of(hammer: Hammer, drive: Drive) -> Window:
     That of Fig. 11 for a hammer whose backstop and pack are where the paper has them. For others its
     half-widths are a sixth of the way from backstop to pack, as in Fig. 11, and a sixth of the speed that
     the largest force gives the armature over that way; where a hammer lacks one of them and nothing bounds
-    the motion, the whole of its scales (`printhammer.run.problem.scales_of`). As in Fig. 11 the backstop, or the
-    origin, lies a quarter of its width from the left.
+    the motion, the whole of its scales (`printhammer.run.problem.scales_of`). As in Fig. 11 the backstop, or
+    the origin, lies a quarter of its width from the left.
     """
     place, front = hammer.position, hammer.front
     if (

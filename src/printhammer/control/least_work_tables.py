@@ -95,7 +95,7 @@ def least_work_dataset(found: LeastWork) -> xr.Dataset:
 
 
 def current_csv(found: LeastWork) -> str:
-    """Return the current of a burst as the text of a sampled waveform, see `printhammer.drive.waveforms.shapes.Sampled`.
+    """Return the current of a burst as the text of a sampled waveform.
 
     To be joined by straight lines; fired once, it does what the drive of the burst does.
     """

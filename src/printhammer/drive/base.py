@@ -101,7 +101,7 @@ class Drive:
         """Return the drive as the kernel wants it.
 
         Firing times, s; the row at which the segment table of each firing begins; the tables one after the
-        other (see `printhammer.drive.segments.stacked`); whether pulses replace; whether the drive is a force.
+        other (`printhammer.drive.segments.stacked`); whether pulses replace; whether the drive is a force.
         """
         return self._times, self._begins(), self._pieces, self._overlap == "replace", self.quantity == "force"
 

@@ -43,7 +43,8 @@ def fit(
         left out. "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the
         reading of the displacement sensor at x = 0, or None to fit it. "spring": `position`. "pack":
         `thickness`; `exponents`, whether these are fitted too. "backstop": `stiffness`, N/m^1.5 or a
-        `printhammer.identify.static.backstop.Stiffness`. "motion": as `printhammer.identify.shots.motion.fit_motion`.
+        `printhammer.identify.static.backstop.Stiffness`. "motion": as
+        `printhammer.identify.shots.motion.fit_motion`.
 
     Returns
     -------

@@ -1,9 +1,9 @@
 """Parts of a hammer, one law a file.
 
-Every module of this package whose name does not start with an underscore is imported and registers its part;
-a part from elsewhere enters with `register`. A module holds, for its role, plain scalar functions (floats in,
-float out, `c` the float64 array of `Part.packed`), written so that numba compiles them; they call nothing but
-`math`:
+Every module of this package and its folders whose name does not start with an underscore is imported and
+registers its part; a part from elsewhere enters with `register`. A module holds, for its role, plain scalar
+functions (floats in, float out, `c` the float64 array of `Part.packed`), written so that numba compiles them;
+they call nothing but `math`:
 
 ========  ===================================================================================================
 role      functions
@@ -22,7 +22,7 @@ a kink inside a contact (an option that forbids a surface to pull), so that an i
 """
 
 from importlib import import_module
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 
 from printhammer.parts.base import (
     PARTS,
@@ -36,9 +36,9 @@ from printhammer.parts.base import (
     register,
 )
 
-for _found in iter_modules(__path__):
-    if not _found.name.startswith("_"):
-        import_module(f"{__name__}.{_found.name}")
+for _module in walk_packages(__path__, f"{__name__}."):
+    if not _module.name.rpartition(".")[2].startswith("_"):
+        import_module(_module.name)
 
 __all__ = [
     "PARTS",

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
 
 
-def figure7(
-    hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | str | None = None
-) -> Figure:
+def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | str | None = None) -> Figure:
     """Draw Fig. 7: the train that `printhammer.buzz.find_buzz_train` finds, or its best attempt, saying so.
 
     Parameters

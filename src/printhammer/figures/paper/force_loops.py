@@ -31,7 +31,7 @@ _NOTE: Final = (0.4, 0.09)
 
 
 @styled
-def figure5(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
+def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 5: the sum of all forces, equation (2), against displacement after a single pulse.
 
     A clockwise loop is energy given to the armature, a counter-clockwise one energy lost; arrow heads tell

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 
 
 @styled
-def figure9(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None) -> Figure:
+def frequency_map(
+    hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None
+) -> Figure:
     """Draw Fig. 9: the frequency-time map in colours.
 
     Parameters

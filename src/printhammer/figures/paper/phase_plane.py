@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @styled
-def figure10(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
+def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 10: velocity against displacement after a single pulse; arrows tell the direction of time.
 
     Parameters

@@ -46,7 +46,7 @@ _COLUMNS: Final = 3
 
 
 @styled
-def figure11(
+def poincare(
     hammer: Hammer,
     *,
     strobes: Sequence[Strobe] | None = None,

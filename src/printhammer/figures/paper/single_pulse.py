@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
 
-def figure3(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
+def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 3: the motion that a single pulse causes.
 
     Parameters

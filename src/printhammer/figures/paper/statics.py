@@ -40,7 +40,7 @@ _HALF_WIDTH, _ENOUGH, _PREFERRED = 0.04, 0.055, 0.3
 
 
 @styled
-def figure2(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
+def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     """Draw Fig. 2: net magnetic force, equation (3), at several currents, and spring force, equation (4).
 
     Parameters

@@ -80,7 +80,7 @@ class _View:
 
 
 @styled
-def figure8(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None) -> Figure:
+def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None) -> Figure:
     """Draw Fig. 8: displacement against time, one curve for each rate, each hiding those behind it.
 
     Parameters

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from printhammer.figures.elements.curves import fired, shown_until, times_of, total_force
+from printhammer.figures.elements.curves import fired, shown_until, times_of
+from printhammer.figures.elements.curves import total_force as force_at
 from printhammer.figures.elements.marks import contact_spans, curve, drive_strip
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import (
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @styled
-def figure4(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
+def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 4: the sum of all forces on the armature, equation (2), after a single pulse.
 
     Parameters
@@ -52,7 +53,7 @@ def figure4(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     motion = fired(hammer, duration=duration)
     until = motion.end if duration is not None else shown_until(motion)
     times = times_of(motion, 0.0, until)
-    total = total_force(motion, times)
+    total = force_at(motion, times)
     time, force = scale("time", until), scale("force")
     figure = new_figure(4.2)
     panel, strip = with_strip(figure)

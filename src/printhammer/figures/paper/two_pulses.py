@@ -20,7 +20,7 @@ DELAYS: Final = (660e-6, 700e-6)
 """Delays of the second pulse in the paper's Fig. 6, s."""
 
 
-def figure6(
+def two_pulses(
     hammer: Hammer, *, delays: Sequence[float] = DELAYS, duration: float | str | None = None
 ) -> Figure:
     """Draw Fig. 6: the motion under two pulses, for each delay of the second.

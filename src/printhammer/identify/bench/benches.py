@@ -314,7 +314,7 @@ def _rebound(bare: Hammer, speed: float) -> float:
 def _restitution(k: float, damping: float, speed: float) -> float:
     """Return the restitution of a free rebound after equations (6) and (7).
 
-    Solves the exact law of `printhammer.parts.backstop._hertz.damping_from_restitution`, which falls with e, for e.
+    Solves the exact law of `damping_from_restitution`, which falls with e, for e.
     """
     from scipy.optimize import brentq
 

@@ -1,8 +1,8 @@
 """The synthetic laboratory: measurements of a hammer, with the errors of real sensors and a seed.
 
-What is there to be seen of a hammer is computed (`printhammer.identify.bench.benches`), goes through the sensors
-(`printhammer.identify.bench.sensor`), and becomes a table like those that a laboratory hands in. Every kind of
-measurement and every column has its own random numbers, so that none disturbs another.
+What there is to be seen of a hammer is computed (`benches`), goes through the sensors (`sensor`), and becomes
+a table like those that a laboratory hands in. Every kind of measurement and every column has its own random
+numbers, so that none disturbs another.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def measure(
         The hammer.
     sensor : Sensor or mapping, optional
         By default that of an ordinary bench, `SENSORS`; or what is different there, such as
-        {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `printhammer.identify.bench.sensor_settings.adjusted`.
+        {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `sensor_settings.adjusted`.
     seed : int, optional
         Of the random numbers; the same seed gives the same table.
     **bench

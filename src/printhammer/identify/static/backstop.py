@@ -1,8 +1,8 @@
 """The backstop from the geometry of its bodies and from rebounds: k and l of equations (6) and (7).
 
 Radii, Young's moduli and Poisson ratios give k (Hertz). Rebound speeds against impact speeds give l/k, by
-the exact restitution law of `printhammer.identify.static.restitution`, whatever mass and stiffness; both together
-give l.
+the exact restitution law of `printhammer.identify.static.restitution`, whatever mass and stiffness; both
+together give l.
 
 Data: the columns ``impact speed`` and ``rebound speed``, both positive.
 """

@@ -1,4 +1,4 @@
-"""The log of judged candidates: a JSON line for each, as `printhammer.reconstruction.judging.judged` makes it."""
+"""The log of judged candidates: a JSON line for each, as `judged.row_of` makes it."""
 
 from __future__ import annotations
 

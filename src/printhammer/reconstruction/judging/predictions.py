@@ -17,9 +17,8 @@ def predictions(rows: Sequence[dict[str, Any]], seed: int, candidates: int) -> d
     Parameters
     ----------
     rows : sequence of dict
-        Judged candidates of a search on the stated claims alone, see
-        `printhammer.reconstruction.judging.judged.row_of`; those count for which all stated claims outside Fig. 11
-        hold.
+        Judged candidates of a search on the stated claims alone, see `judged.row_of`; those count for which
+        all stated claims outside Fig. 11 hold.
     seed : int
         Of the search.
     candidates : int
