@@ -8,7 +8,6 @@ import xarray as xr
 
 import printhammer as ph
 from printhammer.chaos import Strobe, strobes
-from printhammer.chaos.tables import save_strobe, strobe_table
 from printhammer.chaos.window import PAPER_WINDOW, window_of
 from printhammer.claims import claims
 from printhammer.parts.spring.preload import PreloadSpring
@@ -191,12 +190,12 @@ def test_a_dataset_has_units_and_where_it_comes_from(hammer: "ph.Hammer", tmp_pa
     assert chart.attrs["hammer_fingerprint"] == hammer.fingerprint
     assert chart.attrs["verdict"] == "period-1"
     path = tmp_path / "points.nc"
-    save_strobe(found, path)
+    found.save(path)
     with xr.open_dataset(path, engine="scipy") as kept:
         np.testing.assert_array_equal(kept["x"], found.x)
         np.testing.assert_array_equal(kept["firing"], found.firing)
         assert kept.attrs["tolerance"] == "2e-11"
-    table = strobe_table(found)
+    table = found.to_dataframe()
     assert list(table) == ["firing", "t [s]", "x [m]", "v [m/s]", "branch", "memory [m]"]
     assert set(table["branch"]) <= set(MODE_NAMES)
 

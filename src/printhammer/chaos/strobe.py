@@ -8,8 +8,6 @@ law and its memory, the latest local maximum.
 from __future__ import annotations
 
 import operator
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
@@ -20,13 +18,14 @@ from printhammer.chaos.window import window_of
 from printhammer.drive.input import MOST_PULSES, read_count, read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.chaos.verdict import Verdict
     from printhammer.chaos.window import Window
@@ -40,52 +39,43 @@ POINTS = 200
 """Number of points unless told otherwise, as in Fig. 11."""
 
 
-@dataclass(frozen=True)
-class Strobe:
-    """States of a hammer under a periodic drive, one each period.
+class Strobe(Result):
+    """States of a hammer under a periodic drive, one each period."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    drive : Drive
-        The drive.
-    period : float
-        Time between firings, s.
-    phase : float
-        Part of the period between a firing and its point.
-    firing : int array, shape (n,)
-        Number of the firing of each point; the very first one is number 1.
-    t : array, shape (n,)
-        Times, s.
-    x, v : array, shape (n,)
-        Displacement, m, and velocity, m/s; NaN where the run did not get.
-    branch : int array, shape (n,)
-        Code of the mode of motion, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where the run did not
-        get.
-    memory : array, shape (n,)
-        Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0.
-    status : str
-        How the run ended.
-    tolerance : float
-        Tolerance of the integration.
-    verdict : Verdict or None
-        What kind of motion it is, with the evidence; None where it was not asked for.
-    """
+    hammer: Hammer = part("the hammer")
+    drive: Drive = part("the drive")
+    period: float = scalar("s", "time between firings")
+    phase: float = scalar("1", "part of the period between a firing and its point")
+    firing: npt.NDArray[np.int64] = coordinate(
+        "1", "number of the firing", "firing", more="the very first one is number 1", dtype=np.int32
+    )
+    t: FloatArray = column("s", "time", "firing")
+    x: FloatArray = column("m", "displacement", "firing", more="nan where the run did not get")
+    v: FloatArray = column("m/s", "velocity", "firing", more="nan where the run did not get")
+    branch: npt.NDArray[np.int64] = column(
+        "1",
+        "mode of motion",
+        "firing",
+        more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where the run did not get",
+        dtype=np.int32,
+        codes=MODE_NAMES,
+    )
+    memory: FloatArray = column(
+        "m",
+        "latest local maximum inside the pack",
+        "firing",
+        more="0 but on the unloading branch",
+    )
+    status: str = part("how the run ended")
+    tolerance: float = part("tolerance of the integration")
+    verdict: Verdict | None = part(
+        "what kind of motion it is, with the evidence", more="None where it was not asked for"
+    )
 
-    hammer: Hammer
-    drive: Drive
-    period: float
-    phase: float
-    firing: npt.NDArray[np.int64] = field(repr=False)
-    t: FloatArray = field(repr=False)
-    x: FloatArray = field(repr=False)
-    v: FloatArray = field(repr=False)
-    branch: npt.NDArray[np.int64] = field(repr=False)
-    memory: FloatArray = field(repr=False)
-    status: str
-    tolerance: float
-    verdict: Verdict | None
+    @property
+    def title(self) -> str:
+        """One line that says what the points are."""
+        return f"strobe points of {self.hammer.name}, every {self.period:.9g} s"
 
     @property
     def ok(self) -> bool:
@@ -97,39 +87,10 @@ class Strobe:
         """The window in which the points are drawn."""
         return window_of(self.hammer, self.drive)
 
-    @property
-    def provenance(self) -> dict[str, Any]:
-        """Where the points come from: fingerprints, versions, tolerance, and the verdict."""
-        import numba
-
-        from printhammer import __version__
-
+    def notes(self) -> dict[str, Any]:
+        """Return the verdict, for the attributes of the Dataset."""
         judged = {} if self.verdict is None else self.verdict.as_dict()
-        return {
-            "hammer": self.hammer.name,
-            "hammer_fingerprint": self.hammer.fingerprint,
-            "drive": repr(self.drive),
-            "drive_fingerprint": self.drive.fingerprint,
-            "period": self.period,
-            "phase": self.phase,
-            "status": self.status,
-            "tolerance": repr(self.tolerance),
-            **{name: value for name, value in judged.items() if name != "tolerance"},
-            "printhammer": __version__,
-            "numpy": np.__version__,
-            "numba": numba.__version__,
-        }
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the points as a Dataset over `firing`, with units and provenance in the attributes."""
-        from printhammer.chaos.tables import strobe_dataset
-
-        return strobe_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the points in the plane of displacement and velocity; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.strobe").plot(self, **options)
+        return {name: value for name, value in judged.items() if name != "tolerance"}
 
 
 def strobe(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -48,7 +47,7 @@ def strobe(
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="Points (.csv, .nc, .json, SI) or picture (.svg, .png, .pdf); may be given repeatedly.",
+            help="Points (.csv, .nc, .json, .zarr, .parquet) or picture (.svg, .png, .pdf); repeatable.",
         ),
     ] = None,
 ) -> None:
@@ -58,8 +57,8 @@ def strobe(
     """
     from rich.markup import escape
 
+    from printhammer.chaos import Strobe
     from printhammer.chaos import strobe as strobed
-    from printhammer.chaos.tables import SUFFIXES, save_strobe
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
@@ -67,7 +66,7 @@ def strobe(
     from printhammer.support.outputs import check_outputs
 
     wanted = out or []
-    check_endings(wanted, (*SUFFIXES, *PICTURES))
+    check_endings(wanted, (*Strobe.ENDINGS, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     if (period is None) == (rate is None):
         raise InputError("--period and --rate: expected one of them, such as --period '1.10 ms'")
@@ -89,7 +88,7 @@ def strobe(
     train = f"{found.drive.waveform.shape} {found.drive.quantity} every {found.period:.9g} s"
     screen.print(f"[dim]{escape(train)}, overlap {found.drive.overlap}[/dim]\n")
     screen.print(summary(found, units))
-    write_found(screen, wanted, found.plot, partial(save_strobe, found))
+    write_found(screen, wanted, found.plot, found.save)
     if not found.ok:
         complain(f"the run ended early: {found.status}")
         raise typer.Exit(1)

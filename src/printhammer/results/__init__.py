@@ -1,1 +1,22 @@
-"""Results: what they hold, and their files."""
+"""Results: declared once, and from that Dataset, table, files, docstring, HTML repr and picture."""
+
+from printhammer.results.declare import Column, column, coordinate, derived, part, scalar
+from printhammer.results.files import ENDINGS, Reopened, reopen
+from printhammer.results.provenance import KEYS, provenance
+from printhammer.results.result import RESULTS, Result
+
+__all__ = [
+    "ENDINGS",
+    "KEYS",
+    "RESULTS",
+    "Column",
+    "Reopened",
+    "Result",
+    "column",
+    "coordinate",
+    "derived",
+    "part",
+    "provenance",
+    "reopen",
+    "scalar",
+]

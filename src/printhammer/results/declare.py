@@ -1,0 +1,229 @@
+"""How a result says, once and beside each field, what the field means, its unit and its dimensions.
+
+`column`, `coordinate`, `scalar` and `part` declare the fields of a `printhammer.results.Result`, and
+`derived` a property that belongs to its table. Dataset, table, files, the Attributes section of the docstring
+and the HTML repr follow from them.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from functools import cached_property
+from inspect import cleandoc
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+Kind = Literal["column", "coordinate", "scalar", "part"]
+
+_KEY: Final = "column"
+_SECTION: Final = re.compile(r"^(?:Notes|References|Examples|See Also)\n-{3,}$", re.MULTILINE)
+_F = TypeVar("_F", bound="Callable[..., Any]")
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a result says about one of its fields.
+
+    Attributes
+    ----------
+    unit : str
+        SI unit; "1" for a pure number, empty for words.
+    meaning : str
+        One phrase: the long name of the Dataset, and the first words in the docstring.
+    dims : tuple of str
+        Dimensions; none for a scalar.
+    kind : str
+        "column" and "coordinate" are arrays of the Dataset, "scalar" is one of its attributes, "part" is
+        none of it.
+    more : str
+        What else the docstring says.
+    name : str
+        Name in the Dataset.
+    dtype : object
+        Type of the numbers in the Dataset; None for that of the values.
+    codes : sequence of str
+        Names of the numbers 0, 1, 2 and so on; the table holds the names.
+    head : str
+        Heading in the table, without the unit; empty for `name`.
+    attrs : mapping or None
+        Further attributes of the variable.
+    """
+
+    unit: str
+    meaning: str
+    dims: tuple[str, ...] = ()
+    kind: Kind = "column"
+    more: str = ""
+    name: str = ""
+    dtype: Any = None
+    codes: Sequence[str] = ()
+    head: str = ""
+    attrs: Mapping[str, str] | None = None
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Attributes of the variable in the Dataset."""
+        coded = ", ".join(f"{code} {name}" for code, name in enumerate(self.codes))
+        return {
+            **({"units": self.unit} if self.unit else {}),
+            "long_name": self.meaning,
+            **({"codes": coded} if coded else {}),
+            **(self.attrs or {}),
+        }
+
+    @property
+    def heading(self) -> str:
+        """Heading in the table, such as "x [m]"."""
+        return heading(self.head or self.name, self.unit)
+
+    @property
+    def sentence(self) -> str:
+        """The text of the docstring."""
+        unit = f", {self.unit}" if self.unit not in ("", "1") else ""
+        more = f"; {self.more}" if self.more else ""
+        return f"{self.meaning[:1].upper()}{self.meaning[1:]}{unit}{more}."
+
+
+def heading(name: str, unit: str) -> str:
+    """Return the heading of a column, such as "x [m]"; a pure number or a word has no unit."""
+    return name if unit in ("", "1") else f"{name} [{unit}]"
+
+
+def column(
+    unit: str,
+    meaning: str,
+    dims: str,
+    *,
+    more: str = "",
+    name: str = "",
+    dtype: Any = None,
+    codes: Sequence[str] = (),
+    head: str = "",
+    attrs: Mapping[str, str] | None = None,
+    default: Any = MISSING,
+) -> Any:
+    """Declare an array of the Dataset.
+
+    Parameters
+    ----------
+    unit, meaning : str
+        SI unit ("1" for a pure number, empty for words) and one phrase.
+    dims : str
+        Names of the dimensions, with spaces between them.
+    more : str, optional
+        What the docstring says beyond meaning and unit.
+    name, head : str, optional
+        Name in the Dataset and heading in the table, where they are not that of the field.
+    dtype, codes, attrs
+        As `Column` has them.
+    default : object, optional
+        Value of the field where none is given.
+    """
+    note = Column(unit, meaning, tuple(dims.split()), "column", more, name, dtype, codes, head, attrs)
+    return field(default=default, repr=False, metadata={_KEY: note})
+
+
+def coordinate(
+    unit: str,
+    meaning: str,
+    dims: str,
+    *,
+    more: str = "",
+    name: str = "",
+    dtype: Any = None,
+    codes: Sequence[str] = (),
+    head: str = "",
+    attrs: Mapping[str, str] | None = None,
+    default: Any = MISSING,
+) -> Any:
+    """Declare a coordinate of the Dataset; arguments as for `column`."""
+    note = Column(unit, meaning, tuple(dims.split()), "coordinate", more, name, dtype, codes, head, attrs)
+    return field(default=default, repr=False, metadata={_KEY: note})
+
+
+def scalar(
+    unit: str,
+    meaning: str,
+    *,
+    more: str = "",
+    name: str = "",
+    default: Any = MISSING,
+) -> Any:
+    """Declare a number, text or short list that is an attribute of the Dataset; arguments as for `column`."""
+    return field(default=default, metadata={_KEY: Column(unit, meaning, (), "scalar", more, name)})
+
+
+def part(meaning: str, *, more: str = "", repr: bool = True, default: Any = MISSING) -> Any:
+    """Declare a field that is no part of the Dataset, such as the hammer; provenance may speak of it."""
+    return field(default=default, repr=repr, metadata={_KEY: Column("", meaning, (), "part", more)})
+
+
+def derived(
+    unit: str,
+    meaning: str,
+    dims: str = "",
+    *,
+    kind: Kind | None = None,
+    name: str = "",
+    dtype: Any = None,
+    codes: Sequence[str] = (),
+    head: str = "",
+    attrs: Mapping[str, str] | None = None,
+) -> Callable[[_F], _F]:
+    """Make a property part of the Dataset: to stand below `@property` or `@cached_property`.
+
+    Arguments as for `column`; without dimensions it is an attribute of the Dataset.
+    """
+    sort: Kind = kind or ("column" if dims.split() else "scalar")
+    note = Column(unit, meaning, tuple(dims.split()), sort, "", name, dtype, codes, head, attrs)
+
+    def mark(function: _F) -> _F:
+        setattr(function, _KEY, note)
+        return function
+
+    return mark
+
+
+def columns_of(result: type[Any]) -> dict[str, Column]:
+    """List what a class declares, attribute to `Column`: fields in their order, then derived properties."""
+    found: dict[str, Column] = {}
+    if is_dataclass(result):
+        found = {entry.name: entry.metadata[_KEY] for entry in fields(result) if _KEY in entry.metadata}
+    for owner in reversed(result.__mro__):
+        for name, value in vars(owner).items():
+            function = getattr(value, "fget", None) or getattr(value, "func", None)
+            if isinstance(value, property | cached_property) and hasattr(function, _KEY):
+                found[name] = getattr(function, _KEY)
+    return {key: note if note.name else replace(note, name=key) for key, note in found.items()}
+
+
+def with_attributes(doc: str, result: type[Any], columns: Mapping[str, Column]) -> str:
+    """Return a docstring with the Attributes section that follows from the declared fields.
+
+    The section goes before Notes, References and the like. Properties have docstrings of their own.
+    """
+    doc = cleandoc(doc)
+    types = {entry.name: getattr(entry.type, "__name__", entry.type) for entry in fields(result)}
+    lines: list[str] = []
+    for name, note in columns.items():
+        if name in types:
+            lines += [f"{name} : {_type_text(str(types[name]), note.dims)}", f"    {note.sentence}"]
+    if not lines or "Attributes\n-" in doc:
+        return doc
+    section = "\n".join(["Attributes", "----------", *lines])
+    place = _SECTION.search(doc)
+    if place is None:
+        return f"{doc.rstrip()}\n\n{section}\n"
+    return f"{doc[: place.start()]}{section}\n\n{doc[place.start() :]}"
+
+
+def _type_text(annotation: str, dims: tuple[str, ...]) -> str:
+    """Return an annotation as numpydoc writes it, such as "int array, shape (firing,)"."""
+    if not dims or not ("Array" in annotation or "ndarray" in annotation):
+        return annotation.replace(" | ", " or ")
+    sort = "int " if "int" in annotation.lower() else "bool " if "bool" in annotation.lower() else ""
+    none = " or None" if "None" in annotation else ""
+    return f"{sort}array, shape ({', '.join(dims)}{',' if len(dims) == 1 else ''}){none}"

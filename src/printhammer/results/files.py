@@ -1,0 +1,399 @@
+"""Results on disk: written by the ending of the name, whole or not at all, and opened again.
+
+| ending | holds |
+|---|---|
+| `.nc` | the Dataset, NetCDF in the classic format, which everything reads |
+| `.zarr` | the Dataset, a Zarr v3 store (needs the extra ``sweep``) |
+| `.json` | the Dataset: its attributes, and under ``columns`` every array with dimensions, unit and meaning |
+| `.csv` | the table, below lines ``# key: value`` with the attributes |
+| `.parquet` | the table, its attributes among the metadata (needs the extra ``tables``) |
+
+JSON is strict: nan is null, and infinite numbers are "inf" and "-inf".
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import shutil
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from io import BytesIO
+from itertools import takewhile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.results.declare import heading
+from printhammer.results.provenance import KEYS
+from printhammer.support.outputs import write_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    import pandas as pd
+    import xarray as xr
+
+ENDINGS: Final = (".nc", ".zarr", ".csv", ".parquet", ".json")
+"""Endings of the files that hold results."""
+
+_COLUMNS: Final = "columns"
+_MOST_INT: Final = 2**31
+
+
+@dataclass(frozen=True)
+class Reopened:
+    """A result from a file.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    dataset : xarray.Dataset
+        The arrays; of a table (.csv, .parquet) its columns over `row`.
+    dataframe : pandas.DataFrame
+        The table; of a Dataset the arrays over the dimensions of the first one.
+    provenance : dict
+        Where the result comes from, see `printhammer.results.provenance`.
+    """
+
+    path: Path
+    dataset: xr.Dataset = field(repr=False)
+    dataframe: pd.DataFrame = field(repr=False)
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Title, numbers that hold for the whole result, and provenance."""
+        return {str(key): value for key, value in self.dataset.attrs.items()}
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the result comes from."""
+        return {key: value for key, value in self.attributes.items() if key in KEYS}
+
+
+def save(
+    path: str | Path,
+    dataset: Callable[[], xr.Dataset],
+    dataframe: Callable[[], pd.DataFrame],
+    endings: Sequence[str] = ENDINGS,
+) -> None:
+    """Write a result, as a Dataset or as a table by the ending of the name; whole or not at all.
+
+    Raises
+    ------
+    InputError
+        The name ends in none of `endings`, the file cannot be written, or a package is missing that the
+        format needs; what was there stays.
+    """
+    target = Path(path)
+    kind = target.suffix.lower()
+    if kind not in endings:
+        some = f"one of {', '.join(endings)}" if len(endings) > 1 else endings[0]
+        raise InputError(f"{target}: expected a name that ends in {some}")
+    if kind == ".nc":
+        write_file(target, _netcdf(dataset()))
+    elif kind == ".zarr":
+        _save_zarr(dataset(), target)
+    elif kind == ".json":
+        write_file(target, _json(dataset()))
+    elif kind == ".csv":
+        write_file(target, csv_text(dataframe()))
+    else:
+        need("pyarrow", target, "writing Parquet needs pyarrow", "tables")
+        content = BytesIO()
+        dataframe().to_parquet(content, index=False)
+        write_file(target, content.getvalue())
+
+
+def save_dataset(dataset: xr.Dataset, path: str | Path, endings: Sequence[str] = ENDINGS) -> None:
+    """Write a Dataset, whole or not at all; see `save`."""
+    save(path, lambda: dataset, lambda: frame_of(dataset), endings)
+
+
+def reopen(path: str | Path) -> Reopened:
+    """Open a result that was saved.
+
+    Parameters
+    ----------
+    path : path
+        A file that `Result.save` wrote. A CSV file without the lines ``# key: value``, as former versions
+        wrote it, opens as well, and has no provenance.
+
+    Raises
+    ------
+    InputError
+        The name ends in none of `ENDINGS`, the file cannot be read, or holds something else.
+    """
+    source = Path(path)
+    kind = source.suffix.lower()
+    if kind not in ENDINGS:
+        raise InputError(f"{source}: expected a name that ends in one of {', '.join(ENDINGS)}")
+    try:
+        if kind in (".csv", ".parquet"):
+            frame = _read_csv(source) if kind == ".csv" else _read_parquet(source)
+            return Reopened(source, _dataset_of(frame), frame)
+        dataset = _read_json(source) if kind == ".json" else _read_arrays(source)
+    except InputError:
+        raise
+    except Exception as error:  # noqa: BLE001 - the backends raise what they like
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{source}: the result cannot be read ({reason[:200]})") from None
+    return Reopened(source, dataset, frame_of(dataset))
+
+
+def need(package: str, path: str | Path, what: str, extra: str) -> None:
+    """Make sure that an optional package is there.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    if find_spec(package) is None:
+        raise InputError(f"{path}: {what}, which the extra printhammer[{extra}] installs")
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON and every other format hold it: numbers, texts, lists and dicts of Python."""
+    if isinstance(value, dict):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, np.ndarray | list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return int(value) if isinstance(value, bool) else value
+
+
+def frame_of(dataset: xr.Dataset, attributes: Mapping[str, Any] | None = None) -> pd.DataFrame:
+    """Return the arrays of a Dataset over the dimensions of the first one as a table, units in the heads."""
+    first = next(iter(dataset.data_vars.values()), None)
+    dims = () if first is None else tuple(map(str, first.dims))
+    columns = {}
+    for name in (*dataset.coords, *dataset.data_vars):
+        values = dataset[name]
+        if values.dims and set(values.dims) <= set(dims):
+            head = heading(str(name), str(values.attrs.get("units", "")))
+            columns[head] = (tuple(map(str, values.dims)), values.values)
+    return frame(columns, dims, plain(dict(dataset.attrs if attributes is None else attributes)))
+
+
+def frame(
+    columns: Mapping[str, tuple[tuple[str, ...], Any]], dims: tuple[str, ...], attributes: dict[str, Any]
+) -> pd.DataFrame:
+    """Return a table with a row for each place along some dimensions.
+
+    Parameters
+    ----------
+    columns : mapping
+        Dimensions, a part of `dims`, and values, by heading.
+    dims : tuple of str
+        The dimensions; the last varies fastest.
+    attributes : dict
+        For the `attrs` of the table.
+    """
+    import pandas as pd
+
+    arrays = {head: (own, np.asarray(values)) for head, (own, values) in columns.items()}
+    sizes = {
+        dim: length for own, values in arrays.values() for dim, length in zip(own, values.shape, strict=True)
+    }
+    shape = [sizes.get(dim, 0) for dim in dims]
+    found = {}
+    for head, (own, values) in arrays.items():
+        ordered = values.transpose([own.index(dim) for dim in dims if dim in own])
+        spread = ordered.reshape([sizes[dim] if dim in own else 1 for dim in dims])
+        found[head] = np.broadcast_to(spread, shape).reshape(-1)
+    table = pd.DataFrame(found)
+    table.attrs.update(attributes)
+    return table
+
+
+def csv_text(table: pd.DataFrame) -> str:
+    """Return a table as CSV with all digits, its `attrs` as lines ``# key: value`` above the heading."""
+    head = "".join(f"# {key}: {_text(value)}\n" for key, value in table.attrs.items())
+    return head + str(table.to_csv(index=False, float_format="%.17g", lineterminator="\n"))
+
+
+def _text(value: Any) -> str:
+    """Return text as it is where that can be told from numbers and lists, everything else as JSON."""
+    if isinstance(value, str) and _decoded(value) == value == value.strip() and value.isprintable():
+        return value
+    return json.dumps(_strict(value), ensure_ascii=False)
+
+
+def _decoded(value: str, starts: str = '[{"-0123456789n') -> Any:
+    """Return what an attribute was before it had to be text."""
+    if value[:1] and value[0] in starts:
+        with suppress(ValueError):
+            found = json.loads(value)
+            return math.nan if found is None else found
+    return value
+
+
+def _netcdf(dataset: xr.Dataset) -> bytes:
+    # The classic NetCDF format has no truth values and no longer integers.
+    kinds = {"b": np.int8, "i": np.int32, "u": np.int32}
+    kept = dataset.assign(
+        {
+            name: values.astype(kinds[values.dtype.kind])
+            for name, values in dataset.variables.items()
+            if values.dtype.kind == "b" or (values.dtype.kind in "iu" and values.dtype.itemsize > 4)
+        }
+    )
+    kept.attrs = _flat(dataset.attrs)
+    return bytes(kept.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT"))
+
+
+def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return attributes as arrays, numbers and texts; whatever else there is as JSON."""
+    found = {}
+    for key, value in attributes.items():
+        kept = plain(value)
+        numbers = all(
+            isinstance(entry, float) or (isinstance(entry, int) and abs(entry) < _MOST_INT)
+            for entry in (kept if isinstance(kept, list) and kept else [kept])
+        )
+        found[str(key)] = kept if numbers or isinstance(kept, str) else json.dumps(_strict(kept))
+    return found
+
+
+def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
+    need("zarr", target, "Zarr stores need zarr", "sweep")
+    if target.exists() and not (target / "zarr.json").is_file():
+        raise InputError(f"{target}: expected a new store, this is no Zarr store")
+    draft: Path | None = None
+    try:
+        draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
+        with catch_warnings():
+            # Metadata in one place spare readers a warning; each array has its own as well.
+            simplefilter("ignore")
+            dataset.assign_attrs(_flat(dataset.attrs)).to_zarr(
+                draft / target.name, mode="w", zarr_format=3, consolidated=True
+            )
+        if target.exists():
+            target.rename(draft / "before")
+        (draft / target.name).rename(target)
+    except OSError as error:
+        raise InputError(f"{target}: the store cannot be written ({error.strerror or error})") from None
+    finally:
+        if draft is not None:
+            if (draft / "before").exists() and not target.exists():
+                (draft / "before").rename(target)
+            with suppress(OSError):
+                shutil.rmtree(draft)
+
+
+def _json(dataset: xr.Dataset) -> str:
+    columns = {
+        str(name): {
+            "dims": list(map(str, values.dims)),
+            **plain(values.attrs),
+            "dtype": values.dtype.str[1:],
+            "coordinate": name in dataset.coords,
+            "values": _strict(values.values.tolist()),
+        }
+        for name, values in dataset.variables.items()
+    }
+    content = {**_strict(plain(dict(dataset.attrs))), _COLUMNS: columns}
+    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _strict(value: Any) -> Any:
+    """Return what strict JSON holds: null for nan, and texts for infinite numbers."""
+    if isinstance(value, dict):
+        return {key: _strict(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_strict(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value
+
+
+def _read_json(source: Path) -> xr.Dataset:
+    import xarray as xr
+
+    content = json.loads(source.read_text("utf-8"))
+    columns = content.pop(_COLUMNS, None) if isinstance(content, dict) else None
+    if not isinstance(columns, dict):
+        raise InputError(f"{source}: expected a result of printhammer, with {_COLUMNS}")
+    data: dict[bool, dict[str, Any]] = {True: {}, False: {}}
+    for name, entry in columns.items():
+        dims, values = entry.pop("dims"), np.array(entry.pop("values"), dtype=entry.pop("dtype"))
+        data[entry.pop("coordinate")][name] = (dims, values, entry)
+    return xr.Dataset(data[False], data[True], {key: _number(value) for key, value in content.items()})
+
+
+def _number(value: Any) -> Any:
+    return math.nan if value is None else float(value) if value in ("inf", "-inf") else value
+
+
+def _read_arrays(source: Path) -> xr.Dataset:
+    import xarray as xr
+
+    options: dict[str, Any] = {"engine": "scipy"}
+    if source.suffix.lower() == ".zarr":
+        need("zarr", source, "Zarr stores need zarr", "sweep")
+        options = {"engine": "zarr", "consolidated": False}
+    with xr.open_dataset(source, decode_times=False, **options) as found:
+        dataset = found.load()
+    for key, value in dataset.attrs.items():
+        dataset.attrs[key] = _decoded(value, "[{") if isinstance(value, str) else plain(value)
+    return dataset
+
+
+def _read_csv(source: Path) -> pd.DataFrame:
+    import pandas as pd
+
+    lines = source.read_text("utf-8-sig").splitlines(keepends=True)
+    attributes = {}
+    head = list(takewhile(lambda line: line.startswith("#"), lines))
+    for line in head:
+        key, colon, value = line[1:].partition(":")
+        if colon:
+            attributes[key.strip()] = _number(_decoded(value.strip()))
+    rows = list(csv.reader(lines[len(head) :]))
+    if not rows or {len(row) for row in rows} != {len(rows[0])}:
+        raise InputError(f"{source}: expected a heading, and rows with as many cells")
+    table = pd.DataFrame({head: _typed([row[k] for row in rows[1:]]) for k, head in enumerate(rows[0])})
+    table.attrs.update(attributes)
+    return table
+
+
+def _typed(cells: list[str]) -> Any:
+    """Return a column as numbers, to the last bit, or as truth values, or as text."""
+    if set(cells) <= {"True", "False"}:
+        return np.array([cell == "True" for cell in cells])
+    for kind in (int, float):
+        with suppress(ValueError):
+            return np.array([kind(cell) if cell or kind is int else math.nan for cell in cells], dtype=kind)
+    return cells
+
+
+def _read_parquet(source: Path) -> pd.DataFrame:
+    import pandas as pd
+
+    need("pyarrow", source, "reading Parquet needs pyarrow", "tables")
+    return pd.read_parquet(source)
+
+
+def _words(values: Any) -> Any:
+    return np.array([value if isinstance(value, str) else "" for value in values], dtype=np.str_)
+
+
+def _dataset_of(table: pd.DataFrame) -> xr.Dataset:
+    import xarray as xr
+
+    data = {}
+    for head in table:
+        name, _, unit = str(head).partition(" [")
+        values = table[head].to_numpy()
+        kept = values if values.dtype.kind != "O" else _words(values)
+        data[name] = ("row", kept, {"units": unit.removesuffix("]")} if unit else {})
+    return xr.Dataset(data, attrs=table.attrs)

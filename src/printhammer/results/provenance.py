@@ -1,0 +1,85 @@
+"""Where a result comes from: one set of keys, made in one place.
+
+| key | |
+|---|---|
+| `hammer`, `hammer_fingerprint` | name of the hammer and fingerprint of its constants |
+| `drive`, `drive_fingerprint` | the drive in words, and its fingerprint, where there is one drive |
+| `waveform` | what every firing does, as the ``[waveform]`` table of a drive file, on one line of TOML |
+| `overlap` | what overlapping pulses do, "add" or "replace" |
+| `period` | time between the firings of a regime, s |
+| `scheme` | the integration scheme of a single run |
+| `tolerance` | error allowed in one step |
+| `status` | how the run ended, where there is one run |
+| `printhammer`, `numpy`, `numba`, `scipy` | versions on which the bits depend |
+
+What does not apply to a result is left out; the versions are always there.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.drive.text import inline, waveform_text
+
+if TYPE_CHECKING:
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+
+VERSIONS: Final = ("printhammer", "numpy", "numba", "scipy")
+"""Keys that every result has."""
+
+KEYS: Final = (
+    "hammer",
+    "hammer_fingerprint",
+    "drive",
+    "drive_fingerprint",
+    "waveform",
+    "overlap",
+    "period",
+    "scheme",
+    "tolerance",
+    "status",
+    *VERSIONS,
+)
+"""All keys of provenance, in order."""
+
+
+def provenance(
+    *,
+    hammer: Hammer | None = None,
+    drive: Drive | None = None,
+    waveform: Waveform | None = None,
+    overlap: str | None = None,
+    period: float | None = None,
+    scheme: str | None = None,
+    tolerance: float | None = None,
+    status: str | None = None,
+) -> dict[str, Any]:
+    """Return where a result comes from; a drive tells of its waveform and overlap as well."""
+    if drive is not None:
+        # A sequence has many waveforms, and none that speaks for all.
+        waveform = drive.waveform if waveform is None and drive.uniform else waveform
+        overlap = drive.overlap if overlap is None else overlap
+    told = {
+        "hammer": None if hammer is None else hammer.name,
+        "hammer_fingerprint": None if hammer is None else hammer.fingerprint,
+        "drive": None if drive is None else repr(drive),
+        "drive_fingerprint": None if drive is None else drive.fingerprint,
+        "waveform": None if waveform is None else inline(waveform_text(waveform)),
+        "overlap": overlap,
+        "period": period,
+        "scheme": scheme,
+        "tolerance": None if tolerance is None else repr(float(tolerance)),
+        "status": status,
+        **versions(),
+    }
+    return {key: value for key, value in told.items() if value is not None}
+
+
+def versions() -> dict[str, str]:
+    """Return the versions on which the bits of a result depend."""
+    from printhammer import __version__
+
+    return {"printhammer": __version__, **{name: version(name) for name in VERSIONS[1:]}}

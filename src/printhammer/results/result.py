@@ -1,0 +1,219 @@
+"""Result: what every result of a computation can do, from what its class says of its fields.
+
+>>> class Drop(Result, rows="fall"):
+...     '''Falls of a stone.'''
+...
+...     hammer: Hammer = part("the hammer")
+...     height: FloatArray = coordinate("m", "height of the fall", "fall")
+...     time: FloatArray = column("s", "time of the fall", "fall", more="nan where it did not land")
+...     tolerance: float = scalar("1", "error allowed in one step")
+
+makes a frozen dataclass whose Dataset, table, files, docstring and HTML repr follow from the declaration, and
+whose picture `printhammer.figures.plots` knows by the name of the class. Units that depend on the instance,
+and arrays that are no fields, come from a class's own `entries`; further attributes from its `notes`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
+
+import numpy as np
+
+from printhammer.results import files
+from printhammer.results.declare import (
+    Column,
+    column,
+    columns_of,
+    coordinate,
+    part,
+    scalar,
+    with_attributes,
+)
+from printhammer.results.provenance import provenance
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from dataclasses import Field
+    from pathlib import Path
+
+    import pandas as pd
+    import xarray as xr
+
+    Entries = dict[str, tuple[Column, Any]]
+
+RESULTS: dict[str, type[Result]] = {}
+"""All classes of results that were imported, by name."""
+
+
+@dataclass_transform(
+    frozen_default=True, eq_default=False, field_specifiers=(column, coordinate, scalar, part)
+)
+class Result:
+    """A result of a computation; a class that derives from it is a frozen dataclass.
+
+    Parameters of the class statement
+    ---------------------------------
+    rows : str
+        Dimensions of the table, with spaces between them, the last varying fastest; by default those of the
+        first column.
+    endings : tuple of str
+        Endings of the files that `save` writes.
+    fields : bool
+        False for a class with a constructor of its own, all of whose columns are derived properties.
+    """
+
+    ENDINGS: ClassVar[tuple[str, ...]] = files.ENDINGS
+    ROWS: ClassVar[tuple[str, ...]] = ()
+    COLUMNS: ClassVar[dict[str, Column]] = {}
+
+    if TYPE_CHECKING:
+        __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __init_subclass__(
+        cls, *, rows: str = "", endings: tuple[str, ...] = (), fields: bool = True, **options: Any
+    ) -> None:
+        super().__init_subclass__(**options)
+        if rows:
+            cls.ROWS = tuple(rows.split())
+        if endings:
+            cls.ENDINGS = endings
+        RESULTS[cls.__name__] = cls
+        if fields:
+            dataclass(frozen=True, eq=False)(cls)
+        cls.COLUMNS = columns_of(cls)
+        if fields:
+            cls.__doc__ = with_attributes(cls.__doc__ or "", cls, cls.COLUMNS)
+
+    @property
+    def title(self) -> str:
+        """One line that says what the result is."""
+        return type(self).__name__
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the result comes from: fingerprints, versions, tolerance; see `results.provenance`.
+
+        From the attributes `hammer`, `drive`, `regime` and so on, where the result has them.
+        """
+        regime = getattr(self, "regime", None)
+        told: dict[str, Any] = {}
+        if regime is not None:
+            told = {name: getattr(regime, name) for name in ("hammer", "overlap", "period")}
+            told["waveform"] = regime.fired
+        for name in ("hammer", "drive", "waveform", "overlap", "period", "scheme", "tolerance", "status"):
+            value = getattr(self, name, None)
+            # Of many runs, such as those of a chart, each has its own.
+            if value is not None and np.ndim(value) == 0:
+                told[name] = value
+        return provenance(**told)
+
+    def entries(self) -> Entries:
+        """Return the columns and coordinates with their values, by their names in the Dataset.
+
+        A class overrides it where units depend on the instance, or arrays are no fields.
+        """
+        return {
+            note.name: (note, getattr(self, name))
+            for name, note in self.COLUMNS.items()
+            if note.kind in ("column", "coordinate")
+        }
+
+    def notes(self) -> Mapping[str, Any]:
+        """Return what the attributes of the Dataset say beyond title, scalars and provenance."""
+        return {}
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the Dataset: title, scalars, notes and provenance; what is None is left out."""
+        scalars = {
+            note.name: getattr(self, name) for name, note in self.COLUMNS.items() if note.kind == "scalar"
+        }
+        known = {
+            "title": self.title,
+            "result": type(self).__name__,
+            **scalars,
+            **self.notes(),
+            **self.provenance,
+        }
+        return {
+            key: int(value) if isinstance(value, bool) else value
+            for key, value in known.items()
+            if value is not None
+        }
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the result as a Dataset, with units and meanings, and provenance in its attributes."""
+        import xarray as xr
+
+        data: dict[str, Any] = {}
+        coordinates: dict[str, Any] = {}
+        for name, (note, values) in self.entries().items():
+            kept = np.asarray(values) if note.dtype is None else np.asarray(values).astype(note.dtype)
+            target = coordinates if note.kind == "coordinate" else data
+            target[name] = (note.dims, kept, note.attributes)
+        return xr.Dataset(data, coords=coordinates, attrs=self.attributes)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the result as a table, columns such as "x [m]", codes by name; provenance in `attrs`."""
+        entries = sorted(self.entries().values(), key=lambda entry: entry[0].kind != "coordinate")
+        dims = self.ROWS or next(note.dims for note, _values in entries if note.kind == "column")
+        columns = {
+            note.heading: (note.dims, _named(np.asarray(values), note))
+            for note, values in entries
+            if note.dims and set(note.dims) <= set(dims)
+        }
+        return files.frame(columns, dims, files.plain(self.attributes))
+
+    def save(self, path: str | Path) -> None:
+        """Write the result, by the ending of the name; whole or not at all.
+
+        `printhammer.results.reopen` opens it again; see `printhammer.results.files` for what each format
+        holds.
+
+        Raises
+        ------
+        InputError
+            The name ends in none of `ENDINGS`, the file cannot be written, or a package is missing that the
+            format needs; what was there stays.
+        """
+        files.save(path, self.to_dataset, self.to_dataframe, self.ENDINGS)
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the result; returns a matplotlib figure.
+
+        Options are those of the function that `printhammer.figures.plots` names for the class; `picture` is
+        the name of a second picture.
+        """
+        # By name, so that physics does not depend on pictures.
+        return import_module("printhammer.figures.plots").plot(self, **options)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: title, columns, and attributes to unfold."""
+        columns = [
+            (note.heading, " × ".join(map(str, np.shape(values))), ", ".join(note.dims), note.meaning)
+            for note, values in self.entries().values()
+        ]
+        attributes = [(key, str(value)) for key, value in files.plain(self.attributes).items()]
+        return (
+            f"<div><b>{escape(self.title)}</b>{_html_table(columns)}"
+            f"<details><summary>attributes</summary>{_html_table(attributes)}</details></div>"
+        )
+
+
+def _html_table(rows: Sequence[Sequence[str]]) -> str:
+    cells = (
+        "".join(f"<td>{escape(cell if len(cell) <= 80 else cell[:77] + '...')}</td>" for cell in row)
+        for row in rows
+    )
+    return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+
+
+def _named(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:
+    """Return codes by name, "" for those without one."""
+    if not note.codes:
+        return values
+    names = np.array([*note.codes, ""])
+    return names[np.where((values >= 0) & (values < len(note.codes)), values, len(note.codes))]
