@@ -12,6 +12,43 @@ def strobe(hammer: Hammer) -> Result:
     return strobe(hammer, period=1.3e-3, points=5, verdict=False)
 
 
+def quality(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.quality import quality
+
+    return quality(hammer, 900.0, "1101")
+
+
+def safe_rate(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.safe_rate import safe_rate
+
+    return safe_rate(hammer, first=600.0, last=700.0, step=100.0, cycle=False)
+
+
+def tolerance_yield(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.tolerance import tolerance_yield
+
+    return tolerance_yield(hammer, number=2, first=600.0, last=700.0, step=100.0)
+
+
+def damping_study(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.damping import damping_study
+    from printhammer.printing.rates.materials import Material
+
+    tried = [Material("as it is", "as it is", {}), Material("hard", "none", {"backstop.stiffness": -1.0})]
+    return damping_study(hammer, tried, first=600.0, last=700.0, step=100.0)
+
+
+def page(hammer: Hammer) -> Result:
+    from printhammer.printing.page.page import print_page
+
+    return print_page(hammer, "Hi", 1500.0)
+
+
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
+    "DampingStudy": damping_study,
+    "Page": page,
+    "Quality": quality,
+    "SafeRate": safe_rate,
     "Strobe": strobe,
+    "ToleranceYield": tolerance_yield,
 }
