@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.zero_one import zero_one
     from printhammer.control.feedback.comparison import feedback
     from printhammer.control.least_work.burst import least_work
-    from printhammer.control.table.compensation import CompensationTable
-    from printhammer.control.table.files import load_table
+    from printhammer.control.table.compensation import CompensationTable, load_table
     from printhammer.control.table.report import judge_table
     from printhammer.control.table.tuning import tune
     from printhammer.drive.sequence import PulseSequence
@@ -144,7 +143,7 @@ _HOME = {
     "judge_table": "control.table.report",
     "least_work": "control.least_work.burst",
     "load": "hammer",
-    "load_table": "control.table.files",
+    "load_table": "control.table.compensation",
     "lyapunov": "chaos.lyapunov",
     "measure": "identify.laboratory",
     "orbits": "chaos.orbit_search",
