@@ -44,11 +44,28 @@ def page(hammer: Hammer) -> Result:
     return print_page(hammer, "Hi", 1500.0)
 
 
+def compensation_table(hammer: Hammer) -> Result:
+    from tests.control.table.by_hand import by_hand
+
+    return by_hand(hammer)
+
+
+def table_report(hammer: Hammer) -> Result:
+    from tests.control.table.by_hand import by_hand
+
+    from printhammer.control.table.report import judge_table
+    from printhammer.printing.rates.perturbation import Perturbation
+
+    return judge_table(hammer, by_hand(hammer), rates=[900.0], perturbations=[Perturbation()])
+
+
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
+    "CompensationTable": compensation_table,
     "DampingStudy": damping_study,
     "Page": page,
     "Quality": quality,
     "SafeRate": safe_rate,
     "Strobe": strobe,
+    "TableReport": table_report,
     "ToleranceYield": tolerance_yield,
 }

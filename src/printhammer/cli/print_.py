@@ -159,7 +159,7 @@ def print_(
     }
     loaded = load_checked(hammer)
     if table is not None:
-        from printhammer.control.table.files import load_table
+        from printhammer.control.table.compensation import load_table
 
         options["strategy"] = load_table(table).strategy(loaded)
     announce_compiling()

@@ -149,7 +149,7 @@ def quality(
     named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
     check_outputs(wanted, [*read, *named])
     if table is not None:
-        from printhammer.control.table.files import load_table
+        from printhammer.control.table.compensation import load_table
 
         loaded_table = load_table(table)
         common["strategy"] = many["strategy"] = loaded_table.strategy(loaded)
