@@ -125,17 +125,17 @@ class Report:
 
     def frame_sentences(self) -> list[str]:
         """Say how fast Figure 9 is where its error is small enough for a picture, and where it is exact."""
-        found = []
+        sentences = []
         for name, error in (("display", DISPLAY), ("exact", EXACT)):
             for threads in sorted({frame.threads for frame in self.figures.frames}):
                 frame = self.figures.fastest(error, threads)
-                told = "no setting"
+                shown = "no setting"
                 if frame is not None:
                     how = f"{frame.engine} engine, tolerance {frame.tolerance:.0e}"
-                    told = f"{frame.seconds * 1e3:.3g} ms ({how})"
+                    shown = f"{frame.seconds * 1e3:.3g} ms ({how})"
                 on = f"{threads} thread{'s' if threads > 1 else ''}"
-                found.append(f"{name}, median error below {error:.0e} of the stroke, {on}: {told}")
-        return found
+                sentences.append(f"{name}, median error below {error:.0e} of the stroke, {on}: {shown}")
+        return sentences
 
     def to_markdown(self) -> str:
         """Return the page of the documentation."""
@@ -168,10 +168,10 @@ class Report:
             "\n".join(f"- {sentence}" for sentence in self.frame_sentences()),
         ]
         if self.compiling:
-            told = ", ".join(
+            times = ", ".join(
                 f"{seconds:.0f} s ({engine} engine)" for engine, seconds in self.compiling.items()
             )
-            parts.append(f"Compiling, once for a combination of laws and then kept on disk: {told}.")
+            parts.append(f"Compiling, once for a combination of laws and then kept on disk: {times}.")
         parts += [
             "## Long trains",
             "Rates as above, no output but status, end and steps.",
