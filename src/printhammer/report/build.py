@@ -251,7 +251,7 @@ def _provenance(hammer: Hammer, context: Context) -> dict[str, Any]:
     found: dict[str, Any] = {"hammer": hammer.name, "hammer_fingerprint": hammer.fingerprint}
     with suppress(PrinthammerError):
         found |= context.single.provenance
-    for name in ("drive", "drive_fingerprint", "status"):
+    for name in ("drive", "drive_fingerprint", "waveform", "overlap", "status"):
         found.pop(name, None)
     found |= {"printhammer": __version__, "matplotlib": mpl.__version__, "python": platform.python_version()}
     return found
