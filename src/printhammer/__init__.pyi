@@ -50,6 +50,7 @@ from .printing.rates.tolerance import tolerance_yield as tolerance_yield
 from .run.ensemble import Ensemble as Ensemble
 from .run.ensemble import EnsembleResult as EnsembleResult
 from .run.motion import Motion as Motion
+from .run.regime import Regime as Regime
 from .run.simulate import simulate as simulate
 from .sweep import sweep as sweep
 

@@ -20,6 +20,7 @@ import numpy as np
 from printhammer.drive.waveforms.shapes import Sine
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.names import PERIOD, TIMING, quantities_of, unknown
 from printhammer.run.problem import constants_of, scales_of
 from printhammer.support.constants import quantities
 
@@ -89,7 +90,7 @@ def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
         names += [f"waveform.{name}" for name in _of_waveform(drive.waveform)]
     count = len(drive.times)
     if drive.period is not None and count > 1:
-        names.append("period")
+        names.append(PERIOD)
     elif count <= _MOST_SINGLE:
         names += [f"firing.{number}" for number in range(1, count)]
     return names
@@ -154,7 +155,7 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
             scale = abs(value) or _natural(unit, hammer, drive)
             pieces = _table_change(lambda moved: _changed(waveform, last, moved), value, scale, name)
             return Parameter(name, value, scale, unit, meaning, packed, firings, pieces)
-    elif name in ("period", "rate"):
+    elif name in TIMING:
         return _spacing(drive, name, packed)
     elif section == "firing":
         number = int(last) if last.isdecimal() else -1
@@ -173,8 +174,7 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
         return Parameter(
             name, constant.si, scale, constant.si_unit, constant.meaning, packed, firings, pieces
         )
-    known = ", ".join(parameter_names(hammer, drive))
-    raise InputError(f"constant = {name!r} is not known, expected one of {known}")
+    raise unknown(name, parameter_names(hammer, drive))
 
 
 def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
@@ -182,7 +182,7 @@ def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
     period, count = drive.period, len(drive.times)
     if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
         raise InputError(f"constant = {name!r}, expected a drive with a single period and several firings")
-    value, unit, sign = (period, "s", 1.0) if name == "period" else (1.0 / period, "Hz", -1.0)
+    value, sign = (period, 1.0) if name == PERIOD else (1.0 / period, -1.0)
     firings, pieces = np.zeros(count), np.zeros(drive.kernel_arrays()[2].shape)
     waveform = drive.waveform
     if isinstance(waveform, Sine):
@@ -193,20 +193,18 @@ def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
         pieces = -sign * table
     else:
         firings = sign * (drive.times - drive.times[0])
-    meaning = "time between firings" if name == "period" else "firings per second"
-    return Parameter(name, value, value, unit, meaning, packed, firings, pieces)
+    note = TIMING[name]
+    return Parameter(name, value, value, note.si, note.meaning, packed, firings, pieces)
 
 
 def _of_waveform(waveform: Waveform) -> dict[str, tuple[float, str, str]]:
     """Return value, unit and meaning of the constants of a waveform."""
     fields = {
         name: (float(getattr(waveform, name)), note.si, note.meaning)
-        for name, note in quantities(type(waveform)).items()
+        for name, note in quantities_of(waveform).items()
     }
-    if "amplitude" in fields:
-        fields["amplitude"] = (fields["amplitude"][0], waveform.unit, fields["amplitude"][2])
-        return fields
-    return {"amplitude": (waveform.peak, waveform.unit, "largest value of the pulse"), **fields}
+    own = {"amplitude": (waveform.peak, waveform.unit, "largest value of the pulse")}
+    return fields if "amplitude" in fields else {**own, **fields}
 
 
 def _changed(waveform: Waveform, name: str, value: float) -> Waveform:

@@ -18,6 +18,7 @@ from printhammer.derivatives.dots import DOT_QUANTITIES, RUN_QUANTITIES, changes
 from printhammer.derivatives.parameters import parameter_names, parameters
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
+from printhammer.hammer.names import unknown
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem, check_tolerance
 from printhammer.run.simulate import end_of_run
@@ -140,8 +141,7 @@ class Sensitivities:
         given = np.zeros(len(self.constants))
         for name, number in spreads.items():
             if name not in self.constants:
-                known = ", ".join(self.constants)
-                raise InputError(f"spreads: {name!r} is not known, expected one of {known}")
+                raise unknown(name, self.constants, "spreads")
             place = self.constants.index(name)
             given[place] = read_number(number, "1", f"spreads: {name}")
             if given[place] < 0.0:

@@ -6,6 +6,7 @@ In the text everything else stays as it is, comments and layout too.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from printhammer.errors import InputError
@@ -64,10 +65,18 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     note = quantities(model).get(name) if model is not None else None
     texts = tuple(TEXTS) if not section else ()
     if model is None or (note is None and name not in file_options(model) and name not in texts):
-        raise InputError(f"the key {shown(key)} is not known, expected one such as 'pack.stiffness'")
+        close = get_close_matches(key, _names(document), 1)
+        expected = repr(close[0]) if close else "one such as 'pack.stiffness'"
+        raise InputError(f"the key {shown(key)} is not known, expected {expected}")
     if note is None or value is None:
         return key, value
     return key, _constant(key, _si_unit(note, document, section, name), value, status, source)
+
+
+def _names(document: Mapping[str, Any]) -> list[str]:
+    """Return the names of everything that a document says, such as "mass" and "pack.stiffness"."""
+    tables = [key for key in SELECTORS if isinstance(document.get(key), Mapping)]
+    return [*document, *(f"{section}.{field}" for section in tables for field in document[section])]
 
 
 def _si_unit(note: Quantity, document: Mapping[str, Any], section: str, name: str) -> str:

@@ -15,8 +15,18 @@ from printhammer.drive.input import period_of_rate, read_number, read_positive
 from printhammer.drive.trains import PulseTrain, SineForce
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.hammer.names import (
+    DRIVE,
+    FORCE,
+    PERIOD,
+    RATE,
+    TIMING,
+    WAVEFORM,
+    quantities_of,
+    unknown,
+)
 from printhammer.run.window import window_of
-from printhammer.support.constants import quantities
+from printhammer.support.constants import Quantity, quantities
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,10 +39,6 @@ if TYPE_CHECKING:
     from printhammer.run.window import Window
     from printhammer.support.arrays import FloatArray
 
-PERIOD: Final = "period"
-RATE: Final = "rate"
-_WAVEFORM: Final = "waveform."
-_DRIVE: Final = "drive."
 _FORCE: Final = ("amplitude", "phase")
 
 
@@ -216,14 +222,35 @@ class Regime:
         if name == RATE:
             return self.rate
         if name not in self.names:
-            raise InputError(f"{name} is not known, expected one of {', '.join(self.names)}")
-        if name.startswith(_DRIVE) and self.drive is not None:
+            raise unknown(name, self.names)
+        if name.startswith(DRIVE) and self.drive is not None:
             found = getattr(self.drive.waveform, self._of_force(name))
-        elif name.startswith(_WAVEFORM) and self.waveform is not None:
+        elif name.startswith(WAVEFORM) and self.waveform is not None:
             found = getattr(self.waveform, self._of_waveform(name))
         else:
             found = self.hammer.constants[name].si
         return float(found)
+
+    def quantity(self, name: str) -> Quantity:
+        """Return unit, meaning and symbol of a constant by name; see `with_`.
+
+        Raises
+        ------
+        InputError
+            There is no constant of that name.
+        """
+        self.value(name)
+        if name == PERIOD and self.drive is not None:
+            return replace(TIMING[name], meaning="period of the force")
+        if name in TIMING:
+            return TIMING[name] if self.drive is None else FORCE["frequency"]
+        section, _, field = name.rpartition(".")
+        if f"{section}." == DRIVE:
+            return FORCE[field]
+        if f"{section}." == WAVEFORM and self.waveform is not None:
+            return quantities_of(self.waveform)[field]
+        constant = self.hammer.constants[name]
+        return Quantity(constant.si_unit, constant.symbol, constant.meaning)
 
     def with_(self, name: str, value: float) -> Self:
         """Return a regime with one constant replaced.
@@ -246,9 +273,9 @@ class Regime:
                 period_of_rate(value) if name == RATE else read_positive(value, "s", name)
             )
         self.value(name)
-        if name.startswith(_DRIVE):
+        if name.startswith(DRIVE):
             return self._with_force(**{self._of_force(name): float(value)})
-        if name.startswith(_WAVEFORM) and self.waveform is not None:
+        if name.startswith(WAVEFORM) and self.waveform is not None:
             fields = {field: getattr(self.waveform, field) for field in type(self.waveform).model_fields} | {
                 self._of_waveform(name): float(value)
             }
@@ -259,13 +286,13 @@ class Regime:
     def names(self) -> list[str]:
         """Names of all constants that `with_` takes."""
         own = self.waveform
-        found = [name for name in self.hammer.constants if own is None or not name.startswith(_WAVEFORM)]
+        found = [name for name in self.hammer.constants if own is None or not name.startswith(WAVEFORM)]
         if own is not None:
             given = [name for name in quantities(type(own)) if getattr(own, name) is not None]
-            found += [f"{_WAVEFORM}{name}" for name in given]
+            found += [f"{WAVEFORM}{name}" for name in given]
         if self.drive is not None:
-            found = [name for name in found if not name.startswith(_WAVEFORM)]
-            found += [f"{_DRIVE}{name}" for name in _FORCE if isinstance(self.drive, SineForce)]
+            found = [name for name in found if not name.startswith(WAVEFORM)]
+            found += [f"{DRIVE}{name}" for name in _FORCE if isinstance(self.drive, SineForce)]
         fixed = self.drive is not None and not isinstance(self.drive, SineForce)
         return [*([] if fixed else [PERIOD, RATE]), *found]
 
@@ -283,11 +310,11 @@ class Regime:
         return replace(self, drive=drive, period=1.0 / known["frequency"])
 
     def _of_force(self, name: str) -> str:
-        field = name.removeprefix(_DRIVE)
+        field = name.removeprefix(DRIVE)
         return field if field in _FORCE and isinstance(self.drive, SineForce) else ""
 
     def _of_waveform(self, name: str) -> str:
-        field = name.removeprefix(_WAVEFORM)
+        field = name.removeprefix(WAVEFORM)
         return field if self.waveform is not None and field in quantities(type(self.waveform)) else ""
 
 

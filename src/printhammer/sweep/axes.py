@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.hammer.file import SELECTORS, Body, kinds_of, model_of
+from printhammer.hammer.file import kinds_of, model_of
+from printhammer.hammer.names import FORCE, PERIOD, RATE, TIMING, in_unit_of_drive, quantity_of
 from printhammer.support.constants import Quantity, expected, quantities, shown
 from printhammer.sweep.quantities import read_quantities, read_quantity
 
@@ -24,15 +25,13 @@ if TYPE_CHECKING:
 Target = Literal["hammer", "waveform", "drive", "at", "state"]
 
 DRIVE: Final[dict[str, Quantity]] = {
-    "rate": Quantity("Hz", "f", "firing rate", gt=0.0),
-    "period": Quantity("s", "T", "time between firings", gt=0.0),
+    RATE: TIMING[RATE],
+    PERIOD: TIMING[PERIOD],
     "start": Quantity("s", "t0", "time of the first firing", ge=0.0),
     "gap": Quantity("s", "tg", "time between bursts", gt=0.0),
     "pulses": Quantity("1", "n", "number of pulses", ge=1.0),
     "bursts": Quantity("1", "nb", "number of bursts", ge=1.0),
-    "amplitude": Quantity("N", "F", "amplitude of the force"),
-    "frequency": Quantity("Hz", "f", "frequency of the force", gt=0.0),
-    "phase": Quantity("rad", "phi", "phase of the force"),
+    **FORCE,
 }
 """What of a drive an axis may change, beside its firing times."""
 
@@ -127,30 +126,6 @@ def read_axis(
     return Axis(table.key, name, target, field, note, np.array(values), geometric)
 
 
-def quantity_of(key: str, hammer: Hammer) -> Quantity | None:
-    """Return what a hammer file says of a constant; None if the hammer can have none of that key."""
-    section, _, name = key.rpartition(".")
-    if not section:
-        return quantities(Body).get(name)
-    found = _sections(hammer).get(section)
-    note = quantities(model_of(section, found)).get(name) if found is not None else None
-    if note is not None and section == "waveform" and note.also and hammer.waveform is not None:
-        return _driven(note, hammer.waveform.unit)
-    return note
-
-
-def _sections(hammer: Hammer) -> dict[str, str]:
-    """Return the tables that a hammer has and their kinds."""
-    found: dict[str, str] = {role: part.law for role, part in hammer.parts.items()}
-    if hammer.waveform is not None:
-        found["waveform"] = hammer.waveform.shape
-    return {"coil": "", **{section: found[section] for section in SELECTORS if section in found}}
-
-
-def _driven(note: Quantity, unit: str) -> Quantity:
-    return Quantity(unit, note.symbol, note.meaning, (), note.gt, note.ge, note.lt, note.le, note.required)
-
-
 def _resolved(
     key: str,
     where: str,
@@ -174,7 +149,7 @@ def _resolved(
     elif section == "waveform" and own_waveform is not None:
         if (note := _constant_of(own_waveform, name)) is not None:
             return "waveform", name, note
-    elif (found := quantity_of(key, hammer)) is not None:
+    elif (found := quantity_of(hammer, key)) is not None:
         return "hammer", key, found
     known = [*(f"drive.{name}" for name in DRIVE), "drive.at.0", *(f"state.{name}" for name in _STATE)]
     known += [f"waveforms.{name}.amplitude" for name in named]
@@ -193,7 +168,7 @@ def _constant_of(waveform: object, name: str) -> Quantity | None:
     if not isinstance(waveform, Mapping) or not isinstance(shape, str) or shape not in kinds_of("waveform"):
         return None
     note = quantities(model_of("waveform", shape)).get(name)
-    return None if note is None else _driven(note, _own_unit(waveform.get(name), note))
+    return None if note is None else in_unit_of_drive(note, _own_unit(waveform.get(name), note))
 
 
 def _own_unit(given: object, note: Quantity) -> str:

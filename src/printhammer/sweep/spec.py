@@ -22,8 +22,9 @@ from printhammer.drive.text import FORMAT as DRIVE_FORMAT
 from printhammer.drive.text import document
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import load, shipped
+from printhammer.hammer.names import quantity_of
 from printhammer.support.constants import shown
-from printhammer.sweep.axes import COUNTS, Axis, quantity_of, read_axis
+from printhammer.sweep.axes import COUNTS, Axis, read_axis
 from printhammer.sweep.members import KINDS, Base
 from printhammer.sweep.outputs import Outputs, read_outputs
 from printhammer.sweep.quantities import read_quantity
@@ -179,7 +180,7 @@ def _spec(found: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
 def _replaced(hammer: Hammer, constants: Mapping[str, Any]) -> Hammer:
     changes = {}
     for key, value in constants.items():
-        note = quantity_of(key, hammer)
+        note = quantity_of(hammer, key)
         if note is None:
             raise InputError(f"constants: {shown(key)} names no constant of {hammer.name}")
         changes[key] = read_quantity(value, note.si, f"constants.{key}")

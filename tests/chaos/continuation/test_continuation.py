@@ -126,7 +126,7 @@ def test_dataset_and_files(branch: Branch, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("parameter", "bounds", "how", "words"),
     [
-        ("pack.nothing", (1.0, 2.0), {"period": SLOW}, "pack.nothing is not known"),
+        ("pack.nothing", (1.0, 2.0), {"period": SLOW}, "'pack.nothing' is not known"),
         ("period", (2.0, 1.0), {"period": SLOW}, "ascending"),
         ("period", (1.0,), {"period": SLOW}, "the least and the largest"),
         ("period", ("1 m", "2 m"), {"period": SLOW}, "period"),

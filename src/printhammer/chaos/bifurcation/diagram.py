@@ -19,8 +19,9 @@ from printhammer.chaos.strobe.verdict import SIGNIFICANT
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.hammer.names import PERIOD, RATE
 from printhammer.run.problem import check_tolerance
-from printhammer.run.regime import PERIOD, RATE, Regime
+from printhammer.run.regime import Regime
 from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 
 from printhammer.drive.text import inline, waveform_text
 from printhammer.errors import InputError
+from printhammer.hammer.names import PERIOD, RATE
 from printhammer.run.ensemble import MODE_NAMES
-from printhammer.run.regime import PERIOD, RATE
 from printhammer.support.constants import quantities
 from printhammer.support.outputs import write_dataset, write_file
 

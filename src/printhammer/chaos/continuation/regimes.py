@@ -21,7 +21,8 @@ from printhammer.chaos.orbits.search import orbits
 from printhammer.chaos.strobe.map import MAP_TOLERANCE
 from printhammer.drive.input import period_of_rate, read_count, read_positive
 from printhammer.errors import InputError
-from printhammer.run.regime import RATE, Regime
+from printhammer.hammer.names import RATE
+from printhammer.run.regime import Regime
 from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:

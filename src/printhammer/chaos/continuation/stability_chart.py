@@ -22,7 +22,7 @@ from printhammer.chaos.continuation.arclength import MapValue, Steps, follow
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, torus_test
 from printhammer.chaos.continuation.continuation import continuation
-from printhammer.chaos.continuation.tracer import read_bounds, unit_of
+from printhammer.chaos.continuation.tracer import read_bounds
 from printhammer.chaos.strobe.map import image_of
 from printhammer.chaos.strobe.train import Train
 from printhammer.chaos.strobe.verdict import period_of
@@ -256,7 +256,7 @@ def stability_chart(
     return StabilityChart(
         regime=regime,
         names=(branch.parameter, second),
-        units=(branch.unit, unit_of(regime, second)),
+        units=(branch.unit, regime.quantity(second).si),
         bounds=(branch.bounds, ends),
         firings=branch.firings,
         curves=tuple(curves),

@@ -25,7 +25,7 @@ from printhammer.figures.elements.style import (
     sign,
     styled,
 )
-from printhammer.run.regime import PERIOD
+from printhammer.hammer.names import PERIOD
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

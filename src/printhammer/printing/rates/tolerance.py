@@ -12,6 +12,7 @@ import numpy as np
 
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.hammer.names import unknown
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.nominal import nominal, rate_of, single_pulses
 from printhammer.printing.dots.strategy import name_of, open_loop
@@ -274,7 +275,7 @@ def spreads_of(hammer: Hammer, given: float | Mapping[str, float]) -> dict[str, 
         }
     for key, value in wanted.items():
         if key not in constants:
-            raise InputError(f"{hammer.path}: spread of {key!r}, expected one of {', '.join(constants)}")
+            raise unknown(key, constants, f"{hammer.path}: spread")
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1.0:
             raise InputError(f"spread of {key} = {value!r} is expected to be from 0 to below 1")
     found = {key: float(value) for key, value in wanted.items() if value > 0.0}

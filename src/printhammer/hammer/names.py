@@ -1,0 +1,82 @@
+"""Names of constants: one vocabulary for files, edits, sweeps, regimes, derivatives, tolerances and controls.
+
+===================== ====================================================================================
+name                  what it is
+===================== ====================================================================================
+``mass``              a number of the hammer itself
+``pack.stiffness``    a constant of a part, spelled as in a hammer file
+``waveform.width``    a constant of the pulse that is fired: the hammer's own, or that of the drive
+``period``, ``rate``  time between firings and firings per second, of a train or of a force
+``drive.amplitude``   of an endless force, as is ``drive.phase``
+===================== ====================================================================================
+
+What a constant is measured in, what it means and where it may lie is declared once, with its part or waveform
+(`printhammer.support.constants.quantity`); here it is looked up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Final
+
+from printhammer.errors import InputError
+from printhammer.hammer.file import SELECTORS, Body, model_of
+from printhammer.support.constants import Quantity, quantities, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+
+PERIOD: Final = "period"
+RATE: Final = "rate"
+WAVEFORM: Final = "waveform."
+DRIVE: Final = "drive."
+
+TIMING: Final = {
+    PERIOD: Quantity("s", "T", "time between firings", gt=0.0),
+    RATE: Quantity("Hz", "f", "firing rate", gt=0.0),
+}
+"""Period and rate of a train."""
+
+FORCE: Final = {
+    "amplitude": Quantity("N", "F", "amplitude of the force"),
+    "frequency": Quantity("Hz", "f", "frequency of the force", gt=0.0),
+    "phase": Quantity("rad", "phi", "phase of the force"),
+}
+"""Constants of a sinusoidal force."""
+
+
+def quantity_of(hammer: Hammer, name: str) -> Quantity | None:
+    """Return what a hammer file says of a constant; None if the hammer can have none of that name."""
+    section, _, field = name.rpartition(".")
+    if not section:
+        return quantities(Body).get(field)
+    kinds: dict[str, str] = {"coil": "", **{role: part.law for role, part in hammer.parts.items()}}
+    if hammer.waveform is not None:
+        kinds["waveform"] = hammer.waveform.shape
+    if section not in kinds or section not in SELECTORS:
+        return None
+    note = quantities(model_of(section, kinds[section])).get(field)
+    if note is not None and section == "waveform" and hammer.waveform is not None:
+        return in_unit_of_drive(note, hammer.waveform.unit)
+    return note
+
+
+def quantities_of(waveform: Waveform) -> dict[str, Quantity]:
+    """Return what is known of the constants of a waveform, amplitudes in the unit of what it drives."""
+    return {name: in_unit_of_drive(note, waveform.unit) for name, note in quantities(type(waveform)).items()}
+
+
+def in_unit_of_drive(note: Quantity, unit: str) -> Quantity:
+    """Return what is known of a constant that may be a current or a force, as the one that it is."""
+    return replace(note, si=unit, also=()) if note.also else note
+
+
+def unknown(name: str, known: Collection[str], where: str = "") -> InputError:
+    """Return the error that says that a constant is not known, with the nearest name or all of them."""
+    close = get_close_matches(name, known, 1)
+    expected = repr(close[0]) if close else f"one of {', '.join(known)}"
+    return InputError(f"{where or 'constant'} = {shown(name)} is not known, expected {expected}")
