@@ -1,9 +1,14 @@
 """One small result of every class, by the name of the class."""
 
 from collections.abc import Callable
+from functools import cache
 
+import numpy as np
+
+import printhammer as ph
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result
+from printhammer.run.ensemble import EnsembleResult
 
 
 def strobe(hammer: Hammer) -> Result:
@@ -59,13 +64,56 @@ def table_report(hammer: Hammer) -> Result:
     return judge_table(hammer, by_hand(hammer), rates=[900.0], perturbations=[Perturbation()])
 
 
+def fit(hammer: Hammer) -> Result:
+    from printhammer.identify.result import Fit, FittedConstant
+
+    return Fit(
+        kind="spring",
+        source=("spring.csv",),
+        constants={"spring.Bs": FittedConstant.of("spring.Bs", 1.0, 0.1, 3.0, "N")},
+        keys=("spring.Bs",),
+        covariance=np.array([[0.01]]),
+        abscissa=np.array([1e-4, 2e-4, 3e-4]),
+        data=np.array([1.0, 0.9, 0.7]),
+        fitted=np.array([1.0, 0.9, 0.8]),
+        residuals=np.array([0.0, 0.0, -0.1]),
+        axes=(("displacement", "m"), ("force", "N")),
+        degrees_of_freedom=2.0,
+        residual_scale=0.1,
+        weights=np.ones(3),
+        outliers=np.array([False, False, True]),
+        condition_number=1.5,
+        series=np.zeros(3, np.int64),
+        series_names=("spring",),
+        lines=np.array([2, 3, 5]),
+        given={"backstop.position": "50 um"},
+    )
+
+
+def not_none(result: Result | None) -> Result:
+    assert result is not None
+    return result
+
+
+@cache
+def ensemble(hammer: Hammer) -> EnsembleResult:
+    drives = [ph.PulseTrain(hammer.waveform, rate=rate, pulses=2) for rate in (400.0, 500.0)]
+    return ph.Ensemble(hammer, drives, 6e-3).run(dots=True, strobes="firings", times=[1e-3, 2e-3, 3e-3])
+
+
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     "CompensationTable": compensation_table,
     "DampingStudy": damping_study,
+    "DotTable": lambda hammer: not_none(ensemble(hammer).dots),
+    "EnsembleResult": ensemble,
+    "Fit": fit,
+    "Measurement": lambda hammer: ph.measure("pack", hammer, seed=1, points=5),
+    "Motion": lambda hammer: ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=20),
     "Page": page,
     "Quality": quality,
     "SafeRate": safe_rate,
-    "Strobe": strobe,
+    "Strobe": lambda hammer: ph.strobe(hammer, period=0.0013, points=5, verdict=False),
+    "Strobes": lambda hammer: not_none(ensemble(hammer).strobes),
     "TableReport": table_report,
     "ToleranceYield": tolerance_yield,
 }

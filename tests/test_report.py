@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from tests import results
+from tests import reconstruction_files
 
 from printhammer.claims import claims
 from printhammer.errors import InputError
@@ -70,8 +70,8 @@ def results_of(hammer: "ph.Hammer", folder: Path, **changes: object) -> Results:
     """Return made-up results of a reconstruction of a hammer."""
     place = folder / "results"
     place.mkdir(parents=True)
-    search = {**results.SAMPLE["search"], "shipped": hammer.fingerprint}
-    return results_in(results.write(place, **{"search": search, **changes}))
+    search = {**reconstruction_files.SAMPLE["search"], "shipped": hammer.fingerprint}
+    return results_in(reconstruction_files.write(place, **{"search": search, **changes}))
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +196,7 @@ def test_without_results_the_report_says_so(hammer: "ph.Hammer", tmp_path: Path)
 
 
 def test_corrupt_results_are_told_before_anything_is_done(hammer: "ph.Hammer", tmp_path: Path) -> None:
-    made = results_of(hammer, tmp_path, **results.changed("family", "hammers", to=[]))
+    made = results_of(hammer, tmp_path, **reconstruction_files.changed("family", "hammers", to=[]))
     with pytest.raises(InputError, match=r"family\.json: hammers: expected"):
         write_report(hammer, tmp_path / "out", reconstruction=made)
     assert not (tmp_path / "out").exists()

@@ -10,7 +10,7 @@ import xarray as xr
 
 import printhammer as ph
 from printhammer.cli import map as verb
-from printhammer.maps.layout import save_map
+from printhammer.results import save_dataset
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -76,7 +76,9 @@ def test_the_rates_and_times_of_a_measured_map(
 ) -> None:
     rates = np.array([520.0, 700.0, 910.0])
     chart = ph.frequency_map(hammer, rates, times=200)
-    save_map(chart.assign(displacement=chart["displacement"] + np.float32(1e-6)), tmp_path / "measured.nc")
+    save_dataset(
+        chart.assign(displacement=chart["displacement"] + np.float32(1e-6)), tmp_path / "measured.nc"
+    )
     outcome = cli("map", "--measured", tmp_path / "measured.nc", "--out", tmp_path / "both.png")
     assert (outcome.status, outcome.err) == (0, "")
     assert "3 rates from 520 to 910 Hz" in told(outcome.out)
@@ -118,8 +120,8 @@ def test_runs_that_stop_are_named(cli: "Callable[..., object]", hammer: "ph.Hamm
         (("--tolerance", "2"), "tolerance = 2.0, expected a number from"),
         (("--threads", "0"), "threads = 0, expected at least 1"),
         (
-            ("--out", "map.csv"),
-            "--out map.csv: expected a name that ends in one of .nc, .zarr, .svg, .png, .pdf",
+            ("--out", "map.txt"),
+            "--out map.txt: expected a name that ends in one of .nc, .zarr, .csv, .parquet, .json, .svg",
         ),
         (("--out", "nowhere/map.nc"), "nowhere/map.nc: expected a file in a folder that exists"),
         (("--out", "map.nc", "--out", "map.nc"), "map.nc: expected a file of its own"),

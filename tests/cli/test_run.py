@@ -91,7 +91,7 @@ def test_files(cli, hammer: "ph.Hammer", tmp_path: Path) -> None:
     assert outcome.status == 0
     assert {path.name for path in tmp_path.iterdir()} == set(names.values())
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, at=[0.0, 660e-6]), points=101)
-    record = pd.read_csv(tmp_path / "m.csv")
+    record = pd.read_csv(tmp_path / "m.csv", comment="#")
     assert record["x [m]"].to_numpy() == pytest.approx(motion.x, rel=1e-15)
     stored = pd.read_parquet(tmp_path / "m.parquet")
     pd.testing.assert_frame_equal(record, stored, check_dtype=False, rtol=1e-15, atol=0.0)

@@ -53,7 +53,7 @@ def show(fit: Fit, screen: Console) -> None:
     for heading, sentences in (
         ("taken as known", [f"{name} = {value}" for name, value in fit.given.items()]),
         ("not told apart", fit.indistinct),
-        ("notes", fit.notes),
+        ("notes", fit.remarks),
     ):
         for row, sentence in enumerate(sentences):
             told.add_row("" if row else heading, escape(sentence))

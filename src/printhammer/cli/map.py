@@ -52,7 +52,8 @@ def map_(
     out: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FILE", help="Data (.nc, .zarr) or picture (.svg, .png, .pdf); may be given repeatedly."
+            metavar="FILE",
+            help="Data (.nc, .zarr, .csv, .parquet, .json) or picture (.svg, .png, .pdf); repeatable.",
         ),
     ] = None,
     figure: Annotated[
@@ -71,18 +72,19 @@ def map_(
     from printhammer.drive.trains import PulseTrain
     from printhammer.errors import InputError
     from printhammer.maps.frequency import frequency_map
-    from printhammer.maps.layout import save_map
     from printhammer.maps.measured import load_measured_map
+    from printhammer.results.files import save_dataset
     from printhammer.run.problem import TOLERANCE
+    from printhammer.support.outputs import check_outputs
 
     wanted = out or []
     number_of_figure = _checked(wanted, figure, measured, force)
     read = [Path(hammer), *([measured] if measured is not None else [])]
-    _check_places(wanted, read)
+    check_outputs(wanted, read)
     loaded = load_checked(hammer)
     if loaded.waveform is None:
         raise InputError(f"{loaded.path}: the hammer has no [waveform] to fire, expected one")
-    _check_places(wanted, run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None))
+    check_outputs(wanted, run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None))
     beside = None if measured is None else load_measured_map(measured)
     grid, moments = _axes(beside, lowest, highest, whole(rates, "rates"), whole(times, "times"))
     announce_compiling()
@@ -99,7 +101,7 @@ def map_(
         chart = frequency_map(loaded, grid, progress=tell, **options)
     _show(chart, beside, perf_counter() - start, loaded)
     write_found(
-        screen, wanted, partial(_drawn, loaded, chart, beside, number_of_figure), partial(save_map, chart)
+        screen, wanted, partial(_drawn, loaded, chart, beside, number_of_figure), partial(save_dataset, chart)
     )
     if _complaints(chart):
         raise typer.Exit(1)
@@ -109,12 +111,10 @@ def _checked(wanted: list[Path], figure: str | None, measured: Path | None, forc
     """Check the names of the files that are to be written; return the number of the figure that is drawn."""
     from printhammer.cli.saving import PICTURES, check_endings
     from printhammer.errors import InputError
-    from printhammer.maps.layout import FILES, ZARR, need_zarr
+    from printhammer.results.files import ENDINGS
 
-    check_endings(wanted, (*FILES, *PICTURES))
+    check_endings(wanted, (*ENDINGS, *PICTURES))
     for path in wanted:
-        if path.suffix.lower() == ZARR:
-            need_zarr(path)
         if path.exists() and not force:
             raise InputError(f"--out {path}: expected a new file, this one is there; --force writes over it")
     if figure is None:
@@ -128,15 +128,6 @@ def _checked(wanted: list[Path], figure: str | None, measured: Path | None, forc
             f"--figure {figure} is given beside --measured {measured}, expected one or the other"
         )
     return int(figure)
-
-
-def _check_places(wanted: list[Path], inputs: list[Path]) -> None:
-    """Check that the files can be written where they are to be; a Zarr store is a folder."""
-    from printhammer.maps.layout import ZARR
-    from printhammer.support.outputs import check_outputs
-
-    stores = {path: path / "zarr.json" for path in wanted if path.suffix.lower() == ZARR and path.is_dir()}
-    check_outputs([stores.get(path, path) for path in wanted], inputs)
 
 
 def _axes(

@@ -55,7 +55,7 @@ def write(motion: Motion, wanted: Mapping[str, Path]) -> None:
     InputError
         A file cannot be written.
     """
-    from printhammer.results.export import write_csv, write_parquet
+    from printhammer.results.files import write_csv, write_parquet
     from printhammer.run.contacts import Contact, Dot
 
     for kind, path in wanted.items():

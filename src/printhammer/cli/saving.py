@@ -23,13 +23,15 @@ def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "
     Raises
     ------
     InputError
-        One of them ends otherwise.
+        One of them ends otherwise, or a package is missing that its format needs.
     """
     from printhammer.errors import InputError
+    from printhammer.results.files import need_for
 
     for path in paths:
         if path.suffix.lower() not in endings:
             raise InputError(f"{option} {path}: expected a name that ends in one of {', '.join(endings)}")
+        need_for(path)
 
 
 def load_fired(name: str, wanted: Iterable[Path]) -> Hammer:

@@ -254,7 +254,7 @@ def _provenance(hammer: Hammer, context: Context) -> dict[str, Any]:
     settings: dict[str, Any] = {"hammer": hammer.name, "hammer_fingerprint": hammer.fingerprint}
     with suppress(PrinthammerError):
         settings |= context.single.provenance
-    for name in ("drive", "drive_fingerprint", "status"):
+    for name in ("drive", "drive_fingerprint", "waveform", "overlap", "status"):
         settings.pop(name, None)
     settings |= {
         "printhammer": __version__,

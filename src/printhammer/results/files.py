@@ -40,9 +40,15 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from printhammer.results.declare import Column
+
 ENDINGS: Final = (".nc", ".zarr", ".csv", ".parquet", ".json")
 """Endings of the files that hold results."""
 
+_NEEDED: Final = {
+    ".zarr": ("zarr", "Zarr stores need", "sweep"),
+    ".parquet": ("pyarrow", "Parquet files need", "tables"),
+}
 _COLUMNS: Final = "columns"
 _MOST_INT: Final = 2**31
 
@@ -97,6 +103,7 @@ def save(
     if kind not in endings:
         some = f"one of {', '.join(endings)}" if len(endings) > 1 else endings[0]
         raise InputError(f"{target}: expected a name that ends in {some}")
+    need_for(target)
     if kind == ".nc":
         write_file(target, _netcdf(dataset()))
     elif kind == ".zarr":
@@ -104,12 +111,9 @@ def save(
     elif kind == ".json":
         write_file(target, _json(dataset()))
     elif kind == ".csv":
-        write_file(target, csv_text(dataframe()))
+        write_csv(dataframe(), target)
     else:
-        need("pyarrow", target, "writing Parquet needs pyarrow", "tables")
-        content = BytesIO()
-        dataframe().to_parquet(content, index=False)
-        write_file(target, content.getvalue())
+        write_parquet(dataframe(), target)
 
 
 def save_dataset(dataset: xr.Dataset, path: str | Path, endings: Sequence[str] = ENDINGS) -> None:
@@ -135,6 +139,7 @@ def reopen(path: str | Path) -> Reopened:
     kind = source.suffix.lower()
     if kind not in ENDINGS:
         raise InputError(f"{source}: expected a name that ends in one of {', '.join(ENDINGS)}")
+    need_for(source)
     try:
         if kind in (".csv", ".parquet"):
             frame = _read_csv(source) if kind == ".csv" else _read_parquet(source)
@@ -148,16 +153,17 @@ def reopen(path: str | Path) -> Reopened:
     return Reopened(source, dataset, frame_of(dataset))
 
 
-def need(package: str, path: str | Path, what: str, extra: str) -> None:
-    """Make sure that an optional package is there.
+def need_for(path: str | Path, kind: str = "") -> None:
+    """Make sure that the optional package is there that a file needs; `kind` instead of its ending.
 
     Raises
     ------
     InputError
         It is not installed.
     """
+    package, what, extra = _NEEDED.get(kind or Path(path).suffix.lower(), ("json", "", ""))
     if find_spec(package) is None:
-        raise InputError(f"{path}: {what}, which the extra printhammer[{extra}] installs")
+        raise InputError(f"{path}: {what} {package}, which the extra printhammer[{extra}] installs")
 
 
 def plain(value: Any) -> Any:
@@ -169,6 +175,19 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         value = value.item()
     return int(value) if isinstance(value, bool) else value
+
+
+def dataset_of(entries: Mapping[str, tuple[Column, Any]], attributes: Mapping[str, Any]) -> xr.Dataset:
+    """Return a Dataset of columns and coordinates with their values, by name."""
+    import xarray as xr
+
+    data: dict[str, Any] = {}
+    coordinates: dict[str, Any] = {}
+    for name, (note, values) in entries.items():
+        kept = np.asarray(values) if note.dtype is None else np.asarray(values).astype(note.dtype)
+        target = coordinates if note.kind == "coordinate" else data
+        target[name] = (note.dims, kept, note.attributes)
+    return xr.Dataset(data, coords=coordinates, attrs=dict(attributes))
 
 
 def frame_of(dataset: xr.Dataset, attributes: Mapping[str, Any] | None = None) -> pd.DataFrame:
@@ -215,10 +234,35 @@ def frame(
     return table
 
 
+def write_csv(table: pd.DataFrame, path: str | Path) -> None:
+    """Write a table as CSV with all digits, its `attrs` as lines ``# key: value`` above the heading.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written; what was there stays.
+    """
+    write_file(path, csv_text(table))
+
+
 def csv_text(table: pd.DataFrame) -> str:
     """Return a table as CSV with all digits, its `attrs` as lines ``# key: value`` above the heading."""
     head = "".join(f"# {key}: {_text(value)}\n" for key, value in table.attrs.items())
     return head + str(table.to_csv(index=False, float_format="%.17g", lineterminator="\n"))
+
+
+def write_parquet(table: pd.DataFrame, path: str | Path) -> None:
+    """Write a table as Parquet, its `attrs` with it.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written, or pyarrow is not installed; what was there stays.
+    """
+    need_for(path, ".parquet")
+    content = BytesIO()
+    table.to_parquet(content, index=False)
+    write_file(path, content.getvalue())
 
 
 def _text(value: Any) -> str:
@@ -238,16 +282,9 @@ def _decoded(value: str, starts: str = '[{"-0123456789n') -> Any:
 
 
 def _netcdf(dataset: xr.Dataset) -> bytes:
-    # The classic NetCDF format has no truth values and no longer integers.
-    kinds = {"b": np.int8, "i": np.int32, "u": np.int32}
-    kept = dataset.assign(
-        {
-            name: values.astype(kinds[values.dtype.kind])
-            for name, values in dataset.variables.items()
-            if values.dtype.kind == "b" or (values.dtype.kind in "iu" and values.dtype.itemsize > 4)
-        }
-    )
+    kept = dataset.copy()
     kept.attrs = _flat(dataset.attrs)
+    # SciPy writes the classic format, which everything reads.
     return bytes(kept.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT"))
 
 
@@ -256,16 +293,17 @@ def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     found = {}
     for key, value in attributes.items():
         kept = plain(value)
+        # An array of one number would come back as a number.
+        entries = kept if isinstance(kept, list) and len(kept) > 1 else [kept]
         numbers = all(
             isinstance(entry, float) or (isinstance(entry, int) and abs(entry) < _MOST_INT)
-            for entry in (kept if isinstance(kept, list) and kept else [kept])
+            for entry in entries
         )
         found[str(key)] = kept if numbers or isinstance(kept, str) else json.dumps(_strict(kept))
     return found
 
 
 def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
-    need("zarr", target, "Zarr stores need zarr", "sweep")
     if target.exists() and not (target / "zarr.json").is_file():
         raise InputError(f"{target}: expected a new store, this is no Zarr store")
     draft: Path | None = None
@@ -339,7 +377,6 @@ def _read_arrays(source: Path) -> xr.Dataset:
 
     options: dict[str, Any] = {"engine": "scipy"}
     if source.suffix.lower() == ".zarr":
-        need("zarr", source, "Zarr stores need zarr", "sweep")
         options = {"engine": "zarr", "consolidated": False}
     with xr.open_dataset(source, decode_times=False, **options) as found:
         dataset = found.load()
@@ -379,7 +416,6 @@ def _typed(cells: list[str]) -> Any:
 def _read_parquet(source: Path) -> pd.DataFrame:
     import pandas as pd
 
-    need("pyarrow", source, "reading Parquet needs pyarrow", "tables")
     return pd.read_parquet(source)
 
 

@@ -92,7 +92,8 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
         if place in seen:
             raise InputError(f"{path}: expected a file of its own, this one is written twice")
         seen.add(place)
-        if place.is_dir():
+        # A Zarr store is a folder, and written over as a whole.
+        if place.is_dir() and not (place / "zarr.json").is_file():
             raise InputError(f"{path}: expected a file to write, this is a folder")
         if not place.parent.is_dir():
             raise InputError(f"{path}: expected a file in a folder that exists")

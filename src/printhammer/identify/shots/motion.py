@@ -315,5 +315,5 @@ def _result(
         profiles={keys[which]: fit.profile(solution, which, degrees) for which in weak(values, covariance)},
         rejected=rejected,
         p_value=p_value,
-        notes=tuple(notes),
+        remarks=tuple(notes),
     )

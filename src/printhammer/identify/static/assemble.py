@@ -131,7 +131,7 @@ def assemble(
         profiles=profiles,
         rejected=rejected,
         p_value=p_value,
-        notes=(*notes, *weak),
+        remarks=(*notes, *weak),
     )
 
 

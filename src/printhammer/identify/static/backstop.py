@@ -280,5 +280,5 @@ def _of_bodies(k: Stiffness) -> Fit:
         series=whole,
         series_names=(),
         lines=whole,
-        notes=("the geometry gives the stiffness alone; the damping needs rebounds",),
+        remarks=("the geometry gives the stiffness alone; the damping needs rebounds",),
     )
