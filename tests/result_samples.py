@@ -2,16 +2,11 @@
 
 from collections.abc import Callable
 
+from tests.chaos.samples import CHAOS
+
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result
 
-
-def strobe(hammer: Hammer) -> Result:
-    from printhammer.chaos.strobe.points import strobe
-
-    return strobe(hammer, period=1.3e-3, points=5, verdict=False)
-
-
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
-    "Strobe": strobe,
+    **CHAOS,
 }

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from printhammer.chaos.basins.basins import basins
     from printhammer.chaos.basins.quench import quench_map
-    from printhammer.chaos.bifurcation.diagram import bifurcation
+    from printhammer.chaos.bifurcation.bifurcation import bifurcation
     from printhammer.chaos.continuation.continuation import continuation
     from printhammer.chaos.continuation.regimes import regimes
     from printhammer.chaos.continuation.stability_chart import stability_chart
@@ -135,7 +135,7 @@ _HOME = {
     "SineForce": "drive",
     "Waveform": "waveforms",
     "basins": "chaos.basins.basins",
-    "bifurcation": "chaos.bifurcation.diagram",
+    "bifurcation": "chaos.bifurcation.bifurcation",
     "continuation": "chaos.continuation.continuation",
     "damping_study": "printing.damping",
     "equilibria": "equilibrium",

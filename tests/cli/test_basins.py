@@ -26,7 +26,7 @@ def test_attractors_entropy_and_files(cli: Callable, tmp_path: Path) -> None:
     found = ph.basins(ph.load(CRUDE), period=1.3e-3, x=(30e-6, 260e-6, 5), v=(-1.0, 1.0, 4))
     with xr.open_dataset(paths["nc"], engine="scipy") as chart:
         np.testing.assert_array_equal(chart["label"], found.labels)
-    assert len(pd.read_csv(paths["csv"])) == 20
+    assert len(pd.read_csv(paths["csv"], comment="#")) == 20
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in paths["svg"].read_bytes()
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
-from printhammer.chaos.bifurcation.diagram import InterruptedDiagram
+from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
 from printhammer.cli.bifurcation import EXAMPLE
 from printhammer.cli.main import app
 
@@ -32,7 +32,7 @@ def test_windows_routes_and_files(cli: Callable, tmp_path: Path) -> None:
     )
     with xr.open_dataset(paths["nc"], engine="scipy") as chart:
         np.testing.assert_array_equal(chart["x"], found.x)
-    assert pd.read_csv(paths["csv"])["verdict"].tolist() == found.verdicts.reshape(-1).tolist()
+    assert pd.read_csv(paths["csv"], comment="#")["verdict"].tolist() == found.verdicts.reshape(-1).tolist()
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in paths["svg"].read_bytes()
 
@@ -62,11 +62,13 @@ def test_ctrl_c_writes_what_is_done(
     def interrupted(*_arguments: object, **_options: object) -> None:
         raise InterruptedDiagram(found)
 
-    monkeypatch.setattr(import_module("printhammer.chaos.bifurcation.diagram"), "bifurcation", interrupted)
+    monkeypatch.setattr(
+        import_module("printhammer.chaos.bifurcation.bifurcation"), "bifurcation", interrupted
+    )
     out = tmp_path / "diagram.csv"
     done = cli("bifurcation", "--values", "2", "--out", out)
     assert done.status == 130
-    assert pd.read_csv(out)["status"].tolist() == ["ok", "not run"]
+    assert pd.read_csv(out, comment="#")["status"].tolist() == ["ok", "not run"]
 
 
 @pytest.mark.parametrize(

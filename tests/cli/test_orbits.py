@@ -27,7 +27,7 @@ def test_orbits_on_the_screen_and_in_files(cli: Callable, tmp_path: Path) -> Non
         assert one.kind in done.out
         assert f"{one.multipliers[0].real:+.4g}" in done.out
         assert f"{1e3 * one.energy.coil_work:.4f}" in done.out
-    table = pd.read_csv(paths["csv"], dtype=str)
+    table = pd.read_csv(paths["csv"], dtype=str, comment="#")
     assert table["x [m]"].map(float).tolist() == [one.x[0] for one in found]
     with xr.open_dataset(paths["nc"], engine="scipy") as chart:
         assert chart["x"].values[:, 0].tolist() == [one.x[0] for one in found]
@@ -49,7 +49,7 @@ def test_a_search_that_finds_nothing_is_told(cli: Callable, tmp_path: Path) -> N
     assert done.status == 1
     assert "no orbits of 1 firing" in done.out
     assert "no periodic orbit was found" in done.err
-    assert len(pd.read_csv(table)) == 0
+    assert len(pd.read_csv(table, comment="#")) == 0
 
 
 @pytest.mark.parametrize(

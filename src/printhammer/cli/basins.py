@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -24,7 +23,6 @@ EXAMPLE: Final = (
     " --v '-1 m/s, 1 m/s, 20' --out basins.png"
 )
 
-_SUFFIXES: Final = (".nc", ".csv")
 _TRAIN: Final = "Basins (one of --period and --rate)"
 _QUENCH: Final = "Quench map"
 _ROWS: Final = 12
@@ -88,10 +86,11 @@ def basins(
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
+    from printhammer.results import ENDINGS
     from printhammer.support.outputs import check_outputs
 
     wanted = out or []
-    check_endings(wanted, (*_SUFFIXES, *PICTURES))
+    check_endings(wanted, (*ENDINGS, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     of_basins = {
         "period": period,
@@ -116,29 +115,23 @@ def basins(
     found: Basins | QuenchMap
     if quench:
         from printhammer.chaos.basins.quench import quench_map
-        from printhammer.chaos.basins.quench_tables import save_quench
 
         with counting("cells") as tell:
             found = mapped = quench_map(loaded, progress=tell, **options)
         lines = quenched(mapped, units)
         failed = mapped.status[mapped.status != "ok"]
-        save = partial(save_quench, mapped)
-
     else:
         from printhammer.chaos.basins.basins import NO_STATE_STATUS
         from printhammer.chaos.basins.basins import basins as computed
-        from printhammer.chaos.basins.tables import save_basins
 
         with counting("cells") as tell:
             found = planes = computed(loaded, progress=tell, **options)
         lines = told(planes, side, units)
         failed = planes.status[(planes.status != "ok") & (planes.status != NO_STATE_STATUS)]
-        save = partial(save_basins, planes)
-
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     screen.print(f"[dim]{found.status.size} cells, computed in {perf_counter() - begin:.2g} s[/dim]\n")
     screen.print(lines)
-    write_found(screen, wanted, found.plot, save)
+    write_found(screen, wanted, found.plot, found.save)
     if failed.size:
         kinds = ", ".join(sorted(set(failed.tolist())))
         complain(f"{failed.size} of {found.status.size} runs ended early: {kinds}")

@@ -91,9 +91,8 @@ def bifurcation(
     """
     from rich.markup import escape
 
-    from printhammer.chaos.bifurcation.diagram import InterruptedDiagram
-    from printhammer.chaos.bifurcation.diagram import bifurcation as computed
-    from printhammer.chaos.bifurcation.tables import save_bifurcation
+    from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
+    from printhammer.chaos.bifurcation.bifurcation import bifurcation as computed
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
@@ -136,7 +135,7 @@ def bifurcation(
             screen.print(summary(found, name))
         for line in sentences(found):
             screen.print(escape(line), soft_wrap=True)
-        write_found(screen, wanted, partial(found.plot, show=show), partial(save_bifurcation, found))
+        write_found(screen, wanted, partial(found.plot, show=show), found.save)
     if stopped is not None:
         raise KeyboardInterrupt from stopped
     failed = found.status[found.status != "ok"]
@@ -147,11 +146,11 @@ def bifurcation(
 
 
 def _check(wanted: list[Path], show: str) -> None:
-    from printhammer.chaos.bifurcation.tables import SUFFIXES
+    from printhammer.chaos.bifurcation.diagram import Bifurcation
     from printhammer.cli.saving import PICTURES, check_endings
     from printhammer.errors import InputError
 
-    check_endings(wanted, (*SUFFIXES, *PICTURES))
+    check_endings(wanted, (*Bifurcation.ENDINGS, *PICTURES))
     if show not in ("x", "v"):
         raise InputError(f"--show {show}: expected x or v")
 
@@ -167,7 +166,6 @@ def _values(
     """Return the parameter and its values as arguments of `printhammer.bifurcation`."""
     import numpy as np
 
-    from printhammer.chaos.bifurcation.tables import meaning_of
     from printhammer.drive.input import read_number
     from printhammer.errors import InputError
     from printhammer.run.regime import Regime
@@ -177,7 +175,7 @@ def _values(
         raise InputError(f"--period and --rate: expected none of them where the {parameter} is changed")
     regime = Regime.of(hammer, period=_RANGE[0] if timed else period, rate=rate)
     regime.value(parameter)
-    unit, _meaning = meaning_of(regime, parameter)
+    unit, _meaning = regime.meaning_of(parameter)
     first, last = ends
     if parameter == "period":
         first, last = first or _RANGE[0], last or _RANGE[1]
@@ -227,7 +225,8 @@ def summary(found: Bifurcation, direction: str) -> Table:
 
 def sentences(found: Bifurcation) -> list[str]:
     """Return what the diagram tells: the routes to the first strange train, and hysteresis."""
-    from printhammer.chaos.bifurcation.windows import cells, hysteresis
+    from printhammer.chaos.bifurcation.diagram import hysteresis
+    from printhammer.chaos.bifurcation.windows import cells
 
     told = [""]
     for direction in found.directions:

@@ -101,16 +101,14 @@ def continue_(
     """
     from rich.markup import escape
 
-    from printhammer.chaos.continuation.regimes import InterruptedBranches
-    from printhammer.chaos.continuation.tables import SUFFIXES, save_branches
+    from printhammer.chaos.continuation.regimes import Branches, InterruptedBranches
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
     from printhammer.errors import InputError
-    from printhammer.support.outputs import check_outputs, write_dataset
+    from printhammer.support.outputs import check_outputs
 
     wanted = out or []
-    endings = (".nc", *PICTURES) if second is not None else (*SUFFIXES, *PICTURES)
-    check_endings(wanted, endings)
+    check_endings(wanted, (*Branches.ENDINGS, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     if lowest is None or highest is None:
         missing = "--from" if lowest is None else "--to"
@@ -161,10 +159,9 @@ def continue_(
         chart = _charted(found[0], second, (second_from or "", second_to or ""), whole(grid, "grid") or 0)
         screen.print(f"\n{escape(chart.message)}", soft_wrap=True)
     if chart is not None:
-        data = chart.to_dataset()
-        write_found(screen, wanted, chart.plot, lambda path: write_dataset(path, data))
+        write_found(screen, wanted, chart.plot, chart.save)
     elif second is None and len(found):
-        write_found(screen, wanted, partial(found.plot, show=show), partial(save_branches, list(found)))
+        write_found(screen, wanted, partial(found.plot, show=show), found.save)
     if stopped is not None:
         raise KeyboardInterrupt from stopped
     if not len(found):
@@ -250,7 +247,7 @@ def events(branch: Branch) -> Table:
     for event in branch.events:
         multipliers = "  ".join(_number(complex(value)) for value in event.multipliers)
         table.add_row(
-            f"{event.value:.9g}", event.told, multipliers, "" if event.sharp else "between two orbits"
+            f"{event.value:.9g}", event.message, multipliers, "" if event.sharp else "between two orbits"
         )
     return table
 

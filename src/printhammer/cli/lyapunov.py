@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -65,7 +64,6 @@ def lyapunov(
 
     from printhammer.chaos import LyapunovChart, lyapunovs
     from printhammer.chaos import lyapunov as exponents_of
-    from printhammer.chaos.exponents.tables import SUFFIXES, save_lyapunov
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty
@@ -73,7 +71,7 @@ def lyapunov(
     from printhammer.support.outputs import check_outputs
 
     wanted = out or []
-    check_endings(wanted, (*SUFFIXES, *PICTURES))
+    check_endings(wanted, (*LyapunovChart.ENDINGS, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     periods = _periods(period, rate, lowest, highest, steps)
     options: dict[str, Any] = {
@@ -98,7 +96,7 @@ def lyapunov(
     screen.print(many(chart) if single is None else summary(single))
     if single is None:
         screen.print(f"\n{tally(chart)}", soft_wrap=True)
-    write_found(screen, wanted, (chart if single is None else single).plot, partial(save_lyapunov, chart))
+    write_found(screen, wanted, (chart if single is None else single).plot, chart.save)
     stopped = sorted({status for status in chart.status if status != "ok"})
     if stopped:
         count = sum(status != "ok" for status in chart.status)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -62,8 +61,8 @@ def orbits(
     """
     from rich.markup import escape
 
+    from printhammer.chaos.orbits.search import Orbits
     from printhammer.chaos.orbits.search import orbits as search
-    from printhammer.chaos.orbits.tables import SUFFIXES, save_orbits
     from printhammer.chaos.strobe.map import MAP_TOLERANCE
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, load_fired, write_found
@@ -72,7 +71,7 @@ def orbits(
     from printhammer.support.outputs import check_outputs
 
     wanted = out or []
-    check_endings(wanted, (*SUFFIXES, *PICTURES))
+    check_endings(wanted, (*Orbits.ENDINGS, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     if (period is None) == (rate is None):
         raise InputError("--period and --rate: expected one of them, such as --period '1.05 ms'")
@@ -95,7 +94,7 @@ def orbits(
         screen.print(summary(found, units))
         screen.print()
     screen.print(found.message, soft_wrap=True)
-    write_found(screen, wanted, found.plot, partial(save_orbits, found))
+    write_found(screen, wanted, found.plot, found.save)
     if not len(found):
         complain("no periodic orbit was found; more --starts or --guesses may find one")
         raise typer.Exit(1)

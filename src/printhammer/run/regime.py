@@ -33,7 +33,7 @@ PERIOD: Final = "period"
 RATE: Final = "rate"
 _WAVEFORM: Final = "waveform."
 _DRIVE: Final = "drive."
-_FORCE: Final = ("amplitude", "phase")
+_FORCE: Final = {"amplitude": ("N", "amplitude of the force"), "phase": ("rad", "phase of the force")}
 
 
 class Firing(TypedDict, total=False):
@@ -224,6 +224,32 @@ class Regime:
         else:
             found = self.hammer.constants[name].si
         return float(found)
+
+    def meaning_of(self, name: str) -> tuple[str, str]:
+        """Return SI unit and meaning of a constant; see `with_`.
+
+        Raises
+        ------
+        InputError
+            There is no such constant.
+        """
+        self.value(name)
+        pulsed = self.drive is None
+        if name == PERIOD:
+            return "s", "time between firings" if pulsed else "period of the force"
+        if name == RATE:
+            return "Hz", "firing rate" if pulsed else "frequency of the force"
+        if name.startswith(_DRIVE):
+            return _FORCE[self._of_force(name)]
+        if name.startswith(_WAVEFORM) and self.waveform is not None:
+            note = quantities(type(self.waveform))[self._of_waveform(name)]
+            return self.waveform.unit if note.also else note.si, note.meaning
+        constant = self.hammer.constants[name]
+        return constant.si_unit, constant.meaning
+
+    def unit_of(self, name: str) -> str:
+        """Return the SI unit of a constant; see `meaning_of`."""
+        return self.meaning_of(name)[0]
 
     def with_(self, name: str, value: float) -> Self:
         """Return a regime with one constant replaced.

@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.chaos.continuation.arclength import Steps
 from printhammer.chaos.continuation.branch import MOST, Branch
-from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds, unit_of
+from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbits
 from printhammer.chaos.strobe.map import MAP_TOLERANCE
@@ -112,7 +112,7 @@ def continuation(
         ends, own = read_bounds(regime, parameter, bounds), regime.value(parameter)
         if not ends[0] <= own <= ends[1]:
             raise InputError(
-                f"{parameter} = {own:.9g} {unit_of(regime, parameter)} at the start, expected one within the"
+                f"{parameter} = {own:.9g} {regime.unit_of(parameter)} at the start, expected one within the"
                 f" bounds {ends[0]:.9g} to {ends[1]:.9g}"
             )
         given = None if firings is None else read_count(firings, "firings")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -21,7 +22,6 @@ from printhammer.chaos.continuation.events import event_of
 from printhammer.chaos.continuation.family import RegimeFamily, rigid_backstop
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
-from printhammer.run.regime import PERIOD, RATE
 from printhammer.support.threads import in_threads, thread_count
 
 if TYPE_CHECKING:
@@ -44,26 +44,6 @@ _SHORTER: Final = 1e-6
 _DIGITS: Final = ".9g"
 
 
-def unit_of(regime: Regime, parameter: str) -> str:
-    """Return the SI unit of a constant of a regime.
-
-    Raises
-    ------
-    InputError
-        There is no such constant.
-    """
-    regime.value(parameter)
-    own = {PERIOD: "s", RATE: "Hz", "drive.amplitude": "N", "drive.phase": "rad"}
-    if parameter in own:
-        return own[parameter]
-    if parameter.startswith("waveform.") and regime.waveform is not None:
-        from printhammer.support.constants import quantities
-
-        note = quantities(type(regime.waveform))[parameter.removeprefix("waveform.")]
-        return note.also[0] if note.also and regime.waveform.quantity == "force" else note.si
-    return regime.hammer.constants[parameter].si_unit
-
-
 def read_bounds(
     regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
 ) -> tuple[float, float]:
@@ -74,7 +54,7 @@ def read_bounds(
     InputError
         There is no such constant, or the ends are not two ascending numbers.
     """
-    unit = unit_of(regime, parameter)
+    unit = regime.unit_of(parameter)
     try:
         low, high = bounds
     except (TypeError, ValueError):
@@ -147,8 +127,11 @@ class Tracer:
         near = abs(place - nodes[0].parameter) < _NEAR * (self.bounds[1] - self.bounds[0])
         return place if abs(last) < abs(margin) and near else None
 
-    def doubled(self, firings: int, event: BranchEvent, most: int) -> Branch:
+    def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
         """Return the branch born at a period doubling of an orbit of so many firings."""
+        if threads != self.threads:
+            other = Tracer(self.regime, self.parameter, self.bounds, self.tolerance, threads)
+            return other.doubled(firings, event, most, threads)
         family = self.family(2 * firings)
         steps = Steps(most=most, precision=PRECISION)
         curve = follow_doubled(
@@ -180,7 +163,7 @@ class Tracer:
 
     def told(self, value: float) -> str:
         """Return a value of the constant with name and unit."""
-        return f"{self.parameter} = {value:{_DIGITS}} {unit_of(self.regime, self.parameter)}"
+        return f"{self.parameter} = {value:{_DIGITS}} {self.regime.unit_of(self.parameter)}"
 
     def watch(self, firings: int, steps: Steps, progress: Progress | None) -> Any:
         """Return what is asked between any two nodes: whether the branch ends there."""
@@ -271,7 +254,7 @@ class Tracer:
         return Branch(
             regime=self.regime,
             parameter=self.parameter,
-            unit=unit_of(self.regime, self.parameter),
+            unit=self.regime.unit_of(self.parameter),
             bounds=self.bounds,
             firings=family.firings,
             tolerance=self.tolerance,
@@ -295,6 +278,7 @@ class Tracer:
             events=tuple(event_of(point) for point in found),
             stops=(self.retold(stops[0]), self.retold(stops[1])),
             curve=curve,
+            follow_doubled=partial(self.doubled, family.firings),
         )
 
     def retold(self, stop: Stop) -> Stop:
