@@ -4,17 +4,12 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
+from tests.chaos.samples import CHAOS
 
 import printhammer as ph
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result
 from printhammer.run.ensemble import EnsembleResult
-
-
-def strobe(hammer: Hammer) -> Result:
-    from printhammer.chaos.strobe.points import strobe
-
-    return strobe(hammer, period=1.3e-3, points=5, verdict=False)
 
 
 def quality(hammer: Hammer) -> Result:
@@ -102,6 +97,7 @@ def ensemble(hammer: Hammer) -> EnsembleResult:
 
 
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
+    **CHAOS,
     "CompensationTable": compensation_table,
     "DampingStudy": damping_study,
     "DotTable": lambda hammer: not_none(ensemble(hammer).dots),

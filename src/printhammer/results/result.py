@@ -148,7 +148,7 @@ class Result:
         entries = sorted(self.entries().items(), key=lambda entry: entry[1][0].kind != "coordinate")
         dims = self.ROWS or next(note.dims for _name, (note, _values) in entries if note.kind == "column")
         columns = {
-            note.heading(name): (note.dims, _named(np.asarray(values), note))
+            note.heading(name): (note.dims, named_codes(np.asarray(values), note))
             for name, (note, values) in entries
             if note.dims and set(note.dims) <= set(dims)
         }
@@ -198,7 +198,7 @@ def _html_table(rows: Sequence[Sequence[str]]) -> str:
     return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
-def _named(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:
+def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:
     """Return codes by name, "" for those without one."""
     if not note.codes:
         return values

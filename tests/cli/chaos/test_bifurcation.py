@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
-from printhammer.chaos.bifurcation.diagram import InterruptedDiagram
+from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
 
 SHORT = ("--firings", "60", "--transient", "30", "--refine", "0")
 
@@ -59,7 +59,9 @@ def test_ctrl_c_writes_what_is_done(
     def interrupted(*_arguments: object, **_options: object) -> None:
         raise InterruptedDiagram(found)
 
-    monkeypatch.setattr(import_module("printhammer.chaos.bifurcation"), "bifurcation", interrupted)
+    monkeypatch.setattr(
+        import_module("printhammer.chaos.bifurcation.bifurcation"), "bifurcation", interrupted
+    )
     out = tmp_path / "diagram.csv"
     done = cli("bifurcation", "--values", "2", "--out", out)
     assert done.status == 130

@@ -26,8 +26,8 @@ def test_a_branch(cli: Callable, tmp_path: Path) -> None:
     assert table["period [s]"].to_numpy()[[0, -1]] == pytest.approx([2.95e-3, 3.05e-3], rel=1e-12)
     read = xr.load_dataset(paths["nc"], engine="scipy")
     np.testing.assert_array_equal(read["stable"].to_numpy()[0], np.ones(len(table)))
-    (found,) = json.loads(paths["json"].read_text("utf-8"))
-    assert found["closed"] == "no"
+    found = json.loads(paths["json"].read_text("utf-8"))
+    assert found["columns"]["closed"]["values"] == [0]
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert paths["pdf"].read_bytes().startswith(b"%PDF")
     assert b"<svg" in paths["svg"].read_bytes()

@@ -27,8 +27,8 @@ def test_one_train(cli: Callable, tmp_path: Path) -> None:
     assert table["exponent 1 [1/firing]"].map(float).tolist() == [found.exponents[0]]
     with xr.open_dataset(paths["nc"], engine="scipy") as chart:
         np.testing.assert_array_equal(chart["exponents"][0], found.exponents)
-    (train,) = json.loads(paths["json"].read_text("utf-8"))["trains"]
-    assert train["zero_one"] == found.zero_one.verdict
+    kept = json.loads(paths["json"].read_text("utf-8"))["columns"]
+    assert kept["zero_one"]["values"] == [found.zero_one.verdict]
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in paths["svg"].read_bytes()
 

@@ -60,8 +60,8 @@ def bifurcation(
 
     Ends with status 1 where a run stopped before its end. Ctrl-C writes what is done.
     """
-    from printhammer.chaos.bifurcation.diagram import InterruptedDiagram
-    from printhammer.chaos.bifurcation.diagram import bifurcation as computed
+    from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
+    from printhammer.chaos.bifurcation.bifurcation import bifurcation as computed
 
     start: Any = direction.replace("-", " ")
     axis = _axis(hammer, parameter, (lowest, highest), values, period, rate)
@@ -94,7 +94,6 @@ def _axis(
     """Return the parameter and its values as arguments of `printhammer.bifurcation`."""
     import numpy as np
 
-    from printhammer.chaos.bifurcation.tables import meaning_of
     from printhammer.drive.input import read_number
     from printhammer.run.regime import Regime
 
@@ -103,7 +102,7 @@ def _axis(
         raise InputError(f"--period and --rate: expected none of them where the {parameter} is changed")
     regime = Regime.of(hammer, period=_RANGE[0] if timed else period, rate=rate)
     regime.value(parameter)
-    unit, _meaning = meaning_of(regime, parameter)
+    unit = regime.quantity(parameter).si
     first, last = ends
     if parameter == "period":
         first, last = first or _RANGE[0], last or _RANGE[1]
@@ -144,7 +143,8 @@ def summary(result: Bifurcation, direction: str) -> Table:
 
 def sentences(result: Bifurcation) -> list[str]:
     """Return what the diagram tells: the routes to the first strange train, and hysteresis."""
-    from printhammer.chaos.bifurcation.windows import cells, hysteresis
+    from printhammer.chaos.bifurcation.diagram import hysteresis
+    from printhammer.chaos.bifurcation.windows import cells
 
     lines = [""]
     several = len(result.directions) > 1

@@ -161,7 +161,7 @@ def _columns(branch: Branch) -> tuple[Column[Any], ...]:
     unit = branch.unit if branch.unit != "1" else ""
     return (
         Column(branch.parameter, lambda event: event.value, unit=unit, format=".9g"),
-        Column("what happens", lambda event: event.told, left=True),
+        Column("what happens", lambda event: event.message, left=True),
         Column("multipliers", lambda event: "  ".join(multiplier(complex(m)) for m in event.multipliers)),
         Column("", lambda event: "" if event.sharp else "between two orbits", left=True),
     )
