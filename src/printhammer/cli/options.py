@@ -19,6 +19,9 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+DATA: Final = (".nc", ".zarr", ".csv", ".parquet", ".json")
+"""Endings of the files of every result, those of `printhammer.results.ENDINGS`."""
+
 
 @dataclass(frozen=True)
 class Option:
@@ -108,8 +111,9 @@ def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
     return Files(what, "FILE", type=Path, many=many, endings=endings, **more)
 
 
-def results(what: str, *endings: str) -> Files:
-    """Return the option `--out` of a verb whose result has files with these endings, and pictures."""
+def results(what: str, *more: str) -> Files:
+    """Return the option `--out` of a verb that has a result: data, a picture, or what else it can be."""
+    endings = (*DATA, *more)
     kinds = f"{what} ({', '.join(endings)}; SI)"
     return files(f"{kinds} or picture (.svg, .png, .pdf); may be given repeatedly.", *endings)
 

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from printhammer.cli import progress
 from printhammer.cli.options import Option
-from printhammer.cli.saving import writer
 from printhammer.cli.screen import heading
 from printhammer.cli.terminal import complain, console, say, warn
 from printhammer.errors import InputError
@@ -63,7 +62,7 @@ class Content:
     @classmethod
     def of(cls, result: Any, **options: Any) -> Content:
         """Return a result as content; `options` go to its `plot`."""
-        return cls(writer(result), lambda: result.plot(**options))
+        return cls(result.save, lambda: result.plot(**options))
 
     def write(self, path: Path) -> None:
         """Write a file; InputError if it cannot be written."""

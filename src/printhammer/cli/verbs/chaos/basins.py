@@ -38,7 +38,7 @@ _count = partial(opt.whole, panel=_BASINS)
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("Cells", ".nc", ".csv"),
+    out=opt.results("Cells"),
 )
 def basins(
     job: Job,

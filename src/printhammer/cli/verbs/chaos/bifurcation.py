@@ -37,7 +37,7 @@ _of = partial(opt.text, panel=_PARAMETER)
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("States (.nc), verdicts (.csv)", ".nc", ".csv"),
+    out=opt.results("States and verdicts"),
 )
 def bifurcation(
     job: Job,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from printhammer.cli import options as opt
-from printhammer.cli.runner import PICTURES, Answer, Content, Job, check_endings, verb
+from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, multiplier, table
 from printhammer.errors import InputError
 
@@ -44,7 +44,7 @@ def read_state(written: str, name: str) -> tuple[float, float]:
         "overlap": opt.overlapping(),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Branches", ".csv", ".nc", ".json"),
+    out=opt.results("Branches"),
 )
 def continue_(
     job: Job,
@@ -83,8 +83,6 @@ def continue_(
     from printhammer.chaos.continuation import regimes as of_regimes
     from printhammer.chaos.continuation.stability_chart import stability_chart
 
-    if second is not None:
-        check_endings(job.outputs, (".nc", *PICTURES))
     bounds = _both(lowest, highest, "--from", "--to", parameter)
     if regimes and (period, rate, firings, state, second) != (None,) * 5:
         raise InputError("--regimes: expected no --period, --rate, --firings, --state or --second beside it")

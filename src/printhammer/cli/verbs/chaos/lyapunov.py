@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
-from printhammer.cli.saving import writer
 from printhammer.cli.screen import Column, coloured, facts, table, train_line
 from printhammer.errors import InputError
 
@@ -34,7 +33,7 @@ _trains = partial(opt.text, panel=_TRAINS)
         "transient": opt.whole("Firings left out before.", default=1000),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Exponents", ".csv", ".nc", ".json"),
+    out=opt.results("Exponents"),
 )
 def lyapunov(
     job: Job,
@@ -72,7 +71,7 @@ def lyapunov(
     return Answer(
         shown,
         note=f"{train}; growth from firing {chart.first} to {chart.last}",
-        files={"out": Content(writer(chart), plot)},
+        files={"out": Content(chart.save, plot)},
         complaints=ended_early(chart.status),
     )
 

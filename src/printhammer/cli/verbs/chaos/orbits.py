@@ -47,7 +47,7 @@ _COLUMNS: Final[tuple[Column[Orbit], ...]] = (
         "guesses": _search("Guesses that are tried for each number of firings.", default=48),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Orbits", ".csv", ".nc", ".json"),
+    out=opt.results("Orbits"),
 )
 def orbits(job: Job, hammer: Hammer = opt.FIRED, units: Units = opt.UNITS, **passed: Any) -> Answer:
     """Search for the motions that repeat after some firings, stable or not, and tell what they do.

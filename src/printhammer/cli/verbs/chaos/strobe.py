@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         "tolerance": opt.TOLERANCE,
         "verdict": opt.switch("Judge firings 1001 to 2000.", default=True),
     },
-    out=opt.results("Points", ".csv", ".nc", ".json"),
+    out=opt.results("Points"),
 )
 def strobe(hammer: Hammer = opt.FIRED, units: Units = opt.UNITS, **passed: Any) -> Answer:
     """Fire a hammer without end and tell what its state is at each firing: periodic, or strange.

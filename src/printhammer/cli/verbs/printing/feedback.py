@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("Deviations", ".nc"),
+    out=opt.results("Deviations"),
     run=opt.files(
         "Picture of one run (.svg, .png, .pdf), or its drive (.toml); may be given repeatedly.",
         ".toml",

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
-from printhammer.cli.saving import writer
 from printhammer.cli.screen import facts
 from printhammer.cli.units import Units, with_unit
 from printhammer.cli.verbs.printing.strategy import FEEDBACK, TABLE, chosen_strategy
@@ -95,7 +94,7 @@ def print_(
     passed |= chosen_strategy(job, hammer, table, feedback)[0]
     with job.telling("printing"):
         page = print_page(hammer, asked, often, head=head, **passed)
-    save = writer(page)
+    save = page.save
     views: dict[str, Any] = {name: Content(save, partial(page.plot, view=name)) for name in ("zoom", "sheet")}
     return Answer(
         [facts(on_paper(page, units))],

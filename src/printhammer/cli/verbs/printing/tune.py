@@ -33,8 +33,10 @@ _ROWS: Final = 12
         "robust": opt.switch("Tune on hammers that differ a little as well."),
         "largest_current": opt.text("CURRENT", "Bound on the current.", default="2 A"),
     },
-    out=opt.results("Table", ".csv", ".json", ".h", ".nc"),
-    report=opt.files("Picture of gain and loss (.svg, .png, .pdf) or numbers (.nc).", ".nc", many=False),
+    out=opt.results("Table", ".h"),
+    report=opt.files(
+        "Picture of gain and loss (.svg, .png, .pdf) or numbers (.nc, .csv, ...).", *opt.DATA, many=False
+    ),
 )
 def tune(
     job: Job,

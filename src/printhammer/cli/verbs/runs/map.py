@@ -33,7 +33,7 @@ _count = partial(opt.whole, panel=_BURST)
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("Data", ".nc", ".zarr"),
+    out=opt.results("Data"),
 )
 def map_(
     job: Job,
