@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 
 EXAMPLE: Final = "Example: printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png"
 
-_SUFFIXES: Final = (".nc", ".csv")
 _MOST_RATES: Final = 200
 
 
@@ -83,13 +81,12 @@ def energy(
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.control.least_work.burst import least_work
-    from printhammer.control.least_work.tables import save_least_work
+    from printhammer.control.least_work.burst import LeastWork, least_work
     from printhammer.errors import InputError
     from printhammer.support.outputs import check_outputs
 
     wanted = out or []
-    check_endings(wanted, (*_SUFFIXES, *PICTURES))
+    check_endings(wanted, (*LeastWork.ENDINGS, *PICTURES))
     check_outputs(wanted, [Path(hammer)])
     given: dict[str, Any] = {
         "force": number(force, "force"),
@@ -120,7 +117,7 @@ def energy(
     if supply:
         screen.print()
         screen.print(supplied(found.under_supply(), found.count, units))
-    write_found(screen, wanted, found.plot, partial(save_least_work, found))
+    write_found(screen, wanted, found.plot, found.save)
     if found.adequate < found.count:
         complain(f"{found.adequate} of {found.count} dots are adequate")
         raise typer.Exit(1)
@@ -194,7 +191,6 @@ def _at_rates(hammer: Hammer, rates: list[float], options: dict[str, Any], wante
     from printhammer.cli.saving import write_found
     from printhammer.cli.terminal import complain, console, honesty, plain_table
     from printhammer.control.least_work.rates import FOUND, least_work_rates
-    from printhammer.support.outputs import write_dataset
 
     with counting("rates") as tell:
         found = least_work_rates(hammer, rates, progress=tell, **options)
@@ -208,8 +204,7 @@ def _at_rates(hammer: Hammer, rates: list[float], options: dict[str, Any], wante
         said = "" if status == FOUND else status
         table.add_row(f"{found.rates[row]:.6g}", f"{found.adequate[row]} of {found.count}", *known, said)
     screen.print(table)
-    data = found.to_dataset()
-    write_found(screen, wanted, found.plot, lambda path: write_dataset(path, data))
+    write_found(screen, wanted, found.plot, found.save)
     missing = int((found.status != FOUND).sum())
     if missing:
         complain(f"no current was found at {missing} of {found.status.size} rates")

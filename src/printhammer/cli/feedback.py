@@ -82,14 +82,14 @@ def feedback(
 
     from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
+    from printhammer.control.feedback.comparison import Feedback
     from printhammer.control.feedback.comparison import feedback as compared
-    from printhammer.control.feedback.tables import save_feedback
     from printhammer.drive.file import save_drive
     from printhammer.drive.input import read_number, read_positive
     from printhammer.support.outputs import check_outputs
 
     wanted, shown = out or [], run or []
-    check_endings(wanted, (".nc", *PICTURES))
+    check_endings(wanted, (*Feedback.ENDINGS, *PICTURES))
     check_endings(shown, (".toml", *PICTURES), "--run")
     check_outputs([*wanted, *shown], [Path(hammer)] if table is None else [Path(hammer), table])
     sensor = {
@@ -122,8 +122,8 @@ def feedback(
     screen = console()
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}\n")
     screen.print(told(found, units))
-    write_found(screen, wanted, found.plot, partial(save_feedback, found))
-    write_found(screen, shown, found.plot_run, partial(save_drive, found.seen.motion.drive))
+    write_found(screen, wanted, found.plot, found.save)
+    write_found(screen, shown, found.plot_run, partial(save_drive, found.run.motion.drive))
     bad = int((~found.passed[-1]).sum())
     if bad:
         complain(f"{bad} of {found.passed.shape[1]} patterns are not printed within limits with feedback")
