@@ -25,9 +25,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-_SOON: Final = 1e-6
-"""Least time by which a run is carried, s."""
-
+_SOON: Final = 1e-6  # Least time by which a run is carried, s
 _BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
 
 

@@ -50,8 +50,8 @@ BURST: Final = "11101101"
 MOST_GAPS: Final = 500
 """Number of gaps above which a double-pulse test is refused."""
 
+# First and last gap of the double-pulse test, in flight times of the single pulse, and their number
 _GAPS: Final = (1.5, 6.0, 46)
-"""First and last gap of the double-pulse test, in flight times of the single pulse, and their number."""
 
 
 class FeedbackStrategy:

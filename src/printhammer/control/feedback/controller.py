@@ -44,40 +44,25 @@ and does not begin before it."""
 WINDOW: Final = 120e-6
 """Time over which samples are looked at, s."""
 
+# Standard deviations that are expected at a touch: of the displacement, in parts of the way to the pack, and
+# of the speed, m/s
 _PLACE_ERROR: Final = 0.03
 _SPEED_ERROR: Final = 0.03
-"""Standard deviations that are expected at a touch: of the displacement, in parts of the way to the pack, and
-of the speed, m/s."""
-
+# Likewise after the first launch, beside what the scale of the currents makes of it
 _LAUNCH_ERRORS: Final = (0.005, 0.003)
-"""Likewise after the first launch, beside what the scale of the currents makes of it."""
-
+# Distance before the touch from which a contact is computed, in parts of the way to the pack
 _BEFORE: Final = 0.15
-"""Distance before the touch from which a contact is computed, in parts of the way to the pack."""
-
+# Time after a touch up to which its samples are looked at, in flight times of the single pulse
 _CONTACT: Final = 1.1
-"""Time after a touch up to which its samples are looked at, in flight times of the single pulse."""
-
+# Change of the time of a touch beyond which an estimate is not believed, in flight times
 _ASTRAY: Final = 0.4
-"""Change of the time of a touch beyond which an estimate is not believed, in flight times."""
-
+# Current, in parts of the largest one, that presses the armature against the backstop after a landing
 _CLAMP: Final = 1.0
-"""Current, in parts of the largest one, that presses the armature against the backstop after a landing."""
-
-_CLAMPED, _LONGEST = 0.6, 1.2
-"""How long it does, and at most where there is time, in flight times."""
-
-_FADED: Final = 3.0
-"""Time that is left for a current to fade, in time constants of the driver."""
-
-_CLEAR: Final = 0.22
-"""Part of the flight of a launch after which the armature is off the backstop."""
-
-_PATIENCE: Final = 40e-6
-"""Time between the end of a contact and a throw that is decided anew, s."""
-
-_POLICIES: Final = 8
-"""Number of policies that are kept."""
+_CLAMPED, _LONGEST = 0.6, 1.2  # How long it does, and at most where there is time, in flight times
+_FADED: Final = 3.0  # Time that is left for a current to fade, in time constants of the driver
+_CLEAR: Final = 0.22  # Part of the flight of a launch after which the armature is off the backstop
+_PATIENCE: Final = 40e-6  # Time between the end of a contact and a throw that is decided anew, s
+_POLICIES: Final = 8  # Number of policies that are kept
 
 
 class Ahead(NamedTuple):

@@ -34,21 +34,13 @@ MIDDLE: Final = 1
 
 @dataclass(frozen=True)
 class Fronts:
-    """Maps for packs at several distances.
+    """Maps for packs at several distances."""
 
-    Attributes
-    ----------
-    maps : tuple of ImpactMap
-        From touch to touch, one for each of `OFFSETS`, with the same touches and the same ways.
-    landings : tuple of Landing
-        Ways to land, likewise.
-    front_force : array, shape (T, A)
-        By how much the force grows with the distance of the front where the coil is switched as for the
-        nominal one: in parts of the single-pulse force for one way from backstop to pack.
-    """
-
+    # From touch to touch, one for each of `OFFSETS`, with the same touches and the same ways
     maps: tuple[ImpactMap, ...]
-    landings: tuple[Landing, ...]
+    landings: tuple[Landing, ...]  # Ways to land, likewise
+    # By how much the force grows with the distance of the front where the coil is switched as for the
+    # nominal one: in parts of the single-pulse force for one way from backstop to pack, (T, A)
     front_force: FloatArray
 
     @property

@@ -30,63 +30,37 @@ PUSHED, FREE = 0, 1
 ALWAYS: Final = 2e-3
 """Width of a push that is still on at the next touch, s."""
 
+# Speeds of the touches, in parts of that of the single pulse
 _PUSHED_SPEEDS: Final = np.linspace(0.3, 1.1, 17)
 _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)
-"""Speeds of the touches, in parts of that of the single pulse."""
-
-_RETURNS: Final = (0.0, -0.4, -1.0)
-"""Return currents, in parts of the largest one."""
+_RETURNS: Final = (0.0, -0.4, -1.0)  # Return currents, in parts of the largest one
 
 FORCES: Final = (0.95, 1.0, 1.05)
 """Forces for which ways are computed, in parts of that of the single pulse; only the return currents vary
 more slowly over the ways."""
 
+# Widths of the pushes that end before the touch, in parts of that of the launch
 _WIDTHS: Final = (0.85, 1.0, 1.2)
-"""Widths of the pushes that end before the touch, in parts of that of the launch."""
-
+# Times of releases, and of throws before and after the bounce, in flight times of the single pulse
 _RELEASES: Final = np.linspace(0.0, 0.85, 29)
 _EARLY: Final = np.linspace(0.14, 1.07, 38)
 _LATE: Final = np.linspace(1.1, 2.9, 48)
-"""Times of releases, and of throws before and after the bounce off the backstop, in flight times of the
-single pulse."""
-
-_WATCHED: Final = 3.0
-_WAIT: Final = 1.7
-"""Length of the runs for forces, and of the others after the throw, in flight times."""
-
+_WATCHED, _WAIT = 3.0, 1.7  # Length of the runs for forces, and of the others after the throw, likewise
+# Time after which next to nothing is left of a change of the current, in time constants of the driver
 _FADED: Final = 2.5
-"""Time after which next to nothing is left of a change of the current, in time constants of the driver."""
-
-_LARGEST_FORCE: Final = 1.15
-"""Force above which a way leads nowhere, in parts of that of the single pulse."""
+_LARGEST_FORCE: Final = 1.15  # Force above which a way leads nowhere, in parts of that of the single pulse
 
 
 @dataclass(frozen=True)
 class ForceMap:
-    """Peak force by touch (T,), return current (B,) and release (R,).
+    """Peak force by touch (T,), return current (B,) and release (R,)."""
 
-    Attributes
-    ----------
-    kind : int array, shape (T,)
-        `PUSHED` or `FREE`.
-    speed : array, shape (T,)
-        Of the touch, m/s; evenly spaced within a kind.
-    back : array, shape (B,)
-        Return currents, A.
-    release : array, shape (R,)
-        Time after the touch at which the push ends, s.
-    force : array, shape (T, B, R)
-        In parts of the single-pulse force.
-    front : float
-        Front of the pack, m.
-    """
-
-    kind: IntArray
-    speed: FloatArray
-    back: FloatArray
-    release: FloatArray
-    force: FloatArray
-    front: float
+    kind: IntArray  # `PUSHED` or `FREE`, (T,)
+    speed: FloatArray  # Of the touch, m/s; evenly spaced within a kind, (T,)
+    back: FloatArray  # Return currents, A, (B,)
+    release: FloatArray  # Time after the touch at which the push ends, s, (R,)
+    force: FloatArray  # In parts of the single-pulse force, (T, B, R)
+    front: float  # Front of the pack, m
 
     @property
     def off(self) -> int:
@@ -118,47 +92,24 @@ class ForceMap:
 
 @dataclass(frozen=True)
 class ImpactMap:
-    """Where the ways to switch the coil (A,) lead from the touches of a force map (T,).
+    """Where the ways to switch the coil (A,) lead from the touches of a force map (T,)."""
 
-    Attributes
-    ----------
-    back : array, shape (A,)
-        Return current, A.
-    fire : array, shape (A,)
-        Time after the touch at which the next push begins, s.
-    width : array, shape (A,)
-        Of that push, s; `ALWAYS` for one up to the next touch.
-    release : array, shape (T, A)
-        Time after the touch at which the push ends, s.
-    force : array, shape (T, A)
-        Peak force in parts of the single-pulse force; NaN where this way leads nowhere.
-    next_touch, next_speed : array, shape (T, A)
-        Time of the next touch after this one, s, and its speed, m/s; NaN likewise.
-    next_kind : int array, shape (A,)
-        `PUSHED` or `FREE`.
-    leaves : array, shape (T, A)
-        Time after the touch at which the armature leaves the pack, s.
-    kind, speed : array, shape (T,)
-        Of the touches, as in the force map.
-    forces : ForceMap
-        Peak force by release.
-    driver : Driver
-        Of the coil.
-    """
-
-    back: FloatArray
-    fire: FloatArray
-    width: FloatArray
-    release: FloatArray
+    back: FloatArray  # Return current, A, (A,)
+    fire: FloatArray  # Time after the touch at which the next push begins, s, (A,)
+    width: FloatArray  # Of that push, s; `ALWAYS` for one up to the next touch, (A,)
+    release: FloatArray  # Time after the touch at which the push ends, s, (T, A)
+    # Peak force in parts of the single-pulse force; NaN where this way leads nowhere, (T, A)
     force: FloatArray
+    # Time of the next touch after this one, s, and its speed, m/s; NaN likewise, (T, A)
     next_touch: FloatArray
     next_speed: FloatArray
-    next_kind: IntArray
-    leaves: FloatArray
+    next_kind: IntArray  # `PUSHED` or `FREE`, (A,)
+    leaves: FloatArray  # Time after the touch at which the armature leaves the pack, s, (T, A)
+    # Of the touches, as in the force map, (T,)
     kind: IntArray
     speed: FloatArray
-    forces: ForceMap
-    driver: Driver
+    forces: ForceMap  # Peak force by release
+    driver: Driver  # Of the coil
 
 
 def force_map(plant: Plant) -> ForceMap:

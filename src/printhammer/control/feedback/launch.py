@@ -15,39 +15,22 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.impact_map import ForceMap
     from printhammer.control.feedback.plant import Plant
 
+# Widths of pushes that are tried, in flight times of the single pulse
 _WIDTHS: Final = np.linspace(0.2, 1.0, 81)
-"""Widths of pushes that are tried, in flight times of the single pulse."""
-
-_LENGTH: Final = 4.0
-"""Length of their runs, likewise."""
-
-_ALMOST: Final = 0.9
-"""Force that the touch alone is to print, in parts of that of the single pulse."""
-
-_WEAKER: Final = 0.03
-"""Change of the scale of the currents from which derivatives are taken."""
+_LENGTH: Final = 4.0  # Length of their runs, likewise
+_ALMOST: Final = 0.9  # Force that the touch alone is to print, in parts of that of the single pulse
+_WEAKER: Final = 0.03  # Change of the scale of the currents from which derivatives are taken
 
 
 @dataclass(frozen=True)
 class Launch:
-    """A start from rest.
+    """A start from rest."""
 
-    Attributes
-    ----------
-    width : float
-        Of the push, s.
-    flight : float
-        From firing to touch, s.
-    speed : float
-        At the touch, m/s.
-    place_slope, speed_slope : float
-        By how much the displacement, m, and the speed, m/s, at the time of the touch grow with the currents,
-        for currents twice as large.
-    """
-
-    width: float
-    flight: float
-    speed: float
+    width: float  # Of the push, s
+    flight: float  # From firing to touch, s
+    speed: float  # At the touch, m/s
+    # By how much the displacement, m, and the speed, m/s, at the time of the touch grow with the
+    # currents, for currents twice as large
     place_slope: float
     speed_slope: float
 

@@ -26,12 +26,10 @@ FRONT_ERROR: Final = 0.04
 SCALE_ERROR: Final = 0.03
 """Standard deviation of the scale of the currents before the first flight."""
 
+# Standard deviations by which both may change from one decision to the next (process noise)
 _FRONT_DRIFT: Final = 0.002
 _SCALE_DRIFT: Final = 0.002
-"""Standard deviations by which both may change from one decision to the next (process noise)."""
-
-_FARTHEST: Final = 5.0
-"""Number of standard deviations from nominal beyond which nothing is believed."""
+_FARTHEST: Final = 5.0  # Number of standard deviations from nominal beyond which nothing is believed
 
 
 @dataclass
@@ -100,86 +98,44 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """A touch as it was when its push was decided, before the contact told where the front is.
+    """A touch as it was when its push was decided, before the contact told where the front is."""
 
-    Attributes
-    ----------
-    touch, speed, kind
-        Time, s, speed, m/s, and kind of the touch.
-    front : float
-        By how much the front was thought to be farther away, in parts of the way to the pack.
-    force, slope : float
-        Force in parts of the single-pulse force, and by how much it grows with the distance of the front.
-    back : float
-        Return current, A.
-    """
-
+    # Time, s, speed, m/s, and kind of the touch
     touch: float
     speed: float
     kind: int
-    front: float
+    front: float  # By how much the front was thought to be farther away, in parts of the way to the pack
+    # Force in parts of the single-pulse force, and by how much it grows with the distance of the front
     force: float
     slope: float
-    back: float
+    back: float  # Return current, A
 
 
 @dataclass
 class Loop:
-    """One run of the closed loop.
+    """One run of the closed loop."""
 
-    Attributes
-    ----------
-    slots : tuple of int
-        Numbers of the slots at which dots are wanted.
-    due : array, shape (dots,)
-        Times at which touches are wanted, s.
-    key : int
-        What tells the noise of this run from that of others.
-    state : array, shape (4,)
-        Displacement, m, velocity, m/s, mode, memory.
-    pulses : list of Pulse
-        All firings so far.
-    touch, speed, kind
-        The coming touch as it is expected: time, s, speed, m/s, and kind.
-    since : float
-        Time from which on the armature flies, s.
-    time : float
-        How far the run is carried, s.
-    alive : bool
-        Whether the run goes on.
-    launched : bool
-        Whether the coming touch is that of a launch from rest.
-    rests : bool
-        Whether the armature comes to rest, and is still to be launched.
-    learned : Learned
-        What the controller knows of the hammer by now.
-    touched : Touched or None
-        The latest touch, from which it learns.
-    printed : Printed or None
-        Likewise, where the throw after it is decided once more when the contact is over.
-    seen : list
-        What the sensor showed at each decision: times, s, and displacements, m.
-    touches : list of tuple
-        Time, s, and speed, m/s, of each touch as it was estimated.
-    """
-
-    slots: tuple[int, ...]
-    due: FloatArray
-    key: int
-    state: FloatArray
-    pulses: list[Pulse] = field(default_factory=list)
+    slots: tuple[int, ...]  # Numbers of the slots at which dots are wanted
+    due: FloatArray  # Times at which touches are wanted, s, (dots,)
+    key: int  # What tells the noise of this run from that of others
+    state: FloatArray  # Displacement, m, velocity, m/s, mode, memory, (4,)
+    pulses: list[Pulse] = field(default_factory=list)  # All firings so far
+    # The coming touch as it is expected: time, s, speed, m/s, and kind
     touch: float = 0.0
     speed: float = 0.0
     kind: int = 0
-    since: float = 0.0
-    time: float = 0.0
-    alive: bool = True
-    launched: bool = True
-    rests: bool = False
-    learned: Learned = field(default_factory=Learned)
-    touched: Touched | None = None
+    since: float = 0.0  # Time from which on the armature flies, s
+    time: float = 0.0  # How far the run is carried, s
+    alive: bool = True  # Whether the run goes on
+    launched: bool = True  # Whether the coming touch is that of a launch from rest
+    rests: bool = False  # Whether the armature comes to rest, and is still to be launched
+    learned: Learned = field(default_factory=Learned)  # What the controller knows of the hammer by now
+    touched: Touched | None = None  # The latest touch, from which it learns
+    # Likewise, where the throw after it is decided once more when the contact is over
     printed: Printed | None = None
+    # What the sensor showed at each decision: times, s, and displacements, m
     seen: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+    # Time, s, and speed, m/s, of each touch as it was estimated
     touches: list[tuple[float, float]] = field(default_factory=list)
 
     def wait(self, dot: int) -> float:

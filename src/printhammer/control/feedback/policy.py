@@ -33,32 +33,16 @@ NEVER: Final = 50.0
 KNOWN: Final = 0.01
 """Standard deviation of the front, in parts of the way to the pack, above which it counts as not known."""
 
-_DISCOUNT: Final = 0.9
-"""Discount of the costs of each further dot."""
-
-_ROUNDS: Final = 8
-"""Number of dots before a rest from which on more make no difference."""
-
-_LATENESS: Final = np.linspace(-0.9, 0.9, 13)
-"""Nodes of the lateness, in parts of the limit."""
-
-_SPEED_DOUBT: Final = 0.04
-"""Standard deviation of the speed of a touch, m/s."""
-
+_DISCOUNT: Final = 0.9  # Discount of the costs of each further dot
+_ROUNDS: Final = 8  # Number of dots before a rest from which on more make no difference
+_LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, in parts of the limit
+_SPEED_DOUBT: Final = 0.04  # Standard deviation of the speed of a touch, m/s
+# Slope of the next touch over the speed where there is no other touch to take it from, s / (m/s)
 _STEEPEST: Final = 2e-3
-"""Slope of the next touch over the speed where there is no other touch to take it from, s / (m/s)."""
-
-_NEAR: Final = 2
-"""Number of speeds to either side over which a way counts as steep."""
-
-_FAST: Final = 0.3
-"""Speed that is left after a landing, m/s, of cost 1."""
-
-_STEEP: Final = 8.0
-"""By how much more a deviation on its limit costs than its square."""
-
-_EFFORT: Final = 0.1
-"""Cost of the largest current over a whole period."""
+_NEAR: Final = 2  # Number of speeds to either side over which a way counts as steep
+_FAST: Final = 0.3  # Speed that is left after a landing, m/s, of cost 1
+_STEEP: Final = 8.0  # By how much more a deviation on its limit costs than its square
+_EFFORT: Final = 0.1  # Cost of the largest current over a whole period
 
 
 class Committed(NamedTuple):

@@ -21,49 +21,32 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.plant import Plant
     from printhammer.support.arrays import FloatArray
 
+# Beginnings and widths of the brake pulses of the first grid, in flight times of the single pulse
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
 _WIDTHS: Final = np.linspace(0.1, 0.75, 20)
-"""Beginnings and widths of the brake pulses of the first grid, in flight times of the single pulse."""
-
+# Finer grids about the best, and their half widths, likewise: each covers a step of the one before
 _NEAR: Final = np.linspace(-1.0, 1.0, 7)
 _FINER: Final = (0.034, 0.01, 0.003)
-"""Finer grids about the best, and their half widths, likewise: each covers a step of the one before."""
-
+# Time in which a distance from rest would be covered, by which it counts as a speed, likewise
 _FALL: Final = 1.0 / 3.0
-"""Time in which a distance from rest would be covered, by which it counts as a speed, likewise."""
-
+# Times after the touch at which the armature is to be at rest, likewise
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
-"""Times after the touch at which the armature is to be at rest, likewise."""
-
-_SETTLED: Final = 0.65
-"""Time after the brake pulse from which on it counts as at rest, likewise."""
+_SETTLED: Final = 0.65  # Time after the brake pulse from which on it counts as at rest, likewise
 
 
 @dataclass(frozen=True)
 class Landing:
-    """The best way to land, for each of the touches of a map (T,); NaN where the force cannot be had.
+    """The best way to land, for each of the touches of a map (T,); NaN where the force cannot be had."""
 
-    Attributes
-    ----------
-    release : array, shape (T,)
-        Time after the touch at which the push ends, s.
-    force : array, shape (T,)
-        Force in parts of the single-pulse force.
-    brake, width : array, shape (T,)
-        Time after the touch at which the brake pulse begins, and its width, s.
-    left : array, shape (T,)
-        Largest speed that is left, m/s; a distance from rest counts as the speed with which it is covered in
-        a third of the flight time of a single pulse.
-    settled : float
-        Time after the touch from which on the armature counts as at rest, s.
-    """
-
-    release: FloatArray
-    force: FloatArray
+    release: FloatArray  # Time after the touch at which the push ends, s, (T,)
+    force: FloatArray  # Force in parts of the single-pulse force, (T,)
+    # Time after the touch at which the brake pulse begins, and its width, s, (T,)
     brake: FloatArray
     width: FloatArray
+    # Largest speed that is left, m/s; a distance from rest counts as the speed with which it is covered
+    # in a third of the flight time of a single pulse, (T,)
     left: FloatArray
-    settled: float
+    settled: float  # Time after the touch from which on the armature counts as at rest, s
 
 
 def soft_landing(plant: Plant, forces: ForceMap) -> Landing:

@@ -79,14 +79,11 @@ Shape = Literal["free", "pulses"]
 SHAPES: Final = get_args(Shape)
 """What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths."""
 
+# End of a slot after its touch, in parts of the time in which a single pulse indents the pack
 _PAST_PEAK: Final = 1.2
-"""End of a slot after its touch, in parts of the time in which a single pulse indents the pack."""
-
-_SPARE: Final = 5e-4
-"""Part of the force by which a dot is planned to be harder than asked for."""
-
+_SPARE: Final = 5e-4  # Part of the force by which a dot is planned to be harder than asked for
+# Energy in motion below which a hammer counts as at rest, in parts of what a dot costs the pack
 _SETTLED: Final = 1e-2
-"""Energy in motion below which a hammer counts as at rest, in parts of what a dot costs the pack."""
 
 
 class NoBurstError(PrinthammerError):

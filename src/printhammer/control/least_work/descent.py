@@ -29,11 +29,8 @@ ARRIVAL: Final = 20e-6
 FORCE: Final = 0.05
 """Tolerance by which a force is measured, relative."""
 
-_DIFFERENCE: Final = 1e-5
-"""Difference from which derivatives are taken."""
-
-_ENDS_AT: Final = 1e-5
-"""Change of the cost at which a descent ends."""
+_DIFFERENCE: Final = 1e-5  # Difference from which derivatives are taken
+_ENDS_AT: Final = 1e-5  # Change of the cost at which a descent ends
 
 
 def descend(

@@ -37,32 +37,15 @@ if TYPE_CHECKING:
 GONE: Final = 1e-2
 """The current of a pulse has gone where less than this part of its peak is left."""
 
-_PER_SLOT: Final = 2
-"""Number of pulses of a slot."""
-
-_TRIED: Final = 1024
-"""Number of times and widths from the best of which a search begins."""
-
-_TRIES, _MOST_TRIES = 4, 10
-"""Number of searches, and while nothing is found."""
-
-_ROUNDS: Final = 40
-"""Steps of a search."""
-
-_SHORTEST: Final = 0.02
-"""Least width, in parts of the largest one."""
-
-_SAMPLES: Final = 301
-"""Instants of a slot at which the power is looked at."""
-
-_HALVINGS: Final = 60
-"""Halvings of an interval of widths: more than a double has bits to tell them apart."""
-
-_NONE: Final = 1e-9
-"""Part of a slot below which a width is none."""
-
-_WRONG: Final = 10.0
-"""Cost of a contact too many, or a run that failed, in parts of the loading work."""
+_PER_SLOT: Final = 2  # Number of pulses of a slot
+_TRIED: Final = 1024  # Number of times and widths from the best of which a search begins
+_TRIES, _MOST_TRIES = 4, 10  # Number of searches, and while nothing is found
+_ROUNDS: Final = 40  # Steps of a search
+_SHORTEST: Final = 0.02  # Least width, in parts of the largest one
+_SAMPLES: Final = 301  # Instants of a slot at which the power is looked at
+_HALVINGS: Final = 60  # Halvings of an interval of widths: more than a double has bits to tell them apart
+_NONE: Final = 1e-9  # Part of a slot below which a width is none
+_WRONG: Final = 10.0  # Cost of a contact too many, or a run that failed, in parts of the loading work
 
 
 class PulsePlan:

@@ -38,32 +38,16 @@ LEAD: Final = 2.0
 LANDING: Final = 5.0
 """Length of the landing, in flight times of the single pulse."""
 
-_FEWEST, _MOST = 8, 96
-"""Least and largest number of nodes of a slot."""
-
+_FEWEST, _MOST = 8, 96  # Least and largest number of nodes of a slot
+# Part of a step by which the current of a slot lasts longer than the slot, which cuts it off
 _OVERLAP: Final = 0.01
-"""Part of a step by which the current of a slot lasts longer than the slot, which cuts it off."""
-
-_LAGS: Final = 1e-3
-"""Lag in the pack up to which a current does, in `RELOADING`."""
-
-_WRONG: Final = 10.0
-"""Cost of a contact too many, or a run that failed, in parts of the loading work."""
-
-_PROFILES: Final = 512
-"""Number of profiles."""
-
-_TRIES, _MOST_TRIES = 3, 12
-"""Number of profiles from which a search begins, and while none is found."""
-
-_ROUNDS, _ROUNDS_AGAIN = 30, 20
-"""Steps of a search from a profile, and from what did for the slot before."""
-
-_SEARCH_TOLERANCE: Final = 5e-7
-"""Tolerance with which profiles are compared."""
-
-_INSIDE: Final = 1.0 - 1e-9
-"""A hair inside a bound, which rounding would exceed."""
+_LAGS: Final = 1e-3  # Lag in the pack up to which a current does, in `RELOADING`
+_WRONG: Final = 10.0  # Cost of a contact too many, or a run that failed, in parts of the loading work
+_PROFILES: Final = 512  # Number of profiles
+_TRIES, _MOST_TRIES = 3, 12  # Number of profiles from which a search begins, and while none is found
+_ROUNDS, _ROUNDS_AGAIN = 30, 20  # Steps of a search from a profile, and from what did for the slot before
+_SEARCH_TOLERANCE: Final = 5e-7  # Tolerance with which profiles are compared
+_INSIDE: Final = 1.0 - 1e-9  # A hair inside a bound, which rounding would exceed
 
 
 class NodePlan:

@@ -24,9 +24,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-_SAMPLES: Final = 301
-"""Instants of a slot at which power and motion are looked at."""
-
+_SAMPLES: Final = 301  # Instants of a slot at which power and motion are looked at
 _IN_PACK: Final = {
     "loading": 1,
     "unloading": 2,
@@ -36,15 +34,9 @@ _IN_PACK: Final = {
 }
 """Branch as `Ensemble` takes it, by the mode."""
 
-_MANY: Final = 64
-"""Number of runs from which on threads are worth their while."""
-
-_LEAST_SPEED: Final = 0.03
-"""Speed with which the armature is to leave the pack, m/s."""
-
-_CLEAR: Final = 2e-6
-"""Distance from where it turned from which on it leaves, m."""
-
+_MANY: Final = 64  # Number of runs from which on threads are worth their while
+_LEAST_SPEED: Final = 0.03  # Speed with which the armature is to leave the pack, m/s
+_CLEAR: Final = 2e-6  # Distance from where it turned from which on it leaves, m
 _SMOOTHING: Final = 1e-3
 """Weight of the squared current beside the positive work, so that no current is spent for nothing."""
 
@@ -54,25 +46,14 @@ RELOADING: Final = 1e-6
 
 @dataclass(frozen=True)
 class SlotState:
-    """How a slot begins.
+    """How a slot begins."""
 
-    Attributes
-    ----------
-    x, v : float
-        Displacement, m, and velocity, m/s.
-    branch : int
-        Code of the mode, as in `Strobes`, or -1 for none.
-    memory : float
-        As in `Strobes`, m.
-    current : float
-        Coil current, A.
-    """
-
+    # Displacement, m, and velocity, m/s
     x: float
     v: float
-    branch: int
-    memory: float
-    current: float
+    branch: int  # Code of the mode, as in `Strobes`, or -1 for none
+    memory: float  # As in `Strobes`, m
+    current: float  # Coil current, A
 
     @property
     def row(self) -> list[float]:
@@ -117,35 +98,19 @@ class _NodeDrive(Drive):
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What some currents do in a slot: arrays of shape (M,).
+    """What some currents do in a slot: arrays of shape (M,)."""
 
-    Attributes
-    ----------
-    positive, net : array
-        Work of the coil, J, good to about 1e-4 of itself.
-    squared_current : array
-        Integral of the squared current, A^2 s.
-    force : array
-        Largest force of the first dot, N; 0 without one.
-    arrival : array
-        Time of its touch since the slot began, s; NaN without one.
-    extra_contacts : int array
-        Further contacts.
-    reloading : array
-        How far the armature lagged, m, in the contact with which the slot begins: by which way it left the
-        pack slower than `_LEAST_SPEED`, once clear of where it turned, or went into it again.
-    ok : bool array
-        Whether the run went as asked.
-    """
-
+    # Work of the coil, J, good to about 1e-4 of itself
     positive: FloatArray
     net: FloatArray
-    squared_current: FloatArray
-    force: FloatArray
-    arrival: FloatArray
-    extra_contacts: npt.NDArray[np.int64]
+    squared_current: FloatArray  # Integral of the squared current, A^2 s
+    force: FloatArray  # Largest force of the first dot, N; 0 without one
+    arrival: FloatArray  # Time of its touch since the slot began, s; NaN without one
+    extra_contacts: npt.NDArray[np.int64]  # Further contacts
+    # How far the armature lagged, m, in the contact with which the slot begins: by which way it left
+    # the pack slower than `_LEAST_SPEED`, once clear of where it turned, or went into it again
     reloading: FloatArray
-    ok: npt.NDArray[np.bool_]
+    ok: npt.NDArray[np.bool_]  # Whether the run went as asked
 
 
 def node_times(duration: float, nodes: int) -> FloatArray:
@@ -155,36 +120,16 @@ def node_times(duration: float, nodes: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Task:
-    """What the slots of a burst have in common.
+    """What the slots of a burst have in common."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    coil : CoilForce
-        Force of its coil.
-    largest : float
-        Largest current of either sign, A.
-    slew : float
-        Largest slope of the current of either sign, A/s.
-    force : float
-        Least force of a dot, N.
-    loading : float
-        Loading work of such a dot, J, by which work is measured.
-    heat : bool
-        Whether the squared current is to be least instead of the positive work.
-    tolerance : float
-        As for `printhammer.simulate`.
-    """
-
-    hammer: Hammer
-    coil: CoilForce
-    largest: float
-    slew: float
-    force: float
-    loading: float
-    heat: bool
-    tolerance: float
+    hammer: Hammer  # The hammer
+    coil: CoilForce  # Force of its coil
+    largest: float  # Largest current of either sign, A
+    slew: float  # Largest slope of the current of either sign, A/s
+    force: float  # Least force of a dot, N
+    loading: float  # Loading work of such a dot, J, by which work is measured
+    heat: bool  # Whether the squared current is to be least instead of the positive work
+    tolerance: float  # As for `printhammer.simulate`
 
     def run(self, begin: SlotState, currents: FloatArray, duration: float, tolerance: float) -> Outcomes:
         """Run a slot of some duration, s, with many currents (M, nodes), A, at the nodes after the first."""

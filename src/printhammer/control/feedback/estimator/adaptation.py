@@ -30,21 +30,17 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
+# Standard deviation of what the nominal hammer says of a contact, in parts of the way to the pack
 _MODEL_ERROR: Final = 0.003
-"""Standard deviation of what the nominal hammer says of a contact, in parts of the way to the pack."""
-
-_GRID: Final = 1.0 / 128.0
-"""Step of the fronts at which contacts are computed, likewise."""
-
+_GRID: Final = 1.0 / 128.0  # Step of the fronts at which contacts are computed, likewise
+# Differences from which derivatives are taken: of the front in steps of the grid, of the scale of the
+# currents, of the displacement in parts of the way to the pack, and of the speed, m/s
 _FRONT_STEPS: Final = 4
 _SCALE_STEP: Final = 0.03
 _PLACE_STEP: Final = 0.005
 _SPEED_STEP: Final = 0.02
-"""Differences from which derivatives are taken: of the front in steps of the grid, of the scale of the
-currents, of the displacement in parts of the way to the pack, and of the speed, m/s."""
-
+# Mean square of what is left of the samples, in variances, above which a contact is not believed
 _STRANGE: Final = 9.0
-"""Mean square of what is left of the samples, in variances, above which a contact is not believed."""
 
 
 class Contacts:

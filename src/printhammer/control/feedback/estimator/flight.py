@@ -26,27 +26,15 @@ if TYPE_CHECKING:
 
     Accelerations = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
-_ROUNDS: Final = 3
-"""Iterations: of a path, of a fit, and of the time of a touch."""
-
-_NODES: Final = 65
-"""Nodes of a path in time."""
-
-_SLOWEST: Final = 1e-2
-"""Least speed of a touch, m/s."""
-
-_SHORTEST: Final = 1e-6
-"""Least length of a flight, s."""
-
+_ROUNDS: Final = 3  # Iterations: of a path, of a fit, and of the time of a touch
+_NODES: Final = 65  # Nodes of a path in time
+_SLOWEST: Final = 1e-2  # Least speed of a touch, m/s
+_SHORTEST: Final = 1e-6  # Least length of a flight, s
+# Differences from which derivatives are taken: of the speed in parts of it, and of the scale of currents
 _STEP: Final = 0.01
 _SCALE_STEP: Final = 0.02
-"""Differences from which derivatives are taken: of the speed in parts of it, and of the scale of currents."""
-
-_BENDS: Final = 2
-"""Iterations of a path in a fit."""
-
-_PLACES, _CURRENTS = 97, 129
-"""Numbers of displacements and currents of the table of forces."""
+_BENDS: Final = 2  # Iterations of a path in a fit
+_PLACES, _CURRENTS = 97, 129  # Numbers of displacements and currents of the table of forces
 
 
 class FreeForce:
@@ -91,24 +79,14 @@ class Expected:
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight as the samples tell it.
+    """A flight as the samples tell it."""
 
-    Attributes
-    ----------
-    touch, speed : array, shape (M,)
-        Time, s, and speed, m/s, of the coming touch.
-    scale : array, shape (M,)
-        By which part all currents are larger than they should be.
-    reference : array, shape (M,)
-        Time, s, for which `state` and `covariance` hold.
-    state, covariance : array, shape (M, 3) and (M, 3, 3)
-        Displacement, m, speed, m/s, and scale, and their covariance.
-    """
-
+    # Time, s, and speed, m/s, of the coming touch, (M,)
     touch: FloatArray
     speed: FloatArray
-    scale: FloatArray
-    reference: FloatArray
+    scale: FloatArray  # By which part all currents are larger than they should be, (M,)
+    reference: FloatArray  # Time, s, for which `state` and `covariance` hold, (M,)
+    # Displacement, m, speed, m/s, and scale, and their covariance, (M, 3)
     state: FloatArray
     covariance: FloatArray
 

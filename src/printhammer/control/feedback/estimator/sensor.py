@@ -22,11 +22,10 @@ if TYPE_CHECKING:
     Words = npt.NDArray[np.uint64]
 
 
+# Least standard deviation that a sample counts with, in parts of the way from backstop to pack
 _LEAST_ERROR: Final = 1e-4
-"""Least standard deviation that a sample counts with, in parts of the way from backstop to pack."""
-
+# Part of an interval by which a sample may lie beyond a boundary, so that no rounding decides
 _SLACK: Final = 1e-6
-"""Part of an interval by which a sample may lie beyond a boundary, so that no rounding decides."""
 
 
 class Samples(NamedTuple):
