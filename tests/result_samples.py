@@ -96,19 +96,52 @@ def ensemble(hammer: Hammer) -> EnsembleResult:
     return ph.Ensemble(hammer, drives, 6e-3).run(dots=True, strobes="firings", times=[1e-3, 2e-3, 3e-3])
 
 
+def feedback(hammer: Hammer) -> Result:
+    from tests.control.feedback.by_hand import by_hand
+
+    return by_hand(hammer)
+
+
+def least_work(hammer: Hammer) -> Result:
+    import pytest
+    from tests.control.least_work.test_burst import let_go, thrown
+
+    from printhammer.control.least_work import search
+    from printhammer.control.least_work.burst import least_work
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "printing_current", thrown)
+        patch.setattr(search, "landing_current", let_go)
+        return least_work(hammer, rate="400 Hz", dots=2, force=0.3)
+
+
+def least_work_rates(hammer: Hammer) -> Result:
+    import numpy as np
+
+    from printhammer.control.least_work.rates import LeastWorkRates
+
+    ratio = np.array([1.2, np.nan])
+    status = np.array(["ok", "no current found"])
+    return LeastWorkRates(
+        hammer, np.array([400.0, 4e3]), 2, ratio, ratio, ratio, ratio, np.array([2, 0]), status
+    )
+
+
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     **CHAOS,
     "CompensationTable": compensation_table,
     "DampingStudy": damping_study,
     "DotTable": lambda hammer: not_none(ensemble(hammer).dots),
     "EnsembleResult": ensemble,
+    "Feedback": feedback,
     "Fit": fit,
+    "LeastWork": least_work,
+    "LeastWorkRates": least_work_rates,
     "Measurement": lambda hammer: ph.measure("pack", hammer, seed=1, points=5),
     "Motion": lambda hammer: ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=20),
     "Page": page,
     "Quality": quality,
     "SafeRate": safe_rate,
-    "Strobe": lambda hammer: ph.strobe(hammer, period=0.0013, points=5, verdict=False),
     "Strobes": lambda hammer: not_none(ensemble(hammer).strobes),
     "TableReport": table_report,
     "ToleranceYield": tolerance_yield,

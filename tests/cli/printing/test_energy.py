@@ -6,13 +6,13 @@ import xarray as xr
 from tests.control.test_least_work import let_go, thrown
 from tests.hammers import CRUDE
 
-from printhammer.control import least_work as module
+from printhammer.control.least_work import search
 
 
 @pytest.fixture
 def unsearched(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "printing_current", thrown)
-    monkeypatch.setattr(module, "landing_current", let_go)
+    monkeypatch.setattr(search, "printing_current", thrown)
+    monkeypatch.setattr(search, "landing_current", let_go)
 
 
 def test_a_burst_and_its_files(cli: Callable, tmp_path: Path, unsearched: None) -> None:
@@ -24,7 +24,7 @@ def test_a_burst_and_its_files(cli: Callable, tmp_path: Path, unsearched: None) 
     assert "2 of 2 adequate at 400 Hz" in done.out
     assert "positive work W+" in done.out
     assert "+3.0 %" in done.out
-    assert paths["csv"].read_text("utf-8").startswith("time [us],current [A]\n")
+    assert "\ntime [us],current [A]\n" in paths["csv"].read_text("utf-8")
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in paths["svg"].read_bytes()
 

@@ -31,12 +31,7 @@ _MOST_RATES: Final = 200
         "spacing": opt.text("TIME", "Time between nodes of the current, such as '50 us'."),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.files(
-        "Burst (.nc), its current as a sampled waveform (.csv), or picture (.svg, .png, .pdf);"
-        " may be given repeatedly.",
-        ".nc",
-        ".csv",
-    ),
+    out=opt.results("Burst, as .csv its current as a sampled waveform"),
 )
 def energy(
     job: Job,

@@ -77,7 +77,7 @@ def feedback(
         [compared_ways(result, units)],
         files={
             "out": Content.of(result),
-            "run": Content(partial(save_drive, result.seen.motion.drive), result.plot_run),
+            "run": Content(partial(save_drive, result.run.motion.drive), result.plot_run),
         },
         complaints=[complaint] if bad else [],
     )
