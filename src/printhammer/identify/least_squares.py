@@ -52,46 +52,31 @@ class Law(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Parameters and what the residuals say.
-
-    Attributes
-    ----------
-    p : array, shape (n,)
-        Parameters.
-    covariance : array, shape (n, n)
-        Of the parameters.
-    fitted, residuals : array, shape (m,)
-        The law, and the data less the law.
-    jacobian : array, shape (m, n)
-        At `p`.
-    variance : array, shape (m,)
-        Of the noise in each row; all 1 where the data are exact.
-    outliers : array of bool, shape (m,)
-        Rows left out.
-    degrees_of_freedom : int
-        Rows used less parameters.
-    freedoms : array, shape (n,)
-        Degrees of freedom with which the variance of each parameter is known.
-    residual_scale : float
-        Root of the sum of squared residuals over the degrees of freedom.
-    condition_number : float
-        Of the weighted Jacobian with columns of unit length.
-    exact : bool
-        Whether the residuals are no more than rounding.
-    """
+    """Parameters and what the residuals say."""
 
     p: FloatArray
+    """Parameters, shape (n,)."""
     covariance: FloatArray
+    """Of the parameters, shape (n, n)."""
     fitted: FloatArray
     residuals: FloatArray
+    """The law, and the data less the law, shape (m,)."""
     jacobian: FloatArray
+    """At `p`, shape (m, n)."""
     variance: FloatArray
+    """Of the noise in each row; all 1 where the data are exact. Shape (m,)."""
     outliers: npt.NDArray[np.bool_]
+    """Rows left out, shape (m,)."""
     degrees_of_freedom: int
+    """Rows used less parameters."""
     freedoms: FloatArray
+    """Degrees of freedom with which the variance of each parameter is known. Shape (n,)."""
     residual_scale: float
+    """Root of the sum of squared residuals over the degrees of freedom."""
     condition_number: float
+    """Of the weighted Jacobian with columns of unit length."""
     exact: bool
+    """Whether the residuals are no more than rounding."""
 
     @property
     def used(self) -> npt.NDArray[np.bool_]:

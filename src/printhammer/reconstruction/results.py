@@ -186,15 +186,10 @@ _Model = TypeVar("_Model", bound=_Table)
 
 @dataclass(frozen=True)
 class Results:
-    """The results in a folder; each is None where its file is absent.
-
-    Attributes
-    ----------
-    folder : Path or Traversable
-        The folder.
-    """
+    """The results in a folder; each is None where its file is absent."""
 
     folder: Path | Traversable
+    """The folder."""
 
     @cached_property
     def base_rates(self) -> BaseRates | None:

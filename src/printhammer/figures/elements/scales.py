@@ -20,24 +20,16 @@ Name = Literal["displacement", "velocity", "force", "time", "current"]
 
 @dataclass(frozen=True)
 class Scale:
-    """How a quantity is shown.
-
-    Attributes
-    ----------
-    label : str
-        Name on the axis.
-    si : str
-        SI unit of the numbers inside.
-    unit : str
-        Unit of the numbers drawn.
-    other : str
-        Unit of the opposite axis; empty for none.
-    """
+    """How a quantity is shown."""
 
     label: str
+    """Name on the axis."""
     si: str
+    """SI unit of the numbers inside."""
     unit: str
+    """Unit of the numbers drawn."""
     other: str = ""
+    """Unit of the opposite axis; empty for none."""
 
     @property
     def factor(self) -> float:

@@ -75,27 +75,18 @@ _LEAST: Final = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """What is there to be measured.
-
-    Attributes
-    ----------
-    what : str
-        One line that says what is measured, and how.
-    true : dict of str to array, shape (rows,)
-        Columns by name, SI, before noise and resolution.
-    words : dict of str to tuple of str
-        Columns of words.
-    exact : tuple of str
-        Columns that have no error, such as the time.
-    suspect : str
-        Column in which wrong readings occur.
-    """
+    """What is there to be measured."""
 
     what: str
+    """One line that says what is measured, and how."""
     true: dict[str, FloatArray]
+    """Columns by name, SI, before noise and resolution, shape (rows,)."""
     suspect: str
+    """Column in which wrong readings occur."""
     words: dict[str, tuple[str, ...]]
+    """Columns of words."""
     exact: tuple[str, ...] = ()
+    """Columns that have no error, such as the time."""
 
 
 def magnet(

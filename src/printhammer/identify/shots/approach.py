@@ -33,21 +33,14 @@ _TRIES: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known of the parameters beside the records: normal, (p - mean) with a covariance.
-
-    Attributes
-    ----------
-    which : int array, shape (k,)
-        Numbers of the parameters.
-    mean : array, shape (k,)
-        SI.
-    covariance : array, shape (k, k)
-        SI.
-    """
+    """What is known of the parameters beside the records: normal, (p - mean) with a covariance."""
 
     which: npt.NDArray[np.int64]
+    """Numbers of the parameters, shape (k,)."""
     mean: FloatArray
+    """SI, shape (k,)."""
     covariance: FloatArray
+    """SI, shape (k, k)."""
 
 
 class Approach:

@@ -55,38 +55,28 @@ _NO_MOTION: Final = "the hammer does not move so that the records could be compa
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the fit ended.
-
-    Attributes
-    ----------
-    values : array, shape (p,)
-        Parameters, SI.
-    covariance : array, shape (p, p)
-        SI.
-    states : list of array
-        States at the joints of each shot.
-    shown, by_parameter : list of array, shape (n,) and (n, p)
-        The model of each record, m, and its derivatives with respect to the parameters in their scales.
-    outliers : list of bool array
-        Samples left out.
-    scales, memories : array, shape (shots,)
-        Standard deviation of the residuals, m, and the factor by which their memory increases variances.
-    design : array
-        Rows of data and prior over their standard errors, columns counted in the scales.
-    cost : float
-        Weighted sum of squares, prior included.
-    """
+    """Where the fit ended."""
 
     values: FloatArray
+    """Parameters, SI, shape (p,)."""
     covariance: FloatArray
+    """SI, shape (p, p)."""
     states: list[FloatArray]
+    """States at the joints of each shot."""
     shown: list[FloatArray]
     by_parameter: list[FloatArray]
+    """The model of each record, m, and its derivatives with respect to the parameters in their scales. Shape
+    (n,) and (n, p)."""
     outliers: list[npt.NDArray[np.bool_]]
+    """Samples left out."""
     scales: FloatArray
     memories: FloatArray
+    """Standard deviation of the residuals, m, and the factor by which their memory increases variances. Shape
+    (shots,)."""
     design: FloatArray
+    """Rows of data and prior over their standard errors, columns counted in the scales."""
     cost: float
+    """Weighted sum of squares, prior included."""
 
 
 class GaussNewton:

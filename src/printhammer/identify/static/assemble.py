@@ -29,34 +29,23 @@ _GRID: Final = 25
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """The data of a fit and where they were measured.
-
-    Attributes
-    ----------
-    files : tuple of Path
-        The tables.
-    kind : str
-        "magnet", "spring", "pack" or "backstop".
-    abscissa, values : array, shape (m,)
-        SI.
-    axes : tuple of tuple of str
-        Names and SI units.
-    series : array of int, shape (m,)
-        Place in `series_names`.
-    series_names : tuple of str
-        For the legend.
-    lines : array of int, shape (m,)
-        Lines of the files.
-    """
+    """The data of a fit and where they were measured."""
 
     files: tuple[Path, ...]
+    """The tables."""
     kind: str
+    """One of "magnet", "spring", "pack" and "backstop"."""
     abscissa: FloatArray
     values: FloatArray
+    """SI, shape (m,)."""
     axes: tuple[tuple[str, str], tuple[str, str]]
+    """Names and SI units."""
     series: npt.NDArray[np.int64]
+    """Place in `series_names`, shape (m,)."""
     series_names: tuple[str, ...]
+    """For the legend."""
     lines: npt.NDArray[np.int64]
+    """Lines of the files, shape (m,)."""
 
 
 def assemble(

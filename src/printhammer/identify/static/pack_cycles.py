@@ -25,21 +25,14 @@ _FALL: Final = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Branch and load cycle of each row.
-
-    Attributes
-    ----------
-    unloading : array of bool, shape (m,)
-        Whether a row is on the unloading branch.
-    cycle : array of int, shape (m,)
-        Number of the load cycle, from 0.
-    unloaded : array of int
-        Cycles with rows of unloading inside the pack, ascending.
-    """
+    """Branch and load cycle of each row."""
 
     unloading: npt.NDArray[np.bool_]
+    """Whether a row is on the unloading branch, shape (m,)."""
     cycle: npt.NDArray[np.int64]
+    """Number of the load cycle, from 0, shape (m,)."""
     unloaded: npt.NDArray[np.int64]
+    """Cycles with rows of unloading inside the pack, ascending."""
 
 
 def cycles_of(table: Table) -> Cycles:

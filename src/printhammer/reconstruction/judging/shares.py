@@ -15,18 +15,12 @@ _Z: Final = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)
 
 @dataclass(frozen=True)
 class Share:
-    """Of `measured` hammers something holds for `holds`.
-
-    Attributes
-    ----------
-    measured : int
-        Number of hammers, at least one.
-    holds : int
-        Number of those for which it holds.
-    """
+    """Of `measured` hammers something holds for `holds`."""
 
     measured: int
+    """Number of hammers, at least one."""
     holds: int
+    """Number of those for which it holds."""
 
     @property
     def rate(self) -> float:
