@@ -57,6 +57,8 @@ def family(
 ) -> Figure:
     """Draw the constants of a family over those of a hammer, and below them the conclusions.
 
+    A dot for each member in each row.
+
     Parameters
     ----------
     hammer : Hammer
@@ -70,11 +72,6 @@ def family(
         drawn.
     order : str, optional
         Conclusion by which members are coloured, light to dark, in all panels.
-
-    Returns
-    -------
-    Figure
-        A dot for each member in each row.
     """
     from matplotlib.colors import LinearSegmentedColormap
 

@@ -58,16 +58,8 @@ _NAMED: Final = 6
 def plot(fit: Fit) -> Figure:
     """Draw a fit.
 
-    Parameters
-    ----------
-    fit : Fit
-        From `printhammer.identify`.
-
-    Returns
-    -------
-    Figure
-        Data with the law, residuals below; on the right the correlation of the constants and the residuals
-        against those of a normal distribution. Outliers that were left out are ringed.
+    Data with the law, residuals below; on the right the correlation of the constants and the residuals
+    against those of a normal distribution. Outliers that were left out are ringed.
 
     Raises
     ------

@@ -189,7 +189,6 @@ class Results:
     """The results in a folder; each is None where its file is absent."""
 
     folder: Path | Traversable
-    """The folder."""
 
     @cached_property
     def base_rates(self) -> BaseRates | None:

@@ -39,7 +39,6 @@ class Plan:
     """A spec and what follows from it."""
 
     spec: Spec
-    """The spec."""
     shape: tuple[int, ...]
     """Members along each dimension."""
     dims: tuple[str, ...]

@@ -48,7 +48,6 @@ class Spec:
     base: Base
     """What all members have in common."""
     axes: tuple[Axis, ...]
-    """The axes."""
     design: str
     """Either "grid" or "latin-hypercube"."""
     members: int | None

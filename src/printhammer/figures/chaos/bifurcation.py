@@ -69,10 +69,11 @@ def plot(
 ) -> Figure:
     """Draw a bifurcation diagram.
 
+    Black: points to which all directions lead; blue and orange: points to which only rising or falling values
+    do. The bands below tell the verdicts.
+
     Parameters
     ----------
-    diagram : Bifurcation
-        From `printhammer.bifurcation`.
     show : str, optional
         "x": displacements at the firings; "v": velocities.
     orbits : iterable, optional
@@ -82,12 +83,6 @@ def plot(
     limits : tuple of float, optional
         Least and largest displacement or velocity shown, SI; by default all but one in a thousand at
         either end are shown, and the others counted.
-
-    Returns
-    -------
-    Figure
-        The figure. Black: points to which all directions lead; blue and orange: points to which only rising
-        or falling values do. The bands below tell the verdicts.
 
     Raises
     ------

@@ -64,6 +64,8 @@ def plot(
 ) -> Figure:
     """Draw branches against their constant.
 
+    A colour for each number of firings.
+
     Parameters
     ----------
     branches : Branch or Branches
@@ -74,11 +76,6 @@ def plot(
         Whether grazings are marked beside folds, period doublings and the like.
     limits : tuple of float, optional
         Ends of the upward axis, SI.
-
-    Returns
-    -------
-    Figure
-        The figure; a colour for each number of firings.
 
     Raises
     ------

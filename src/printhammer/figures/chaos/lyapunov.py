@@ -42,15 +42,7 @@ _SIGMAS: Final = 3.0
 def plot(found: Lyapunov) -> Figure:
     """Draw the running estimates of both exponents against the number of firings.
 
-    Parameters
-    ----------
-    found : Lyapunov
-        From `printhammer.lyapunov`.
-
-    Returns
-    -------
-    Figure
-        The figure; bands reach three standard errors to either side.
+    Bands reach three standard errors to either side.
     """
     figure = new_figure(4.6)
     upper, lower = figure.subplots(2, 1, sharex=True)
@@ -110,16 +102,8 @@ def _middle(ax: Axes) -> float:
 def plot_chart(chart: LyapunovChart) -> Figure:
     """Draw both exponents and the K of the 0-1 test against the time between firings.
 
-    Parameters
-    ----------
-    chart : LyapunovChart
-        From `printhammer.chaos.lyapunovs`.
-
-    Returns
-    -------
-    Figure
-        The figure; bars reach three standard errors to either side, open marks are trains on which exponent
-        and 0-1 test do not both decide, or do not agree.
+    Bars reach three standard errors to either side, open marks are trains on which exponent and 0-1 test do
+    not both decide, or do not agree.
     """
     figure = new_figure(6.0)
     grid = figure.add_gridspec(3, 1, height_ratios=(3.0, 2.0, 2.0), hspace=0.04)
@@ -193,16 +177,7 @@ def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
 def plot_zero_one(found: ZeroOne) -> Figure:
     """Draw what the 0-1 test looks at: the path, its mean square displacement, and the correlations.
 
-    Parameters
-    ----------
-    found : ZeroOne
-        From `printhammer.zero_one`.
-
-    Returns
-    -------
-    Figure
-        The figure; path and displacement are those of the angle with the median correlation, ringed at the
-        right.
+    Path and displacement are those of the angle with the median correlation, ringed at the right.
     """
     figure = new_figure(2.9)
     path, growth, angles = figure.subplots(1, 3)

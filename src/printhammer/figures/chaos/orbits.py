@@ -55,19 +55,14 @@ _LINES: Final = ("-", "--", "-.", ":")
 def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) -> Figure:
     """Draw orbits at their firings over the strobe points of the train from rest, and some against time.
 
+    Stable orbits are filled marks, all others open ones; the first few are drawn against time below.
+
     Parameters
     ----------
-    orbits : Orbits
-        From `printhammer.orbits`.
     points : int, optional
         Number of strobe points; 0 for none.
     longest : int, optional
         Leave out orbits of more firings.
-
-    Returns
-    -------
-    Figure
-        Stable orbits are filled marks, all others open ones; the first few are drawn against time below.
     """
     shown = [orbit for orbit in orbits if longest is None or orbit.firings <= longest]
     traced = shown[:_TRACES]
@@ -89,15 +84,7 @@ def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) ->
 def plot_orbit(orbit: Orbit) -> Figure:
     """Draw one orbit: its curve in the plane of displacement and velocity, and displacement against time.
 
-    Parameters
-    ----------
-    orbit : Orbit
-        The orbit.
-
-    Returns
-    -------
-    Figure
-        Marks are the states at the firings.
+    Marks are the states at the firings.
 
     Raises
     ------

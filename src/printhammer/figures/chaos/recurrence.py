@@ -28,15 +28,7 @@ _NAMES: Final = {
 def plot(found: Recurrence) -> Figure:
     """Draw a recurrence plot: a point where two states lie within the threshold of each other.
 
-    Parameters
-    ----------
-    found : Recurrence
-        From `printhammer.recurrence`.
-
-    Returns
-    -------
-    Figure
-        The figure, the quantities beside the plot.
+    The quantities stand beside the plot.
     """
     from matplotlib.colors import ListedColormap
 

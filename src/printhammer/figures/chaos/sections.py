@@ -29,15 +29,7 @@ if TYPE_CHECKING:
 def plot(section: Section) -> Figure:
     """Draw the touches of a surface: velocity against the time since the last firing.
 
-    Parameters
-    ----------
-    section : Section
-        From `printhammer.section`.
-
-    Returns
-    -------
-    Figure
-        The figure; the whole period is shown.
+    The whole period is shown.
     """
     figure = new_figure(4.2)
     ax = figure.add_subplot()

@@ -43,22 +43,17 @@ def plot(
 ) -> Figure:
     """Draw the largest sensitivities of one dot, or of the whole run.
 
+    A bar is the relative change of the quantity for a relative change of the constant: with a bar of 2, one
+    per cent of the constant makes two per cent of the quantity. Constants that are zero have none.
+
     Parameters
     ----------
-    found : Sensitivities
-        From `printhammer.sensitivities`.
     dot : int, optional
         Number of the firing, from 0; by default the first that struck.
     quantities : sequence of str, optional
         Quantities of a dot or of the run, one panel each.
     bars : int, optional
         Largest number of constants in a panel.
-
-    Returns
-    -------
-    Figure
-        A bar is the relative change of the quantity for a relative change of the constant: with a bar of 2,
-        one per cent of the constant makes two per cent of the quantity. Constants that are zero have none.
 
     Raises
     ------

@@ -38,16 +38,8 @@ _REGION: Final = "#cfe3f1"
 def plot(chart: StabilityChart) -> Figure:
     """Draw a stability chart.
 
-    Parameters
-    ----------
-    chart : StabilityChart
-        From `printhammer.stability_chart`.
-
-    Returns
-    -------
-    Figure
-        The first constant to the right, the second upward. Shaded: where the train from rest settles to the
-        orbit's period; grey: where its run stopped.
+    The first constant to the right, the second upward. Shaded: where the train from rest settles to the
+    orbit's period; grey: where its run stopped.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

@@ -49,17 +49,12 @@ RING: Final[dict[str, Any]] = {
 def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
     """Draw strobe points: velocity against displacement, the backstop, and the verdict.
 
+    Rings are the last points of a periodic train.
+
     Parameters
     ----------
-    strobe : Strobe
-        From `printhammer.strobe`.
     fit : bool, optional
         Whether the axes end close about the points, instead of at the window of Fig. 11.
-
-    Returns
-    -------
-    Figure
-        The figure; rings are the last points of a periodic train.
     """
     figure = new_figure(4.6)
     ax = figure.add_subplot()
@@ -110,10 +105,6 @@ def panel(
 
     Parameters
     ----------
-    ax : Axes
-        The axes.
-    strobe : Strobe
-        The points.
     window : Window
         Limits of the axes; points outside are counted in a corner.
     way, speed : Scale

@@ -41,18 +41,7 @@ _BINS: Final = 41
 
 @styled
 def plot(table: CompensationTable) -> Figure:
-    """Draw a table: as maps of history by history at one or few rates, else against the rate.
-
-    Parameters
-    ----------
-    table : CompensationTable
-        From `printhammer.tune`.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Draw a table: as maps of history by history at one or few rates, else against the rate."""
     figure = _few_rates(table) if table.rates.size < _FEW else _many_rates(table)
     told = f"{table.hammer} · {table.fingerprint[:8]} · at most {table.largest_current:g} A"
     text = figure.supxlabel(told, x=0.99, ha="right", fontsize=TINY, color=MUTED)
@@ -138,16 +127,8 @@ def _many_rates(table: CompensationTable) -> Figure:
 def plot_report(report: TableReport) -> Figure:
     """Draw what a table gains and loses: shares of good dots for each hammer, and force and arrival.
 
-    Parameters
-    ----------
-    report : TableReport
-        From `printhammer.judge_table`.
-
-    Returns
-    -------
-    Figure
-        The figure. Bars: dots within the limits, over all rates and patterns. Histograms: dots of the de
-        Bruijn cycle at the first rate; grey bands are the limits.
+    Bars: dots within the limits, over all rates and patterns. Histograms: dots of the de Bruijn cycle at the
+    first rate; grey bands are the limits.
     """
     figure = new_figure(5.6)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.2, 1.0))

@@ -40,16 +40,8 @@ _AFTER: Final = 0.08
 def plot(found: LeastWork) -> Figure:
     """Draw a burst of least work.
 
-    Parameters
-    ----------
-    found : LeastWork
-        From `printhammer.control.least_work.burst.least_work`.
-
-    Returns
-    -------
-    Figure
-        Above: displacement, current, and the power of the coil, filled where it gives and where it takes
-        back. Below: the work of the coil and the losses, in parts of what the pack absorbs.
+    Above: displacement, current, and the power of the coil, filled where it gives and where it takes back.
+    Below: the work of the coil and the losses, in parts of what the pack absorbs.
     """
     figure = new_figure(6.6)
     grid = figure.add_gridspec(4, 1, height_ratios=(2.6, 1.2, 1.4, 1.3))

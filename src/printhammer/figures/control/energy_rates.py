@@ -28,15 +28,7 @@ if TYPE_CHECKING:
 def plot(found: LeastWorkRates) -> Figure:
     """Draw net and positive work, and the least positive work of any current, against the rate.
 
-    Parameters
-    ----------
-    found : LeastWorkRates
-        From `printhammer.control.least_work.rates.least_work_rates`.
-
-    Returns
-    -------
-    Figure
-        The figure. Crosses at the bottom: rates at which no current was found.
+    Crosses at the bottom: rates at which no current was found.
     """
     figure = new_figure(3.6)
     ax = figure.add_subplot()

@@ -39,17 +39,9 @@ _REACH: Final = 4.0
 def plot(found: Feedback) -> Figure:
     """Draw a comparison of feedback with other ways to drive.
 
-    Parameters
-    ----------
-    found : Feedback
-        From `printhammer.control.feedback.comparison.feedback`.
-
-    Returns
-    -------
-    Figure
-        Above: how many dots of all patterns are off by how much, lost ones not among them; what is farther
-        off than the axis reaches is counted at its ends. Below: the second of two dots, by the time between
-        their slots. Between the dashed lines a dot is within limits.
+    Above: how many dots of all patterns are off by how much, lost ones not among them; what is farther off
+    than the axis reaches is counted at its ends. Below: the second of two dots, by the time between their
+    slots. Between the dashed lines a dot is within limits.
     """
     figure = new_figure(5.6)
     grid = figure.add_gridspec(2, 2)

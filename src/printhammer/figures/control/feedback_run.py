@@ -34,16 +34,8 @@ if TYPE_CHECKING:
 def plot(found: Feedback) -> Figure:
     """Draw the run of a comparison.
 
-    Parameters
-    ----------
-    found : Feedback
-        From `printhammer.control.feedback.comparison.feedback`.
-
-    Returns
-    -------
-    Figure
-        Displacement, the samples that the controller looked at, the times at which touches are wanted (short
-        lines at the front of the pack); below, the current and its bounds.
+    Displacement, the samples that the controller looked at, the times at which touches are wanted (short
+    lines at the front of the pack); below, the current and its bounds.
     """
     figure = new_figure(4.6)
     panel, strip = with_strip(figure, 2.6)

@@ -39,10 +39,6 @@ def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] 
     ----------
     ax : Axes
         Axes with displacement along `side`, whose limits are set.
-    hammer : Hammer
-        The hammer.
-    shown : Scale
-        The displacement.
     side : str, optional
         "y" for horizontal lines, "x" for vertical ones.
     """
@@ -210,8 +206,6 @@ def drive_strip(
 
     Parameters
     ----------
-    ax : Axes
-        The strip.
     motions : sequence of Motion
         Motions of one hammer; if they differ in what is driven, the first decides.
     times : sequence of array

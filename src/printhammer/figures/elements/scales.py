@@ -75,8 +75,6 @@ def scale(name: Name, largest: float = 0.0) -> Scale:
 
     Parameters
     ----------
-    name : str
-        The quantity.
     largest : float, optional
         Largest absolute value, SI; hammers far from the size of the paper's get larger units.
 
@@ -97,8 +95,6 @@ def label(ax: Axes, side: Literal["x", "y"], shown: Scale, name: str = "") -> Se
         Axes whose data are in `shown.unit`.
     side : str
         "x" or "y".
-    shown : Scale
-        The quantity.
     name : str, optional
         Other name than that of the scale.
 

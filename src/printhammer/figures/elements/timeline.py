@@ -47,6 +47,9 @@ def timeline(
 ) -> Figure:
     """Draw one or more motions of one hammer against time, with the drive below.
 
+    Its lines have the gids "displacement" and "current" (or "force"), followed by " 1", " 2" where there are
+    several motions.
+
     Parameters
     ----------
     motions : sequence of Motion
@@ -63,12 +66,6 @@ def timeline(
         Sentences shown above the figure; those of runs that stopped early are added.
     height : float, optional
         Height of the figure, in.
-
-    Returns
-    -------
-    Figure
-        The figure; its lines have the gids "displacement" and "current" (or "force"), followed by " 1", " 2"
-        where there are several motions.
     """
     hammer = motions[0].hammer
     figure = new_figure(height)

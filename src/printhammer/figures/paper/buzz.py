@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | str | None = None) -> Figure:
     """Draw Fig. 7: the train that `find_buzz_train` finds, or its best attempt, saying so.
 
+    The numbers at the dots that count are peak forces in units of that of a single pulse.
+
     Parameters
     ----------
     hammer : Hammer
@@ -29,11 +31,6 @@ def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | 
         Result of a search made before.
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled.
-
-    Returns
-    -------
-    Figure
-        The figure; the numbers at the dots that count are peak forces in units of that of a single pulse.
 
     Raises
     ------

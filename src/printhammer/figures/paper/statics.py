@@ -50,11 +50,6 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     currents : sequence of float, optional
         Coil currents, A; those outside the range of the magnet's law are left out.
 
-    Returns
-    -------
-    Figure
-        The figure.
-
     Raises
     ------
     InputError

@@ -33,17 +33,14 @@ if TYPE_CHECKING:
 def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 4: the sum of all forces on the armature, equation (2), after a single pulse.
 
+    The impacts on a rigid backstop have no finite force and are not drawn.
+
     Parameters
     ----------
     hammer : Hammer
         Any hammer with a waveform.
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled, at most 4 ms.
-
-    Returns
-    -------
-    Figure
-        The figure. The impacts on a rigid backstop have no finite force and are not drawn.
 
     Raises
     ------

@@ -39,17 +39,9 @@ _BAR: Final = 0.66
 def plot(found: DampingStudy) -> Figure:
     """Draw a damping study.
 
-    Parameters
-    ----------
-    found : DampingStudy
-        From `printhammer.damping_study`.
-
-    Returns
-    -------
-    Figure
-        A row a material. Bars: safe rate, settle-out time, change of momentum at the backstop, all at the
-        same print force. Hollow: that takes more current than is allowed. Dashed: the hammer as it is. What
-        is not known is said instead of a bar.
+    A row a material. Bars: safe rate, settle-out time, change of momentum at the backstop, all at the same
+    print force. Hollow: that takes more current than is allowed. Dashed: the hammer as it is. What is not
+    known is said instead of a bar.
     """
     count = len(found.materials)
     figure = new_figure(1.3 + _ROW * count, 7.6)

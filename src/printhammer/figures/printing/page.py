@@ -63,19 +63,14 @@ _MICRONS: Final = Scale("Placement error", "m", "um")
 def plot(page: Page, view: View = "page") -> Figure:
     """Draw a page.
 
+    In the difference a dot has the colour of its placement error, and crosses are lost dots. In the worst
+    place rings are where dots are wanted, and crosses lost dots.
+
     Parameters
     ----------
-    page : Page
-        From `printhammer.print_page`.
     view : str, optional
         "page": from the top, what was printed, what was wanted, the difference, and the worst place; "zoom":
         the worst place alone; "sheet": the paper alone, at its true size.
-
-    Returns
-    -------
-    Figure
-        The figure. In the difference a dot has the colour of its placement error, and crosses are lost dots.
-        In the worst place rings are where dots are wanted, and crosses lost dots.
 
     Raises
     ------

@@ -40,16 +40,8 @@ _ROOM: Final = 1.25
 def plot(found: Quality) -> Figure:
     """Draw where the dots of a pattern lie in force and arrival, and one after the other.
 
-    Parameters
-    ----------
-    found : Quality
-        From `printhammer.quality`.
-
-    Returns
-    -------
-    Figure
-        Left: every dot, its force over that of the single pulse against how late it arrives, the limits as a
-        box. Right: both against the slot, at most 64 slots, those with the worst dot among them.
+    Left: every dot, its force over that of the single pulse against how late it arrives, the limits as a box.
+    Right: both against the slot, at most 64 slots, those with the worst dot among them.
     """
     figure = new_figure(3.6, 7.6)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.35))
@@ -97,15 +89,12 @@ def plot(found: Quality) -> Figure:
 def plot_safe_rate(*found: SafeRate) -> Figure:
     """Draw how force and arrival deviate against the rate, and up to which rate all patterns pass.
 
+    Bands from the least to the largest deviation of any dot of any pattern; grey: within limits.
+
     Parameters
     ----------
     found : SafeRate
         From `printhammer.safe_rate`; several, such as of different strategies, are drawn over each other.
-
-    Returns
-    -------
-    Figure
-        Bands from the least to the largest deviation of any dot of any pattern; grey: within limits.
     """
     figure = new_figure(4.6)
     axes = figure.subplots(2, 1, sharex=True)

@@ -32,19 +32,14 @@ if TYPE_CHECKING:
 def plot(found: ToleranceYield, *, bars: int = 8) -> Figure:
     """Draw a tolerance yield.
 
+    Left: the part of the hammers that print every pattern well up to a rate, or, of one rate, the
+    single-pulse dots of those that pass and of those that do not. Right: the rank correlation of each
+    constant with the safe rate, or with passing; grey: what chance does.
+
     Parameters
     ----------
-    found : ToleranceYield
-        From `printhammer.tolerance_yield`.
     bars : int, optional
         Largest number of constants shown.
-
-    Returns
-    -------
-    Figure
-        Left: the part of the hammers that print every pattern well up to a rate, or, of one rate, the
-        single-pulse dots of those that pass and of those that do not. Right: the rank correlation of each
-        constant with the safe rate, or with passing; grey: what chance does.
     """
     figure = new_figure(3.6, 7.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))

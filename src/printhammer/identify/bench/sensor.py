@@ -54,11 +54,6 @@ class Amount:
         signed : bool, optional
             Whether it may be negative.
 
-        Returns
-        -------
-        Amount
-            The amount.
-
         Raises
         ------
         InputError

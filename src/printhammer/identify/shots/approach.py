@@ -48,8 +48,6 @@ class Approach:
 
     Parameters
     ----------
-    shooting : Shooting
-        The model.
     priors : sequence of (Prior, array)
         What is known beside, each with the matrix that whitens it, counted in the scales of the parameters.
     spikes : sequence of bool array

@@ -84,8 +84,6 @@ class GaussNewton:
 
     Parameters
     ----------
-    shooting : Shooting
-        The model.
     priors : sequence of Prior
         What is known beside.
     robust : bool
@@ -142,11 +140,6 @@ class GaussNewton:
             Parameters that stay where they are.
         noise : Solution, optional
             Whose noise and outliers are taken as known, near it.
-
-        Returns
-        -------
-        Solution
-            The solution.
 
         Raises
         ------

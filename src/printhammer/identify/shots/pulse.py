@@ -71,11 +71,6 @@ def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform
     tau : float
         Time constant of the sensor, s.
 
-    Returns
-    -------
-    Pulse
-        The waveform.
-
     Raises
     ------
     InputError

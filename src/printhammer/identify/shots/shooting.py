@@ -103,8 +103,6 @@ class Shooting:
     ----------
     hammer : Hammer
         Its constants that are not fitted stay as they are.
-    shots : sequence of Shot
-        The records.
     pulses : sequence of Pulse
         The current of each; None where the hammer's own waveform is fired.
     parameters : Parameters

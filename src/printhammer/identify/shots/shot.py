@@ -93,11 +93,6 @@ def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) 
     bandwidth : float, optional
         Of the sensor, Hz; by default what a comment ``# bandwidth: 200 kHz`` says, and else unlimited.
 
-    Returns
-    -------
-    Shot
-        The record.
-
     Raises
     ------
     InputError

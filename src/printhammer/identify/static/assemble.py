@@ -32,7 +32,6 @@ class Data:
     """The data of a fit and where they were measured."""
 
     files: tuple[Path, ...]
-    """The tables."""
     kind: str
     """One of "magnet", "spring", "pack" and "backstop"."""
     abscissa: FloatArray
@@ -68,8 +67,6 @@ def assemble(
         What was fitted.
     law : Law
         For the profiles.
-    solution : Solution
-        The fit.
     parameters : sequence of tuple
         Key, SI unit, and whether a hammer file has it; an empty key for a parameter that is of no interest.
     given, indistinct, rejected, p_value, notes
@@ -129,12 +126,8 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
 
     Parameters
     ----------
-    law : Law
-        The law.
     data : array, shape (m,)
         The data.
-    solution : Solution
-        The fit.
     index : int
         Of the parameter.
 
@@ -215,8 +208,6 @@ def positive(fit: Fit, path: Path, remedies: Mapping[str, str]) -> None:
 
     Parameters
     ----------
-    fit : Fit
-        The fit.
     path : Path
         The table, for the message.
     remedies : mapping of str to str

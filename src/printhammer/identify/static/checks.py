@@ -120,8 +120,6 @@ def together(solution: Solution, names: Sequence[str]) -> list[str]:
 
     Parameters
     ----------
-    solution : Solution
-        The fit.
     names : sequence of str
         Of its parameters; an empty name for one that is of no interest.
 

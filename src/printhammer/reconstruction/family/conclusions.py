@@ -136,11 +136,6 @@ def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
     context : Context, optional
         Runs to share; by default a new one.
 
-    Returns
-    -------
-    Conclusions
-        The conclusions.
-
     Raises
     ------
     NotMeasurableError

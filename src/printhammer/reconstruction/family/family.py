@@ -136,11 +136,6 @@ def write_family(
     least : int, optional
         Number of members needed.
 
-    Returns
-    -------
-    list of Member
-        The members.
-
     Raises
     ------
     InputError
@@ -320,8 +315,6 @@ def json_text(family: Sequence[Member], gauged: Sequence[Mapping[str, float]]) -
 
     Parameters
     ----------
-    family : sequence of Member
-        The members.
     gauged : sequence of mapping
         Their constants at the common gauge, key to value, SI.
     """

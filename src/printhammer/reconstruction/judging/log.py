@@ -31,8 +31,6 @@ def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
 
     Parameters
     ----------
-    path : Path
-        The log.
     some : bool, optional
         Whether there must be some.
 

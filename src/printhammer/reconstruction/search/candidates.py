@@ -53,7 +53,6 @@ class Candidate:
     constants: dict[str, float]
     """Of the hammer file, SI."""
     hammer: Hammer
-    """The hammer."""
     rest: float
     """Displacement at rest, m."""
 
