@@ -6,20 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    TINY,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements import style
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +16,7 @@ if TYPE_CHECKING:
     from printhammer.printing.rates.damping import DampingStudy
     from printhammer.support.arrays import FloatArray
 
-COLOURS: Final = {"as it is": INK, "hard": BLUE, "elastomer": GREEN, "pack": ORANGE}
+COLOURS: Final = {"as it is": style.INK, "hard": style.BLUE, "elastomer": style.GREEN, "pack": style.ORANGE}
 """Colour of each kind of material."""
 
 _ROW: Final = 0.2
@@ -59,7 +47,7 @@ def plot(found: DampingStudy) -> Figure:
         _panel(ax, found, values, told)
         ax.set_xlabel(name)
     labels = [one.label.replace(" us", " µs") for one in found.materials]
-    axes[0].set_yticks(range(count), labels, fontsize=TINY)
+    axes[0].set_yticks(range(count), labels, fontsize=style.TINY)
     axes[0].set_ylim(count - 0.4, -0.6)
     for tick, one in zip(axes[0].get_yticklabels(), found.materials, strict=True):
         tick.set_color(COLOURS[one.kind])
@@ -71,12 +59,12 @@ def plot(found: DampingStudy) -> Figure:
             xycoords="axes fraction",
             xytext=(0.0, 4.0),
             textcoords="offset points",
-            fontsize=TINY,
+            fontsize=style.TINY,
             color=COLOURS[kind],
         )
     over = int((found.status == "current limit").sum())
     limit = f"; hollow: over {found.current_limit:g} A" if over else f", {found.current_limit:g} A at most"
-    axes[2].set_title(f"All print with {found.nominal.force:.1f} N{limit}", loc="right", fontsize=SMALL)
+    axes[2].set_title(f"All print with {found.nominal.force:.1f} N{limit}", loc="right", fontsize=style.SMALL)
     sign(figure, found.hammer)
     return figure
 
@@ -93,8 +81,8 @@ def _panel(ax: Axes, found: DampingStudy, values: FloatArray, otherwise: list[st
                 xytext=(3.0, 0.0),
                 textcoords="offset points",
                 va="center",
-                fontsize=TINY,
-                color=MUTED,
+                fontsize=style.TINY,
+                color=style.MUTED,
             )
             continue
         hollow = found.status[row] == "current limit"
@@ -113,13 +101,13 @@ def _panel(ax: Axes, found: DampingStudy, values: FloatArray, otherwise: list[st
             xytext=(2.0, 0.0),
             textcoords="offset points",
             va="center",
-            fontsize=TINY,
+            fontsize=style.TINY,
             fontweight="bold" if row == best else "normal",
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
         )
         if one.kind == "as it is":
-            ax.axvline(values[row], color=MUTED, lw=THIN, ls=(0, (4, 3)), zorder=0.5)
+            ax.axvline(values[row], color=style.MUTED, lw=style.THIN, ls=(0, (4, 3)), zorder=0.5)
     ax.set_xlim(0.0, 1.24 * float(np.nanmax(values, initial=1e-12)))
-    ax.grid(axis="x", color=FAINT, lw=0.5)
+    ax.grid(axis="x", color=style.FAINT, lw=0.5)
     ax.set_axisbelow(True)
     ax.tick_params(axis="y", length=0.0)
