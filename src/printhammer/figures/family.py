@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.marks import ALONG_Y, beside, note
 from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.units import from_si
 
@@ -110,16 +110,7 @@ def _constants(
         ax.scatter(found[inside], row + fan[inside], s=11, c=shades[inside], lw=0.0, zorder=3.0, gid=key)
         if not inside.all():
             signs = f"{int((~inside).sum())} of the other sign"
-            ax.annotate(
-                signs,
-                (0.0, row),
-                (3, 0),
-                xycoords=("axes fraction", "data"),
-                textcoords="offset points",
-                fontsize=style.TINY,
-                color=style.ORANGE,
-                va="center",
-            )
+            beside(ax, signs, (0.0, row), (3, 0), "left center", xycoords=ALONG_Y, color=style.ORANGE)
     seen = ratios[ratios > 0.0]
     low, high = min(float(seen.min(initial=1.0)), 0.9) / 1.06, max(float(seen.max(initial=1.0)), 1.1) * 1.06
     ax.set(xlim=(low, high), ylim=(len(rows) - 0.4, -0.6))

@@ -12,7 +12,7 @@ from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import note
 from printhammer.figures.elements.scales import Name, Scale, label, scale
-from printhammer.figures.elements.style import new_figure, styled
+from printhammer.figures.elements.style import foot, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,11 +68,7 @@ def plot(fit: Fit) -> Figure:
     else:
         _quantiles(figure.add_subplot(grid[:, 1]), fit)
     told = f"{fit.kind} · {' and '.join(fit.source)}"
-    text = figure.supxlabel(told, x=0.99, ha="right", fontsize=style.TINY, color=style.MUTED)
-    text.set_in_layout(True)
-    if fit.rejected:
-        remark = fill(f"The data reject the law: {fit.rejected}.", 118)
-        figure.suptitle(remark, x=0.01, ha="left", fontsize=style.SMALL, color=style.ORANGE)
+    foot(figure, told, fill(f"The data reject the law: {fit.rejected}.", 118) if fit.rejected else "")
     return figure
 
 

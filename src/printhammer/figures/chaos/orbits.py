@@ -10,7 +10,7 @@ from printhammer.chaos.strobe.points import strobe as strobed
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import HALO, name_lines, note, place_lines
+from printhammer.figures.elements.marks import ALONG_X, HALO, beside, name_lines, note, place_lines
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled
 
@@ -147,16 +147,7 @@ def _plane(ax: Axes, regime: Regime, orbits: list[Orbit], under: FloatArray) -> 
         low, high = ax.get_xlim()
         if place is not None and low < float(way.shown(place)) < high:
             ax.axvline(float(way.shown(place)), color=style.MUTED, lw=style.HAIR, zorder=1.0).set_gid(name)
-            ax.annotate(
-                name,
-                (float(way.shown(place)), 0.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(2, 3),
-                textcoords="offset points",
-                fontsize=style.TINY,
-                color=style.MUTED,
-                zorder=4.0,
-            )
+            beside(ax, name, (float(way.shown(place)), 0.0), (2, 3), xycoords=ALONG_X, zorder=4.0)
     label(ax, "x", way, "Displacement at the firing")
     label(ax, "y", speed)
     if ax.get_legend_handles_labels()[0]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from printhammer.figures.elements.style import INK, MUTED, SMALL, new_figure, styled
+from printhammer.figures.elements.marks import beside
+from printhammer.figures.elements.style import INK, SMALL, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,16 +51,14 @@ def plot(found: Recurrence) -> Figure:
     ax.tick_params(axis="both", top=True, right=True)
     told = [f"threshold  {found.threshold:.3g}"]
     told += [f"{_NAMES[name]}  {_shown(value)}" for name, value in found.quantities.items()]
-    ax.annotate(
+    beside(
+        ax,
         "\n".join(told),
         (1.0, 1.0),
+        (8, 0),
+        "left top",
         xycoords="axes fraction",
-        xytext=(8, 0),
-        textcoords="offset points",
-        va="top",
-        ha="left",
         fontsize=SMALL,
-        color=MUTED,
         linespacing=1.7,
     )
     return figure

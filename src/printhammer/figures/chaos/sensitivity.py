@@ -9,6 +9,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import beside
 from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -118,14 +119,13 @@ def _panel(ax: Axes, found: Sensitivities, values: FloatArray, bars: int) -> Non
         value = float(values[k])
         colour = style.BLUE if value > 0.0 else style.ORANGE
         ax.barh(height, value, height=_BAR, color=colour, gid=f"bar-{found.constants[k]}")
-        ax.annotate(
+        beside(
+            ax,
             f"{value:+.3g}".replace("-", "−"),
             (value, height),
-            xytext=(3.0 if value > 0.0 else -3.0, 0.0),
-            textcoords="offset points",
+            (3.0 if value > 0.0 else -3.0, 0.0),
             ha="left" if value > 0.0 else "right",
             va="center",
-            fontsize=style.TINY,
             color=style.INK,
         )
     ax.axvline(0.0, color=style.INK, lw=style.HAIR)

@@ -10,7 +10,7 @@ from printhammer.control.table.histories import REST, gap_text, histories, numbe
 from printhammer.control.table.report import STRATEGIES
 from printhammer.figures.elements import style
 from printhammer.figures.elements.scales import Scale
-from printhammer.figures.elements.style import new_figure, sign, styled
+from printhammer.figures.elements.style import foot, new_figure, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,8 +31,7 @@ def plot(table: CompensationTable) -> Figure:
     """Draw a table: as maps of history by history at one or few rates, else against the rate."""
     figure = _few_rates(table) if table.rates.size < _FEW else _many_rates(table)
     told = f"{table.hammer} · {table.fingerprint[:8]} · at most {table.largest_current:g} A"
-    text = figure.supxlabel(told, x=0.99, ha="right", fontsize=style.TINY, color=style.MUTED)
-    text.set_in_layout(True)
+    foot(figure, told)
     return figure
 
 

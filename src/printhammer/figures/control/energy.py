@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import beside
 from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.run.coil_work import coil_power
 from printhammer.units import from_si
@@ -70,15 +71,7 @@ def _motion(ax: Axes, found: LeastWork) -> None:
     ax.plot(_ms(run.t), _um(run.x), color=style.INK, lw=style.LINE, gid="displacement")
     for contact, force in zip(found.contacts, found.forces.tolist(), strict=True):
         place = float(_ms(np.array([contact.t_peak]))[0])
-        ax.annotate(
-            f"{force:.3f}",
-            (place, float(_um(hammer.front + contact.depth))),
-            xytext=(0.0, 3.0),
-            textcoords="offset points",
-            ha="center",
-            fontsize=style.TINY,
-            color=style.MUTED,
-        )
+        beside(ax, f"{force:.3f}", (place, float(_um(hammer.front + contact.depth))), (0.0, 3.0), ha="center")
     ax.set_ylim(low - room, top)
     ax.set_ylabel("Displacement  [µm]")
     ax.set_title(

@@ -62,10 +62,7 @@ _SCALES: Final[dict[str, tuple[tuple[float, Scale], ...]]] = {
     ),
     "velocity": ((float("inf"), Scale("Velocity", "m/s", "m/s", "in/s")),),
     "force": ((float("inf"), Scale("Force", "N", "N", "lbf")),),
-    "time": (
-        (0.5, Scale("Time", "s", "ms")),
-        (float("inf"), Scale("Time", "s", "s")),
-    ),
+    "time": ((0.5, Scale("Time", "s", "ms")), (float("inf"), Scale("Time", "s", "s"))),
     "current": ((float("inf"), Scale("Current", "A", "A")),),
 }
 

@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Final
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.curves import places, times_of
-from printhammer.figures.elements.marks import curve, drive_strip, firings, name_lines, place_lines
+from printhammer.figures.elements.marks import (
+    curve,
+    drive_strip,
+    firings,
+    legend_above,
+    name_lines,
+    place_lines,
+)
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
 
@@ -112,12 +119,4 @@ def _legend(figure: Figure, labels: Sequence[str]) -> None:
         Line2D([], [], color=_LOOKS[number][0], ls=_LOOKS[number][1], lw=style.THIN + 0.5, label=text)
         for number, text in enumerate(labels)
     ]
-    figure.axes[0].legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderaxespad=0.2,
-        fontsize=style.SMALL,
-        frameon=False,
-        ncols=len(labels),
-    )
+    legend_above(figure.axes[0], handles)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from printhammer.figures.elements.curves import fired, shown_until
+from printhammer.figures.elements.marks import beside
 from printhammer.figures.elements.scales import scale
-from printhammer.figures.elements.style import INK, TINY, in_style
+from printhammer.figures.elements.style import INK, in_style
 from printhammer.figures.elements.timeline import timeline
 from printhammer.units import from_si
 
@@ -81,13 +82,11 @@ def _number(figure: Figure, motion: Motion, train: BuzzTrain, until: float) -> N
         if contact.surface != "pack" or contact.extra or force is None or contact.t_peak > until:
             continue
         peak = float(motion.at(contact.t_peak)[0][0])
-        panel.annotate(
+        beside(
+            panel,
             f"{force:.2f}",
             (float(time.shown(contact.t_peak)), float(way.shown(peak))),
-            xytext=(0, 3),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=TINY,
+            (0, 3),
+            "center bottom",
             color=INK,
         )

@@ -129,11 +129,7 @@ def _colours(count: int) -> list[str]:
 
 
 def _label_curves(
-    ax: Axes,
-    x: FloatArray,
-    lines: FloatArray,
-    curves: dict[str, FloatArray],
-    further: list[FloatArray],
+    ax: Axes, x: FloatArray, lines: FloatArray, curves: dict[str, FloatArray], further: list[FloatArray]
 ) -> None:
     """Write a name on each curve where the others, further ones and the lines of places are far."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from printhammer.figures.elements import style
 from printhammer.figures.elements.curves import fired, shown_until, times_of
 from printhammer.figures.elements.curves import total_force as force_at
-from printhammer.figures.elements.marks import contact_spans, curve, drive_strip
+from printhammer.figures.elements.marks import contact_spans, curve, drive_strip, legend_above
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
 
@@ -74,13 +74,4 @@ def _key(ax: Axes, motion: Motion) -> None:
         if name in touched
     ]
     if handles:
-        ax.legend(
-            handles=handles,
-            loc="lower left",
-            bbox_to_anchor=(0.0, 1.0),
-            borderaxespad=0.2,
-            fontsize=style.SMALL,
-            frameon=False,
-            handlelength=1.2,
-            ncols=len(handles),
-        )
+        legend_above(ax, handles, handlelength=1.2)

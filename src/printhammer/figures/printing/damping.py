@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import ALONG_Y, beside
 from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -53,13 +54,12 @@ def plot(found: DampingStudy) -> Figure:
         tick.set_color(COLOURS[one.kind])
     kinds = [kind for kind in COLOURS if any(one.kind == kind for one in found.materials)]
     for place, kind in enumerate(kinds):
-        axes[0].annotate(
+        beside(
+            axes[0],
             kind,
             (place / len(kinds), 1.0),
+            (0.0, 4.0),
             xycoords="axes fraction",
-            xytext=(0.0, 4.0),
-            textcoords="offset points",
-            fontsize=style.TINY,
             color=COLOURS[kind],
         )
     over = int((found.status == "current limit").sum())
@@ -74,16 +74,7 @@ def _panel(ax: Axes, found: DampingStudy, values: FloatArray, otherwise: list[st
     for row, one in enumerate(found.materials):
         colour = COLOURS[one.kind]
         if not np.isfinite(values[row]):
-            ax.annotate(
-                otherwise[row],
-                (0.0, row),
-                xycoords=("axes fraction", "data"),
-                xytext=(3.0, 0.0),
-                textcoords="offset points",
-                va="center",
-                fontsize=style.TINY,
-                color=style.MUTED,
-            )
+            beside(ax, otherwise[row], (0.0, row), (3.0, 0.0), xycoords=ALONG_Y, va="center")
             continue
         hollow = found.status[row] == "current limit"
         ax.barh(
@@ -95,15 +86,15 @@ def _panel(ax: Axes, found: DampingStudy, values: FloatArray, otherwise: list[st
             alpha=1.0 if row == best else 0.75,
             gid=f"bar-{row}",
         )
-        ax.annotate(
+        beside(
+            ax,
             f"{values[row]:.4g}" if values[row] >= 100.0 else f"{values[row]:.2f}",
             (values[row], row),
-            xytext=(2.0, 0.0),
-            textcoords="offset points",
-            va="center",
-            fontsize=style.TINY,
+            (2.0, 0.0),
+            "left center",
             fontweight="bold" if row == best else "normal",
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+            color=style.INK,
         )
         if one.kind == "as it is":
             ax.axvline(values[row], color=style.MUTED, lw=style.THIN, ls=(0, (4, 3)), zorder=0.5)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import ALONG_X, beside
 from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -102,14 +103,13 @@ def plot_safe_rate(*found: SafeRate) -> Figure:
             if np.isfinite(one.rate):
                 ax.axvline(one.rate, color=colour, lw=style.THIN, ls=(0, (4, 3)), gid="safe rate")
         if np.isfinite(one.rate):
-            axes[0].annotate(
+            beside(
+                axes[0],
                 f"{'at least ' if one.at_least else ''}{one.rate:g} Hz",
                 (one.rate, 1.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(-3.0, -3.0 - 10.0 * number),
-                textcoords="offset points",
-                ha="right",
-                va="top",
+                (-3.0, -3.0 - 10.0 * number),
+                "right top",
+                xycoords=ALONG_X,
                 fontsize=style.SMALL,
                 color=colour,
             )

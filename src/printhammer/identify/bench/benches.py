@@ -193,11 +193,7 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
 
 
 def motion(
-    hammer: Hammer,
-    sensor: Sensor,
-    *,
-    duration: float | str | None = None,
-    before: float | str = BEFORE,
+    hammer: Hammer, sensor: Sensor, *, duration: float | str | None = None, before: float | str = BEFORE
 ) -> Bench:
     """Record one shot from rest for a duration after the firing, s, and a while before, s."""
     from printhammer.drive.input import read_number, read_positive

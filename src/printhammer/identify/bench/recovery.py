@@ -57,11 +57,7 @@ class Recovery:
 
 
 def recover(
-    hammer: Hammer,
-    seed: int,
-    *,
-    sensor: Mapping[str, Any] | None = None,
-    folder: str | Path | None = None,
+    hammer: Hammer, seed: int, *, sensor: Mapping[str, Any] | None = None, folder: str | Path | None = None
 ) -> Recovery:
     """Measure a hammer, fit its constants and build a hammer of them.
 

@@ -14,11 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.residuals import (
-    memory_factor,
-    outliers_of,
-    spikes_of,
-)
+from printhammer.identify.residuals import memory_factor, outliers_of, spikes_of
 from printhammer.identify.result import Profile, student
 from printhammer.identify.shots.approach import Approach, Prior
 from printhammer.identify.shots.identifiable import singular

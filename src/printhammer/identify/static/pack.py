@@ -90,10 +90,7 @@ class PackLaw:
         """Return the derivatives of the force by the two exponents."""
         force, out = self.value(p), self.cycles.unloading
         depth = p[1 + self.column] if len(self.turns) else np.zeros_like(force)
-        return [
-            np.where(out, depth, self.log_r) * force,
-            np.where(out, (self.log_r - depth) * force, 0.0),
-        ]
+        return [np.where(out, depth, self.log_r) * force, np.where(out, (self.log_r - depth) * force, 0.0)]
 
     def spread(self, p: FloatArray) -> FloatArray:
         """Return the components of the variance: force, force in proportion, indentation."""

@@ -56,9 +56,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         " within a tenth and its flight time within 50 us, on a grid of 5 Hz.",
     ),
     "chaos_onset_s": Quantity(
-        "chaos onset",
-        "s",
-        "Longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms.",
+        "chaos onset", "s", "Longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms."
     ),
     "flight_time_spread_s": Quantity(
         "flight-time spread",
@@ -77,9 +75,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         "Lowest of these rates at which that difference exceeds 200 us, what dot-matrix printing tolerates.",
     ),
     "energy_per_dot_J": Quantity(
-        "energy per dot",
-        "J",
-        "Work of the coil on the armature in the cycle of a single pulse.",
+        "energy per dot", "J", "Work of the coil on the armature in the cycle of a single pulse."
     ),
     "pack_loss_J": Quantity("pack loss", "J", "What the pack keeps of it."),
     "backstop_loss_J": Quantity("backstop loss", "J", "What the backstop takes of it."),

@@ -46,10 +46,4 @@ class Share:
     def as_dict(self) -> dict[str, Any]:
         """Return what goes to `claims.json`."""
         low, high = self.interval
-        return {
-            "rate": self.rate,
-            "low": low,
-            "high": high,
-            "measured": self.measured,
-            "holds": self.holds,
-        }
+        return {"rate": self.rate, "low": low, "high": high, "measured": self.measured, "holds": self.holds}
