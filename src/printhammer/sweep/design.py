@@ -44,8 +44,7 @@ def between(share: FloatArray, low: float, high: float, geometric: bool) -> Floa
         values = np.exp(np.log(low) + share * (np.log(high) - np.log(low)))
     else:
         values = low + share * (high - low)
-    inside: FloatArray = np.clip(values, min(low, high), max(low, high))
-    return inside
+    return np.clip(values, min(low, high), max(low, high))
 
 
 @dataclass(frozen=True)

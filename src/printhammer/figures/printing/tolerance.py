@@ -102,8 +102,7 @@ def _ranks(values: np.ndarray) -> np.ndarray:
     """Return ranks; equal values share theirs."""
     _, place, counts = np.unique(values, return_inverse=True, return_counts=True)
     ends = np.cumsum(counts)
-    mean: np.ndarray = (ends - 0.5 * (counts - 1.0))[place]
-    return mean
+    return (ends - 0.5 * (counts - 1.0))[place]
 
 
 def _correlation(first: np.ndarray, second: np.ndarray) -> float:

@@ -307,10 +307,7 @@ def _restitution(k: float, damping: float, speed: float) -> float:
 
     if damping == 0.0:
         return 1.0
-    found: float = brentq(
-        lambda e: damping_from_restitution(k, e, speed) / damping - 1.0, _LEAST, 1.0, xtol=1e-15
-    )
-    return found
+    return brentq(lambda e: damping_from_restitution(k, e, speed) / damping - 1.0, _LEAST, 1.0, xtol=1e-15)
 
 
 def _simulated_rebound(bare: Hammer, speed: float) -> float:

@@ -153,12 +153,10 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
         return p
 
     def residuals(rest: FloatArray, value: float) -> FloatArray:
-        found: FloatArray = (law.value(full(rest, value)) - data)[used] / root
-        return found
+        return (law.value(full(rest, value)) - data)[used] / root
 
     def jacobian(rest: FloatArray, value: float) -> FloatArray:
-        found: FloatArray = law.jacobian(full(rest, value))[used][:, others] / root[:, None]
-        return found
+        return law.jacobian(full(rest, value))[used][:, others] / root[:, None]
 
     middle = _GRID // 2
     for way in (range(middle, _GRID), range(middle, -1, -1)):

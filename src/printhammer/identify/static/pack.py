@@ -72,8 +72,7 @@ class PackLaw:
         if len(self.turns):
             depth = p[1 + self.column]
             power = np.where(self.cycles.unloading, low * depth + high * (self.log_r - depth), power)
-        force: FloatArray = np.where(self.inside, p[0] * np.exp(power), 0.0)
-        return force
+        return np.where(self.inside, p[0] * np.exp(power), 0.0)
 
     def jacobian(self, p: FloatArray) -> FloatArray:
         """Return its derivatives by the parameters."""
