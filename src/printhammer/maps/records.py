@@ -11,8 +11,6 @@ empty cell, or nan, is a gap. Blank lines and lines that begin with # are passed
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -20,6 +18,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.support.csv_table import heading, number, read_rows
 from printhammer.units import parse, to_si
 
 if TYPE_CHECKING:
@@ -84,15 +83,7 @@ class Cells:
             if gaps and text.lower() in _GAPS:
                 values[k] = math.nan
                 continue
-            try:
-                values[k] = float(text)
-            except ValueError:
-                values[k] = math.nan
-            if not math.isfinite(values[k]):
-                raise InputError(
-                    f"{self.what}: line {self.lines[k]}, column {name!r}: {text!r} is expected to be a finite"
-                    " number"
-                )
+            values[k] = number(text, f"{self.what}: line {self.lines[k]}, column {name!r}")
         return values * factor
 
 
@@ -196,36 +187,20 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[Recor
 
 def _named(what: str, cell: str) -> tuple[str, str]:
     """Split the cell of a heading into its name and its unit."""
-    name, _, rest = cell.partition("[")
-    unit, closed, tail = rest.partition("]")
-    if not closed or tail.strip() or not unit.strip():
+    name, unit = heading(cell)
+    if not unit:
         raise InputError(f"{what}: column {cell!r} is expected to carry its unit, such as 'time [us]'")
-    name = name.strip()
-    return (name.lower() if name.lower() in _SI else name), unit.strip()
+    return (name.lower() if name.lower() in _SI else name), unit
 
 
 def _cells(path: Path) -> Cells:
     what = str(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{what}: the measured map is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{what}: the measured map cannot be read ({reason})") from None
-    reader = csv.reader(io.StringIO(text), strict=True)
-    lines, rows = [], []
-    try:
-        for row in reader:
-            if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#"):
-                lines.append(reader.line_num)
-                rows.append(row)
-    except csv.Error as error:
-        raise InputError(f"{what}: expected comma-separated values ({error})") from None
+    found = read_rows(path, "measured map")
+    lines, rows = [line for line, _ in found], [row for _, row in found]
     if len(rows) < 2:
         raise InputError(f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples")
-    heading = [cell.strip() for cell in rows[0]]
+    names = [cell.strip() for cell in rows[0]]
     for line, row in zip(lines[1:], rows[1:], strict=True):
-        if len(row) != len(heading):
-            raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(heading)}")
-    return Cells(what, heading, np.array(lines[1:], dtype=np.int64), rows[1:])
+        if len(row) != len(names):
+            raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(names)}")
+    return Cells(what, names, np.array(lines[1:], dtype=np.int64), rows[1:])

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from tests.control.test_least_work import let_go, thrown
+from tests.control.least_work.test_burst import let_go, thrown
 from tests.hammers import CRUDE
 
 from printhammer.control.least_work import search

@@ -147,8 +147,6 @@ def measure(
     kind : str
         "magnet": static force of magnet and spring over displacement and current; "spring": that of the
         spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": the record of one shot.
-    hammer : Hammer
-        The hammer.
     sensor : Sensor or mapping, optional
         By default that of an ordinary bench, `SENSORS`; or what is different there, such as
         {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `sensor_settings.adjusted`.
@@ -158,11 +156,6 @@ def measure(
         What is measured where, in SI: `displacements`, `currents` (magnet); `displacements` (spring);
         `peaks`, the largest indentations, and `points` of a branch (pack); `speeds` (backstop); `duration`
         and `before`, the time before the firing (motion).
-
-    Returns
-    -------
-    Measurement
-        The table.
 
     Raises
     ------
