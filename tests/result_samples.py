@@ -48,12 +48,66 @@ def ensemble(hammer: Hammer) -> EnsembleResult:
     return ph.Ensemble(hammer, drives, 6e-3).run(dots=True, strobes="firings", times=[1e-3, 2e-3, 3e-3])
 
 
+def quality(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.quality import quality
+
+    return quality(hammer, 900.0, "1101")
+
+
+def safe_rate(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.safe_rate import safe_rate
+
+    return safe_rate(hammer, first=600.0, last=700.0, step=100.0, cycle=False)
+
+
+def tolerance_yield(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.tolerance import tolerance_yield
+
+    return tolerance_yield(hammer, number=2, first=600.0, last=700.0, step=100.0)
+
+
+def damping_study(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.damping import damping_study
+    from printhammer.printing.rates.materials import Material
+
+    tried = [Material("as it is", "as it is", {}), Material("hard", "none", {"backstop.stiffness": -1.0})]
+    return damping_study(hammer, tried, first=600.0, last=700.0, step=100.0)
+
+
+def page(hammer: Hammer) -> Result:
+    from printhammer.printing.page.page import print_page
+
+    return print_page(hammer, "Hi", 1500.0)
+
+
+def compensation_table(hammer: Hammer) -> Result:
+    from tests.control.table.by_hand import by_hand
+
+    return by_hand(hammer)
+
+
+def table_report(hammer: Hammer) -> Result:
+    from tests.control.table.by_hand import by_hand
+
+    from printhammer.control.table.report import judge_table
+    from printhammer.printing.rates.perturbation import Perturbation
+
+    return judge_table(hammer, by_hand(hammer), rates=[900.0], perturbations=[Perturbation()])
+
+
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
+    "CompensationTable": compensation_table,
+    "DampingStudy": damping_study,
     "DotTable": lambda hammer: not_none(ensemble(hammer).dots),
     "EnsembleResult": ensemble,
     "Fit": fit,
     "Measurement": lambda hammer: ph.measure("pack", hammer, seed=1, points=5),
     "Motion": lambda hammer: ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=20),
+    "Page": page,
+    "Quality": quality,
+    "SafeRate": safe_rate,
     "Strobe": lambda hammer: ph.strobe(hammer, period=1.3e-3, points=5, verdict=False),
     "Strobes": lambda hammer: not_none(ensemble(hammer).strobes),
+    "TableReport": table_report,
+    "ToleranceYield": tolerance_yield,
 }

@@ -31,7 +31,7 @@ def test_a_page_and_its_files(cli: Callable, tmp_path: Path) -> None:
     assert "1500 slots a second, 0.635 m/s" in done.out
     with xr.open_dataset(paths["dots.nc"], engine="scipy") as chart:
         np.testing.assert_array_equal(chart["placement_error"], page.placement_error)
-    assert len(pd.read_csv(paths["dots.csv"])) == page.line.size
+    assert len(pd.read_csv(paths["dots.csv"], comment="#")) == page.line.size
     assert paths["page.png"].read_bytes().startswith(b"\x89PNG")
     assert paths["page.pdf"].read_bytes().startswith(b"%PDF")
     assert b"<svg" in (tmp_path / "sheet.svg").read_bytes()

@@ -56,7 +56,7 @@ def test_what_is_gained_and_lost(cli: Callable, quick: Path, tmp_path: Path) -> 
         ("--rate 1kHz --reach 0", "reach"),
         ("--rate 1kHz --largest-current 0.1A", "the waveform peaks at"),
         ("--rate 1kHz --out table.xls", "expected a name that ends in one of"),
-        ("--rate 1kHz --report report.csv", "expected a name that ends in"),
+        ("--rate 1kHz --report report.txt", "expected a name that ends in"),
         ("--rate 1kHz --report report.nc --no-judge", "expected none beside --no-judge"),
     ],
 )

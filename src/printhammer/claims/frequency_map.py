@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.claims.bursts import hang_up_range, onsets
 from printhammer.claims.context import NotMeasurableError
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.maps.frequency import TAIL
 
@@ -45,8 +45,6 @@ def sensitivity(context: Context, band: tuple[float, float], grid: float, step: 
     NotMeasurableError
         The band is narrower than a step, or a run ended early.
     """
-    from printhammer.run.ensemble import Ensemble
-
     low, high = band
     slower = low + grid * np.arange(math.floor((high - step - low) / grid * (1.0 + 1e-12)) + 1)
     if not len(slower):
@@ -57,15 +55,14 @@ def sensitivity(context: Context, band: tuple[float, float], grid: float, step: 
         PulseTrain(context.waveform, rate=rate, pulses=pulses)
         for rate in np.stack([slower, slower + step], axis=1).ravel().tolist()
     ]
-    result = Ensemble(context.hammer, drives, ends, tolerance=context.tolerance).run(times=times)
-    context.demand(result, drives)
+    result = context.ensemble(drives, ends, times=times)
     assert result.x is not None
     change = (result.x[1::2].astype(np.float64) - result.x[::2]) / step
     # Beyond the end of a record there is nothing.
     return float(np.sqrt(np.nanmean(change**2)))
 
 
-@measures("map_sensitivity", "backstop", "pack", "waveform")
+@measures("map_sensitivity", *WHOLE)
 def map_sensitivity(context: Context, claim: Claim) -> Measured:
     """Change of the displacement record per hertz below, in and above the erratic band."""
     settings = claim.settings

@@ -14,6 +14,9 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
+WHOLE: Final = ("backstop", "pack", "waveform")
+"""What most claims are about."""
+
 Verdict = Literal["holds", "fails", "not yet"]
 
 

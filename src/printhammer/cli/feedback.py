@@ -179,8 +179,7 @@ def _driven(hammer: Hammer, supply: str, travel: str) -> Hammer:
 
 
 def _table(path: Path, hammer: Hammer) -> Any:
-    from printhammer.control.table.drive import TableStrategy
-    from printhammer.control.table.files import load_table
+    from printhammer.control.table.compensation import TableStrategy, load_table
 
     return TableStrategy(load_table(path), hammer)
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 EXAMPLE: Final = "Example: printhammer print 'Bounce and chaotic motion' --rate 1.4kHz --out page.png"
 
-_TABLES: Final = (".nc", ".csv")
 _USUAL: Final = ("printed.png", "printed.pdf", "printed-zoom.png")
 _PATTERN: Final = "What to print (a text, or --pattern)"
 _HEAD: Final = "Print head"
@@ -99,8 +98,8 @@ def print_(
             _FILES,
             "--out",
             "FILE",
-            "Page (.png, .pdf, .svg) or its dots (.nc, .csv); may be given repeatedly. Without --out, --zoom,"
-            f" --sheet and --save: {', '.join(_USUAL)}.",
+            "Page (.png, .pdf, .svg) or its dots (.nc, .csv, .json, .zarr, .parquet); repeatable. Without"
+            f" --out, --zoom, --sheet and --save: {', '.join(_USUAL)}.",
         ),
     ] = None,
     zoom: Annotated[
@@ -127,8 +126,7 @@ def print_(
     from printhammer.errors import InputError
     from printhammer.printing.dots.limits import limits_named
     from printhammer.printing.dots.nominal import rate_of
-    from printhammer.printing.page.page import print_page
-    from printhammer.printing.page.page_tables import save_page
+    from printhammer.printing.page.page import Page, print_page
     from printhammer.printing.page.pattern_file import BITMAPS, SUFFIXES
     from printhammer.support.outputs import check_outputs
 
@@ -142,7 +140,7 @@ def print_(
     if not wanted and not views and save is None:
         *pages, last = (Path(name) for name in _USUAL)
         wanted, views = pages, [(last, "zoom")]
-    check_endings(wanted, (*PICTURES, *_TABLES))
+    check_endings(wanted, (*PICTURES, *Page.ENDINGS))
     check_endings([zoom] if zoom else [], PICTURES, "--zoom")
     check_endings([sheet] if sheet else [], PICTURES, "--sheet")
     check_endings([save] if save else [], SUFFIXES, "--save")
@@ -161,7 +159,7 @@ def print_(
     }
     loaded = load_checked(hammer)
     if table is not None:
-        from printhammer.control.table.files import load_table
+        from printhammer.control.table.compensation import load_table
 
         options["strategy"] = load_table(table).strategy(loaded)
     announce_compiling()
@@ -176,9 +174,9 @@ def print_(
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     screen.print(f"[dim]{page.status.size} runs, {page.line.size} dots, computed in {seconds:.2g} s[/dim]\n")
     screen.print(told(page, units))
-    write_found(screen, wanted, page.plot, partial(save_page, page))
+    write_found(screen, wanted, page.plot, page.save)
     for path, view in views:
-        write_found(screen, [path], partial(page.plot, view=view), partial(save_page, page))
+        write_found(screen, [path], partial(page.plot, view=view), page.save)
     if save is not None:
         asked.save(save)
         say_written(screen, save)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -90,7 +89,7 @@ def quality(
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="Numbers (.nc, .csv, .json) or picture (.svg, .png, .pdf); may be given repeatedly.",
+            help="Numbers (.nc, .csv, .json, .zarr, .parquet) or picture (.svg, .png, .pdf); repeatable.",
         ),
     ] = None,
 ) -> None:
@@ -107,11 +106,11 @@ def quality(
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
     from printhammer.drive.trains import PulseTrain
     from printhammer.errors import InputError
-    from printhammer.printing.rates.quality_tables import SUFFIXES, save_result
+    from printhammer.results import ENDINGS
     from printhammer.support.outputs import check_outputs
 
     wanted = out or []
-    check_endings(wanted, (*SUFFIXES, *PICTURES))
+    check_endings(wanted, (*ENDINGS, *PICTURES))
     read = [Path(hammer), *([] if table is None else [table])]
     check_outputs(wanted, read)
     options = {
@@ -150,7 +149,7 @@ def quality(
     named = run_files.tables(loaded, Path(hammer), PulseTrain(loaded.waveform), None)
     check_outputs(wanted, [*read, *named])
     if table is not None:
-        from printhammer.control.table.files import load_table
+        from printhammer.control.table.compensation import load_table
 
         loaded_table = load_table(table)
         common["strategy"] = many["strategy"] = loaded_table.strategy(loaded)
@@ -202,7 +201,7 @@ def quality(
     screen.print(f"[bold]{escape(loaded.name)}[/bold]  {honesty(loaded)}")
     screen.print(f"[dim]computed in {perf_counter() - begin:.2g} s[/dim]\n")
     screen.print(lines)
-    write_found(screen, wanted, found.plot, partial(save_result, found))
+    write_found(screen, wanted, found.plot, found.save)
     if bad:
         complain(bad)
         raise typer.Exit(1)

@@ -55,12 +55,14 @@ def tune(
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="Table (.csv, .json, .h, .nc) or picture of it (.svg, .png, .pdf); may be given repeatedly.",
+            help="Table (.csv, .json, .h, .nc, ...) or picture (.svg, .png, .pdf); may be given repeatedly.",
         ),
     ] = None,
     report: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Picture of gain and loss (.svg, .png, .pdf) or numbers (.nc)."),
+        typer.Option(
+            metavar="FILE", help="Picture of gain and loss (.svg, .png, .pdf) or numbers (.nc, .csv, ...)."
+        ),
     ] = None,
 ) -> None:
     """Tune pulse width and advance as a function of the last gaps, so that every dot is like one from rest.
@@ -72,16 +74,16 @@ def tune(
     from printhammer.cli.progress import counting
     from printhammer.cli.saving import PICTURES, check_endings, write_found
     from printhammer.cli.terminal import announce_compiling, complain, console, honesty, load_checked
-    from printhammer.control.table.files import SUFFIXES
-    from printhammer.control.table.report import judge_table
+    from printhammer.control.table.compensation import CompensationTable
+    from printhammer.control.table.report import TableReport, judge_table
     from printhammer.control.table.tuning import tune as tuned
     from printhammer.errors import InputError
-    from printhammer.support.outputs import check_outputs, write_dataset
+    from printhammer.support.outputs import check_outputs
 
     wanted = out or []
     reports = [] if report is None else [report]
-    check_endings(wanted, (*SUFFIXES, *PICTURES))
-    check_endings(reports, (".nc", *PICTURES), "--report")
+    check_endings(wanted, (*CompensationTable.ENDINGS, *PICTURES))
+    check_endings(reports, (*TableReport.ENDINGS, *PICTURES), "--report")
     if reports and not judge:
         raise InputError(f"--report {report} is given, expected none beside --no-judge")
     check_outputs([*wanted, *reports], [Path(hammer)])
@@ -119,8 +121,7 @@ def tune(
         screen.print(judged(found))
     write_found(screen, wanted, table.plot, table.save)
     if found is not None:
-        data = found.to_dataset()
-        write_found(screen, reports, found.plot, lambda path: write_dataset(path, data))
+        write_found(screen, reports, found.plot, found.save)
     if found is not None and not found.passed[1, 0].all():
         off = ", ".join(f"{one:g} Hz" for one in found.rates[~found.passed[1, 0]].tolist())
         complain(f"with the table not all dots are within the limits at {off}")

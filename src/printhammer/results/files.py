@@ -328,18 +328,23 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
 
 
 def _json(dataset: xr.Dataset) -> str:
+    def text(value: Any) -> str:
+        return json.dumps(_strict(value), allow_nan=False, ensure_ascii=False)
+
     columns = {
         str(name): {
             "dims": list(map(str, values.dims)),
             **plain(values.attrs),
             "dtype": values.dtype.str[1:],
             "coordinate": name in dataset.coords,
-            "values": _strict(values.values.tolist()),
+            "values": values.values.tolist(),
         }
         for name, values in dataset.variables.items()
     }
-    content = {**_strict(plain(dict(dataset.attrs))), _COLUMNS: columns}
-    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    # A line for each attribute and each array.
+    head = "".join(f"  {text(str(key))}: {text(plain(value))},\n" for key, value in dataset.attrs.items())
+    body = ",\n".join(f"    {text(name)}: {text(entry)}" for name, entry in columns.items())
+    return f"{{\n{head}  {text(_COLUMNS)}: {{\n{body}\n  }}\n}}\n"
 
 
 def _strict(value: Any) -> Any:

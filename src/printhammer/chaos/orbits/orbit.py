@@ -318,7 +318,7 @@ class _Run:
         firings = self.regime.moments(self.train, self.periods, 0.0)
         marks = firings[:-1] if self.regime.phase == 0.0 else firings[1:]
         marks = np.concatenate([self.sections[:1], marks])
-        found = follow(self.problem, marks, np.eye(3), renormalise=False).found[1:, :4]
+        found = follow(self.problem, marks, np.eye(3), renormalise=False).states[1:]
         return found if self.regime.phase == 0.0 else np.roll(found, 1, axis=0)
 
 

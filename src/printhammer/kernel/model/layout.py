@@ -16,8 +16,8 @@ PLACES = {"spring": SPRING, "pack": PACK, "backstop": BACKSTOP_PART, "magnet": M
 SLOT = 16
 """Number of constants that a spring, pack or backstop may have."""
 
-END = 3.0
-"""Kind of the row of a table of pieces at which a waveform ends, see `printhammer.kernel.model.pulses`."""
+CUBIC_PIECE, EXPONENTIAL_PIECE, SINE_PIECE, END = 0.0, 1.0, 2.0, 3.0
+"""Kinds of the rows of a table of pieces, see `printhammer.kernel.model.pulses`; the last ends a waveform."""
 
 Control = tuple[float, float, float, float]
 """Scales of displacement and velocity, allowances of the error estimates of order 6 and 7."""

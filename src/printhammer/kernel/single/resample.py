@@ -57,6 +57,8 @@ def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
 @compiled
 def branch_of(mode: int) -> int:
     """Return the mode whose force acts in `mode`, which may be one of rest."""
+    if mode == HELD:
+        return BACKSTOP
     if mode == HELD_LOADING:
         return LOADING
     return UNLOADING if mode == HELD_UNLOADING else mode

@@ -22,15 +22,11 @@ from printhammer.kernel.model.modes import (
     LOADING,
     NO_SWITCH,
     OK,
-    PACK_RELEASED,
     PACK_SURFACE,
     PAUSED,
-    PUSH_BEGAN,
-    PUSH_ENDED,
     RANGE_LEFT,
     REACHED_BACKSTOP,
     REACHED_FRONT,
-    REACHED_PEAK,
     RELOADING,
     RESTING,
     REVERSAL,
@@ -39,6 +35,7 @@ from printhammer.kernel.model.modes import (
     STEP_UNDERFLOW,
     UNLOADING,
 )
+from printhammer.kernel.model.transitions import FOLLOWING
 from printhammer.kernel.single import carry as C
 
 if TYPE_CHECKING:
@@ -436,14 +433,14 @@ def run(
                     else:
                         close_contact(contacts, touched, t, v)
                 else:
-                    mode = BACKSTOP
+                    mode = FOLLOWING[mode, switch]
                     w = 0.0
             elif switch == REACHED_FRONT:
                 v = max(v, 0.0)
                 # A touch without velocity opens a contact only if the armature is pushed on.
                 if v > 0.0 or acceleration(t, x, v, FREE, memory, hammer, drive) > 0.0:
                     touched = open_contact(contacts, touched, PACK_SURFACE, t, v, used, False)
-                    mode = LOADING
+                    mode = FOLLOWING[mode, switch]
             elif switch == REVERSAL:
                 if x <= hammer[FRONT]:
                     close_contact(contacts, touched, t, v)
@@ -453,19 +450,15 @@ def run(
             elif switch in (LEFT_FRONT, LEFT_BACKSTOP):
                 close_contact(contacts, touched, t, v)
                 x = hammer[POSITION] if switch == LEFT_BACKSTOP else hammer[FRONT]
-                mode = FREE
+                mode = FOLLOWING[mode, switch]
                 if switch == LEFT_BACKSTOP and v <= 0.0:
                     v = 0.0
                     if acceleration(t, x, v, FREE, memory, hammer, drive) < 0.0:
                         touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, used, False)
                         mode = BACKSTOP
                         w = 0.0
-            elif switch == REACHED_PEAK:
-                mode = LOADING
-            elif switch == PUSH_ENDED:
-                mode = BACKSTOP_RELEASED if mode == BACKSTOP else PACK_RELEASED
-            elif switch == PUSH_BEGAN:
-                mode = BACKSTOP if mode == BACKSTOP_RELEASED else LOADING
+            else:
+                mode = FOLLOWING[mode, switch]
                 if mode == BACKSTOP:
                     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
             a = acceleration(t, x, v, mode, memory, hammer, drive)

@@ -12,7 +12,7 @@ import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled
 from printhammer.kernel.model.layout import FRONT
-from printhammer.kernel.model.modes import BACKSTOP, HELD, LOADING, PACK_SURFACE, RELOADING, UNLOADING
+from printhammer.kernel.model.modes import LOADING, PACK_SURFACE, RELOADING, UNLOADING
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.forces import Hammer, pack_force
@@ -150,8 +150,7 @@ def note_states(
         else:
             strobes[strobe, 0] = displacement
             strobes[strobe, 1] = velocity
-            # At rest or not, the same force acts.
-            branch = BACKSTOP if mode == HELD else branch_of(mode)
+            branch = branch_of(mode)
             strobes[strobe, 2] = branch
             strobes[strobe, 3] = kept if branch in (UNLOADING, RELOADING) else 0.0
             strobe += 1

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import (
         BACKSTOP_PULLS,
         FORCE_DRIVE,
+        FORCED,
         MEMORY,
         PACK_PULLS,
         backstop_elastic,
@@ -162,8 +163,11 @@ def contact_force(w: float, v: float, hammer: Hammer) -> float:
 
 
 @compiled
-def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[float, float]:
-    """Return the slopes of the backstop's force with w [N/m^0.5] and with velocity [N s/m]."""
+def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[float, float, float, float]:
+    """Return the slopes of the backstop's force with w [N/m^0.5] and with velocity [N s/m].
+
+    Then, where constants force the columns, those of its viscous part.
+    """
     c = hammer[BACKSTOP_PART:MAGNET]
     w = max(w, 0.0)
     spacing = ROOT_SPACING * max(w, 1e-2 * np.sqrt(scales[0]))
@@ -173,10 +177,14 @@ def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[flo
             side = FORWARD
         elif backstop_switch(c, w + 2.0 * spacing, v) <= 0.0:
             side = BACKWARD
-    with_w = 0.0
+    with_w, viscous_w = 0.0, 0.0
     for k in range(POINTS[side]):
-        with_w += WEIGHTS[side, k] * contact_force(w + OFFSETS[side, k] * spacing, v, hammer)
+        at = w + OFFSETS[side, k] * spacing
+        with_w += WEIGHTS[side, k] * contact_force(at, v, hammer)
+        if FORCED:
+            viscous_w += WEIGHTS[side, k] * backstop_viscous(c, at, v)
     with_w /= spacing
+    viscous_w /= spacing
     spacing = SPEED_SPACING * scales[1]
     side = CENTRAL
     if not BACKSTOP_PULLS:
@@ -184,7 +192,10 @@ def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[flo
             side = BACKWARD
         elif backstop_switch(c, w, v - 2.0 * spacing) <= 0.0:
             side = FORWARD
-    with_v = 0.0
+    with_v, viscous_v = 0.0, 0.0
     for k in range(POINTS[side]):
-        with_v += WEIGHTS[side, k] * contact_force(w, v + OFFSETS[side, k] * spacing, hammer)
-    return with_w, with_v / spacing
+        at = v + OFFSETS[side, k] * spacing
+        with_v += WEIGHTS[side, k] * contact_force(w, at, hammer)
+        if FORCED:
+            viscous_v += WEIGHTS[side, k] * backstop_viscous(c, w, at)
+    return with_w, with_v / spacing, viscous_w, viscous_v / spacing
