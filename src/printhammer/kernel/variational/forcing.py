@@ -22,6 +22,7 @@ from printhammer.kernel.model.layout import (
     PACK,
     POSITION,
     SPRING,
+    Train,
 )
 from printhammer.kernel.model.modes import BACKSTOP, LOADING, RELOADING, UNLOADING
 from printhammer.kernel.model.pulses import LIVE_WIDTH
@@ -70,14 +71,14 @@ if TYPE_CHECKING:
 
 
 @compiled
-def set_live_moves(first: int, last: int, pieces: Any, under_way: Any, forcing: Forcing) -> None:
+def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> None:
     """Rewrite the changes of the pieces under way, in the order in which `pass_edges` has them."""
     fire_moves, piece_moves, live_moves = forcing.fire_moves, forcing.piece_moves, forcing.live_moves
     for k in range(fire_moves.shape[0]):
         j = 0
         for p in range(first, last):
-            piece = under_way[p]
-            if pieces[piece, 1] == END:
+            piece = train.under_way[p]
+            if train.pieces[piece, 1] == END:
                 continue
             live_moves[k, j] = fire_moves[k, p] + piece_moves[k, piece, 0]
             for i in range(4):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled
-from printhammer.kernel.model.layout import BACKSTOP_PART, END, FRONT, INVERSE_MASS, MAGNET, POSITION
+from printhammer.kernel.model.layout import BACKSTOP_PART, END, FRONT, INVERSE_MASS, MAGNET, POSITION, Train
 from printhammer.kernel.model.modes import (
     BACKSTOP,
     FREE,
@@ -208,21 +208,17 @@ def pass_edge(
 @compiled
 def pass_moving_edges(
     node: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
+    train: Train,
     first: int,
     last: int,
     columns: Any,
     hammer: Hammer,
-    drive: Drive,
     forcing: Forcing,
 ) -> None:
     """Carry the columns through all edges of the drive at a node, which `pass_edges` has not passed yet."""
+    firings, begins, pieces, replace, under_way, live = train
     t = node[0]
-    value = drive_value(t, drive)
+    value = drive_value(t, live)
     for p in range(first, last):
         piece = under_way[p]
         while pieces[piece, 1] != END:
