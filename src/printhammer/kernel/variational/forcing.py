@@ -66,7 +66,7 @@ if TYPE_CHECKING:
         spring_force,
     )
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_change, piece_rate
-    from printhammer.kernel.variational.layout import Forcing
+    from printhammer.kernel.variational.layout import Forcing, Setting
     from printhammer.kernel.variational.slopes import field_slope
 
 
@@ -223,22 +223,13 @@ def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing)
 
 @compiled
 def add_forcing(
-    rates: Any,
-    y: Any,
-    columns: Any,
-    mode: int,
-    memory: float,
-    slopes: Any,
-    scales: Any,
-    bounds: Any,
-    hammer: Hammer,
-    drive: Drive,
-    forcing: Forcing,
+    rates: Any, y: Any, columns: Any, mode: int, memory: float, slopes: Any, setting: Setting
 ) -> None:
     """Add what constants do to the `rates` of the columns at `y`, and fill in those of the energies.
 
     `slopes` are those of `printhammer.kernel.variational.columns.force_slopes` there.
     """
+    scales, bounds, hammer, drive, forcing = setting
     moves = forcing.moves
     field_x, push_x, _push_v, push_peak, loss_x, loss_v = slopes
     v, t, pace = y[1], y[TIME], rates[TIME]
