@@ -126,7 +126,7 @@ def carry_columns(
         status = stretch.status
         kernel.flow(
             stretch.nodes,
-            *drive,
+            drive,
             problem.constants,
             problem.scales,
             problem.bounds,

@@ -236,7 +236,7 @@ class Problem:
         return specialise(self.laws)
 
     def drive_arrays(self) -> tuple[Any, ...]:
-        """Return what the kernel needs of the drive, with working space of its own."""
+        """Return what the kernel needs of the drive, with working space: see its `Train`."""
         count = self.firings.size
         under_way, live = np.zeros(count, np.int64), np.zeros(1 + 7 * count)
         return (self.firings, self.begins, self.pieces, self.replace, under_way, live)
@@ -268,7 +268,7 @@ class Problem:
     ) -> tuple[int, int, int, int]:
         """Run to time `end`, s, or to a pause, from the start or from where `state` says."""
         status, used, touched, steps = self.kernel.run(
-            *drive[:4],
+            drive,
             self.constants,
             self.start,
             float(self.state[0]),
@@ -277,7 +277,6 @@ class Problem:
             self.control,
             self.bounds,
             max_steps,
-            *drive[4:],
             nodes,
             contacts,
             state,
@@ -325,13 +324,13 @@ class Problem:
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
         """Return states and forces, shape (n, 9), at ascending times, s; see the kernel's `resample`."""
         out = np.empty((times.size, 9))
-        self.kernel.resample(times, record.nodes, *self.drive_arrays(), self.constants, out)
+        self.kernel.resample(times, record.nodes, self.drive_arrays(), self.constants, out)
         return out
 
     def peaks(self, record: Record) -> FloatArray:
         """Return time, depth and force, shape (m, 3), at the peaks of all contacts."""
         out = np.empty((len(record.contacts), 3))
-        self.kernel.peaks(record.contacts, record.nodes, *self.drive_arrays(), self.constants, out)
+        self.kernel.peaks(record.contacts, record.nodes, self.drive_arrays(), self.constants, out)
         return out
 
     def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
@@ -342,7 +341,7 @@ class Problem:
             np.ascontiguousarray(starts, np.float64),
             np.ascontiguousarray(ends, np.float64),
             record.nodes,
-            *self.drive_arrays(),
+            self.drive_arrays(),
             self.constants,
             out,
         )

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled, inlined
-from printhammer.kernel.model.layout import CUBIC_PIECE, END, EXPONENTIAL_PIECE
+from printhammer.kernel.model.layout import CUBIC_PIECE, END, EXPONENTIAL_PIECE, Train
 
 Drive = Any
 """The array ``live``."""
@@ -87,14 +87,9 @@ def drive_value(t: float, drive: Drive) -> float:
 @compiled
 def pass_edges(
     t: float,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
+    train: Train,
     first: int,
     last: int,
-    live: Drive,
 ) -> tuple[int, int, float]:
     """Begin and end all pieces whose edge is not after time `t` [s] and rewrite `live`.
 
@@ -108,6 +103,7 @@ def pass_edges(
         The new `first` and `last`, equal if no pulse is under way, and the time of the next edge [s],
         infinity if there is none.
     """
+    firings, begins, pieces, replace, under_way, live = train
     while last < firings.size and firings[last] <= t:
         under_way[last] = begins[last]
         last += 1
@@ -136,10 +132,9 @@ def pass_edges(
 
 
 @compiled
-def edges_at(
-    t: float, firings: Any, begins: Any, pieces: Any, replace: bool, under_way: Any, live: Drive
-) -> tuple[int, int, float]:
+def edges_at(t: float, train: Train) -> tuple[int, int, float]:
     """Do as `pass_edges` does from the start, but leave out the pulses that ended before time `t` [s]."""
+    firings, pieces = train.firings, train.pieces
     # The last table has the longest support.
     oldest = t - pieces[pieces.shape[0] - 1, 0]
     low, high = 0, firings.size
@@ -151,4 +146,4 @@ def edges_at(
             high = middle
     # One more than needed: a pulse may end at `t` by rounding.
     low = max(low - 1, 0)
-    return pass_edges(t, firings, begins, pieces, replace, under_way, low, low, live)
+    return pass_edges(t, train, low, low)

@@ -37,11 +37,11 @@ from printhammer.kernel.variational.layout import (
 )
 
 if TYPE_CHECKING:
-    from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
+    from printhammer.kernel.model.forces import acceleration, backstop_acceleration
     from printhammer.kernel.model.laws import CHANGING, FORCED, HAS_BACKSTOP, HAS_PACK, MEMORY
-    from printhammer.kernel.model.pulses import Drive, drive_value
+    from printhammer.kernel.model.pulses import drive_value
     from printhammer.kernel.variational.forcing import add_forcing
-    from printhammer.kernel.variational.layout import Forcing
+    from printhammer.kernel.variational.layout import Setting
     from printhammer.kernel.variational.slopes import contact_slopes, field_slope, memory_slope, pack_slopes
 
 LONGEST_PHASE = 0.75
@@ -50,15 +50,7 @@ LONGEST_PHASE = 0.75
 
 @compiled
 def force_slopes(
-    y: Any,
-    mode: int,
-    memory: float,
-    peak: float,
-    peaks: Any,
-    scales: Any,
-    bounds: Any,
-    hammer: Hammer,
-    drive: Drive,
+    y: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
 ) -> tuple[float, float, float, float, float, float]:
     """Return the slopes of the forces at `y`: displacement or w, velocity, time.
 
@@ -71,6 +63,7 @@ def force_slopes(
         displacement, velocity and latest local maximum; of what of it is lost for good, with displacement and
         velocity. In the backstop those with displacement are times 2 w, but for the first.
     """
+    scales, bounds, hammer, drive, _forcing = setting
     value = drive_value(y[TIME], drive)
     if HAS_BACKSTOP and mode == BACKSTOP:
         w = y[0]
@@ -88,20 +81,10 @@ def force_slopes(
 
 @compiled
 def column_rates(
-    rates: Any,
-    y: Any,
-    columns: Any,
-    mode: int,
-    memory: float,
-    peak: float,
-    peaks: Any,
-    scales: Any,
-    bounds: Any,
-    hammer: Hammer,
-    drive: Drive,
-    forcing: Forcing,
+    rates: Any, y: Any, columns: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
 ) -> None:
     """Fill `rates` with those of displacement or w, velocity, time and columns at `y`."""
+    hammer, drive = setting.hammer, setting.drive
     v = y[1]
     if HAS_BACKSTOP and mode == BACKSTOP:
         pace = 2.0 * y[0]
@@ -112,7 +95,7 @@ def column_rates(
         rates[0] = v
         rates[1] = acceleration(y[TIME], y[0], v, mode, memory, hammer, drive)
     rates[TIME] = pace
-    slopes = force_slopes(y, mode, memory, peak, peaks, scales, bounds, hammer, drive)
+    slopes = force_slopes(y, mode, memory, peak, peaks, setting)
     by_x = (pace * slopes[0] + slopes[1]) * hammer[INVERSE_MASS]
     by_v = pace * slopes[2] * hammer[INVERSE_MASS]
     by_peak = slopes[3] * hammer[INVERSE_MASS]
@@ -121,45 +104,26 @@ def column_rates(
         rates[j] = pace * y[j + 1]
         rates[j + 1] = by_x * y[j] + by_v * y[j + 1] + by_peak * columns[PEAK, k]
     if FORCED:
-        add_forcing(rates, y, columns, mode, memory, slopes, scales, bounds, hammer, drive, forcing)
+        add_forcing(rates, y, columns, mode, memory, slopes, setting)
 
 
 @compiled
-def longest_step(
-    mode: int,
-    memory: float,
-    peak: float,
-    work: Any,
-    scales: Any,
-    bounds: Any,
-    hammer: Hammer,
-    drive: Drive,
-) -> float:
+def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Setting) -> float:
     """Return the longest step from row START of `work` that follows a change of the state closely.
 
     The run's own steps follow the state: near rest, where that hardly moves, they are longer.
     """
-    slopes = force_slopes(work[START], mode, memory, peak, work[MEMORIES], scales, bounds, hammer, drive)
+    slopes = force_slopes(work[START], mode, memory, peak, work[MEMORIES], setting)
     pace = 2.0 * work[START, 0] if mode == BACKSTOP else 1.0
-    by_x = (pace * slopes[0] + slopes[1]) * hammer[INVERSE_MASS]
-    by_v = pace * slopes[2] * hammer[INVERSE_MASS]
+    by_x = (pace * slopes[0] + slopes[1]) * setting.hammer[INVERSE_MASS]
+    by_v = pace * slopes[2] * setting.hammer[INVERSE_MASS]
     rate = max(math.sqrt(abs(pace * by_x)), abs(by_v))
     return LONGEST_PHASE / rate if rate > 0.0 else math.inf
 
 
 @compiled
 def column_step(
-    length: float,
-    columns: Any,
-    work: Any,
-    mode: int,
-    memory: float,
-    peak: float,
-    scales: Any,
-    bounds: Any,
-    hammer: Hammer,
-    drive: Drive,
-    forcing: Forcing,
+    length: float, columns: Any, work: Any, mode: int, memory: float, peak: float, setting: Setting
 ) -> None:
     """Take one step of `length` (s, or of the variable s in the backstop) from row START of `work`."""
     count = FIRST_COLUMN + CHANGING * columns.shape[1]
@@ -171,9 +135,7 @@ def column_step(
             share = length * A[stage, j]
             for i in range(count):
                 y[i] += share * work[j, i]
-        column_rates(
-            work[stage], y, columns, mode, memory, peak, peaks, scales, bounds, hammer, drive, forcing
-        )
+        column_rates(work[stage], y, columns, mode, memory, peak, peaks, setting)
     for j in range(STAGES):
         share = length * B[j]
         for i in range(count):

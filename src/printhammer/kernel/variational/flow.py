@@ -9,9 +9,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
-from printhammer.kernel.model.layout import POSITION
+from printhammer.kernel.model.layout import POSITION, Train
 from printhammer.kernel.model.modes import BACKSTOP, RELOADING, UNLOADING
-from printhammer.kernel.variational.layout import DUE, GROWN, PEAK, SMOOTH, START, STATE, Forcing
+from printhammer.kernel.variational.layout import DUE, GROWN, PEAK, SMOOTH, START, STATE, Forcing, Setting
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.forces import Hammer
@@ -111,12 +111,7 @@ def scale_or_note(factor: float, renormalise: bool, columns: Any, scales: Any, g
 @entry
 def flow(
     nodes: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Any,
+    train: Any,
     hammer: Hammer,
     scales: Any,
     bounds: Any,
@@ -140,7 +135,7 @@ def flow(
 
     Parameters
     ----------
-    nodes, firings, begins, pieces, replace, under_way, live, hammer
+    nodes, train, hammer
         As recorded and given in :func:`printhammer.kernel.single.run.run`.
     scales : tuple of float
         Scales of displacement and velocity.
@@ -172,12 +167,14 @@ def flow(
     passed : float64 array, shape (q, 2, r, n)
         The columns at the wanted nodes before the switch there and after it.
     """
+    train = Train(*train)
     forcing = Forcing(*forced_by)
+    setting = Setting(scales, bounds, hammer, train.live, forcing)
     count = nodes.shape[0]
     asked = 0
-    first, last, _edge = edges_at(nodes[0, 0], firings, begins, pieces, replace, under_way, live)
+    first, last, _edge = edges_at(nodes[0, 0], train)
     if FORCED:
-        set_live_moves(first, last, pieces, under_way, forcing)
+        set_live_moves(first, last, train, forcing)
     grown = track[GROWN:]
     for i in range(count):
         due = int(track[DUE])
@@ -188,28 +185,24 @@ def flow(
         final = i + 1 == count
         t_end = after[0]
         if FORCED and due > 0:
-            pass_moving_edges(
-                node, firings, begins, pieces, replace, under_way, first, last, columns, hammer, live, forcing
-            )
-        first, last, _edge = pass_edges(
-            node[0], firings, begins, pieces, replace, under_way, first, last, live
-        )
+            pass_moving_edges(node, train, first, last, columns, setting)
+        first, last, _edge = pass_edges(node[0], train, first, last)
         if FORCED:
-            set_live_moves(first, last, pieces, under_way, forcing)
+            set_live_moves(first, last, train, forcing)
         begin_step(node, work)
         # A mark at the time of several nodes belongs to the last of them.
         while due < marks.size and (marks[due] < t_end or (final and ended and marks[due] == t_end)):
-            factor = carry(marks[due], node, after, columns, work, scales, bounds, hammer, live, forcing)
+            factor = carry(marks[due], node, after, columns, work, setting)
             scale_or_note(factor, renormalise, columns, scales, grown)
             note_mark(states, seen, growth, track, node, initial, columns, work, hammer)
             due += 1
         if due in (0, marks.size) or final:
             continue
-        factor = carry(t_end, node, after, columns, work, scales, bounds, hammer, live, forcing)
+        factor = carry(t_end, node, after, columns, work, setting)
         asked_now = asked < wanted.size and wanted[asked] == i + 1
         if asked_now:
             copy_columns(columns, passed[asked, 0])
-        if not pass_node(node, after, columns, hammer, live, forcing):
+        if not pass_node(node, after, columns, setting):
             track[SMOOTH] = 0.0
         if asked_now:
             copy_columns(columns, passed[asked, 1])

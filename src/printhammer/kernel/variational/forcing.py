@@ -22,6 +22,7 @@ from printhammer.kernel.model.layout import (
     PACK,
     POSITION,
     SPRING,
+    Train,
 )
 from printhammer.kernel.model.modes import BACKSTOP, LOADING, RELOADING, UNLOADING
 from printhammer.kernel.model.pulses import LIVE_WIDTH
@@ -65,19 +66,19 @@ if TYPE_CHECKING:
         spring_force,
     )
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_change, piece_rate
-    from printhammer.kernel.variational.layout import Forcing
+    from printhammer.kernel.variational.layout import Forcing, Setting
     from printhammer.kernel.variational.slopes import field_slope
 
 
 @compiled
-def set_live_moves(first: int, last: int, pieces: Any, under_way: Any, forcing: Forcing) -> None:
+def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> None:
     """Rewrite the changes of the pieces under way, in the order in which `pass_edges` has them."""
     fire_moves, piece_moves, live_moves = forcing.fire_moves, forcing.piece_moves, forcing.live_moves
     for k in range(fire_moves.shape[0]):
         j = 0
         for p in range(first, last):
-            piece = under_way[p]
-            if pieces[piece, 1] == END:
+            piece = train.under_way[p]
+            if train.pieces[piece, 1] == END:
                 continue
             live_moves[k, j] = fire_moves[k, p] + piece_moves[k, piece, 0]
             for i in range(4):
@@ -222,22 +223,13 @@ def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing)
 
 @compiled
 def add_forcing(
-    rates: Any,
-    y: Any,
-    columns: Any,
-    mode: int,
-    memory: float,
-    slopes: Any,
-    scales: Any,
-    bounds: Any,
-    hammer: Hammer,
-    drive: Drive,
-    forcing: Forcing,
+    rates: Any, y: Any, columns: Any, mode: int, memory: float, slopes: Any, setting: Setting
 ) -> None:
     """Add what constants do to the `rates` of the columns at `y`, and fill in those of the energies.
 
     `slopes` are those of `printhammer.kernel.variational.columns.force_slopes` there.
     """
+    scales, bounds, hammer, drive, forcing = setting
     moves = forcing.moves
     field_x, push_x, _push_v, push_peak, loss_x, loss_v = slopes
     v, t, pace = y[1], y[TIME], rates[TIME]

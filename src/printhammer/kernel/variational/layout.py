@@ -75,6 +75,16 @@ class Forcing(NamedTuple):
     value_spacing: float
 
 
+class Setting(NamedTuple):
+    """What stays the same along a run."""
+
+    scales: Any
+    bounds: Any
+    hammer: Any
+    drive: Any
+    forcing: Forcing
+
+
 def changing(forced: bool) -> int:
     """Return the number of rows of a column that change between switches."""
     return STATE + (ENERGIES if forced else 0)

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
         pack_change,
         stored_change,
     )
-    from printhammer.kernel.variational.layout import Forcing
+    from printhammer.kernel.variational.layout import Forcing, Setting
     from printhammer.kernel.variational.slopes import contact_slopes, field_slope, note_memories, pack_slopes
 
 GRADING = 1.0 / 64.0
@@ -76,17 +76,9 @@ def length_in_contact(
 
 
 @compiled
-def place_of_rest(
-    t: float,
-    node: Any,
-    k: int,
-    scales: Any,
-    bounds: Any,
-    hammer: Hammer,
-    drive: Drive,
-    forcing: Forcing,
-) -> float:
+def place_of_rest(t: float, node: Any, k: int, setting: Setting) -> float:
     """Return by how much a constant moves the place where the armature rests [m]."""
+    scales, bounds, hammer, drive, forcing = setting
     x, mode, moves = node[1], int(node[3]), forcing.moves
     if mode == RESTING:
         return float(moves[k, POSITION])
@@ -104,12 +96,13 @@ def place_of_rest(
 
 
 @compiled
-def settle(pause: float, node: Any, columns: Any, scales: Any, bounds: Any, hammer: Hammer) -> float:
+def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
     """Let the columns die out for `pause` [s] about a place of rest in the backstop.
 
     The linear oscillator with the slopes of that place, in closed form. Returns the logarithm of a factor
     taken out of the columns.
     """
+    scales, bounds, hammer = setting.scales, setting.bounds, setting.hammer
     x, w = node[1], node[4]
     slopes = contact_slopes(w, 0.0, scales, hammer)
     by_x = (field_slope(x, 0.0, scales, bounds, hammer) - slopes[0] / (2.0 * w)) * hammer[INVERSE_MASS]
@@ -133,17 +126,7 @@ def settle(pause: float, node: Any, columns: Any, scales: Any, bounds: Any, hamm
 
 
 @compiled
-def rest(
-    t: float,
-    t_to: float,
-    node: Any,
-    columns: Any,
-    scales: Any,
-    bounds: Any,
-    hammer: Hammer,
-    drive: Drive,
-    forcing: Forcing,
-) -> float:
+def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> float:
     """Carry the columns through a rest from `t` to `t_to` [s]; what was before it is forgotten, or dies out.
 
     Returns the logarithm of a factor taken out of the columns.
@@ -153,17 +136,17 @@ def rest(
         for k in range(columns.shape[1]):
             place = 0.0
             if FORCED:
-                place = place_of_rest(t_to, node, k, scales, bounds, hammer, drive, forcing)
+                place = place_of_rest(t_to, node, k, setting)
             columns[0, k], columns[1, k] = place, 0.0
             columns[PEAK, k] = 0.0 if int(node[3]) == RESTING else place
         return grown
     if FORCED:
         for k in range(columns.shape[1]):
-            columns[0, k] -= place_of_rest(t, node, k, scales, bounds, hammer, drive, forcing)
-    grown = settle(t_to - t, node, columns, scales, bounds, hammer)
+            columns[0, k] -= place_of_rest(t, node, k, setting)
+    grown = settle(t_to - t, node, columns, setting)
     if FORCED:
         for k in range(columns.shape[1]):
-            place = place_of_rest(t, node, k, scales, bounds, hammer, drive, forcing)
+            place = place_of_rest(t, node, k, setting)
             columns[0, k] = columns[0, k] * math.exp(grown) + place
             columns[1, k] *= math.exp(grown)
         return 0.0
@@ -171,10 +154,9 @@ def rest(
 
 
 @compiled
-def set_in(
-    t: float, t_to: float, node: Any, columns: Any, hammer: Hammer, drive: Drive, forcing: Forcing
-) -> None:
+def set_in(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> None:
     """Carry the columns through the step that only gets the regularised equations going."""
+    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
     x, pause = node[1], t_to - t
     for k in range(columns.shape[1]):
         columns[0, k] += pause * columns[1, k]
@@ -195,32 +177,22 @@ def add_stored(sign: float, columns: Any, work: Any, hammer: Hammer, forcing: Fo
 
 
 @compiled
-def carry(
-    t_to: float,
-    node: Any,
-    after: Any,
-    columns: Any,
-    work: Any,
-    scales: Any,
-    bounds: Any,
-    hammer: Hammer,
-    drive: Drive,
-    forcing: Forcing,
-) -> float:
+def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
     """Carry state and columns from the time in row START of `work` to `t_to` [s], in the step from `node`.
 
     Returns the logarithm of a factor taken out of the columns.
     """
+    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
     t = work[START, TIME]
     if t_to <= t:
         return 0.0
     mode, kept = int(node[3]), node[4]
     if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING):
         work[START, TIME] = t_to
-        return rest(t, t_to, node, columns, scales, bounds, hammer, drive, forcing)
+        return rest(t, t_to, node, columns, setting)
     if HAS_BACKSTOP and mode == BACKSTOP and work[START, 0] == 0.0 and work[START, 1] == 0.0:
         work[START, TIME] = t_to
-        set_in(t, t_to, node, columns, hammer, drive, forcing)
+        set_in(t, t_to, node, columns, setting)
         return 0.0
     # What a backstop that has let go still stores is lost as it creeps back.
     if FORCED and HAS_BACKSTOP and mode == BACKSTOP_RELEASED:
@@ -229,23 +201,23 @@ def carry(
     if HAS_BACKSTOP and mode == BACKSTOP:
         leaves = t_to == after[0] and int(after[3]) == FREE
         length = length_in_contact(t_to, leaves, t, work[START, 0], work[START, 1], hammer, drive)
-        count = 1 + int(length / longest_step(mode, 0.0, 0.0, work, scales, bounds, hammer, drive))
+        count = 1 + int(length / longest_step(mode, 0.0, 0.0, work, setting))
         for _ in range(count):
-            column_step(length / count, columns, work, mode, 0.0, 0.0, scales, bounds, hammer, drive, forcing)
+            column_step(length / count, columns, work, mode, 0.0, 0.0, setting)
     else:
         memory = memory_of(mode, kept, hammer)
         if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
             note_memories(work[MEMORIES], kept, hammer)
             if FORCED:
                 note_changed_memories(kept, forcing)
-        longest = longest_step(mode, memory, kept, work, scales, bounds, hammer, drive)
+        longest = longest_step(mode, memory, kept, work, setting)
         left = t_to - t
         while left > 0.0:
             length = min(left, longest)
             if HAS_PACK and mode == LOADING and work[START, 1] > 0.0:
                 since = (work[START, 0] - hammer[FRONT]) / work[START, 1]
                 length = min(length, max(since, GRADING * (t_to - t)))
-            column_step(length, columns, work, mode, memory, kept, scales, bounds, hammer, drive, forcing)
+            column_step(length, columns, work, mode, memory, kept, setting)
             left = 0.0 if length == left else t_to - work[START, TIME]
     work[START, TIME] = t_to
     bring_back(work, columns)

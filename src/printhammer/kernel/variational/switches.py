@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled
-from printhammer.kernel.model.layout import BACKSTOP_PART, END, FRONT, INVERSE_MASS, MAGNET, POSITION
+from printhammer.kernel.model.layout import BACKSTOP_PART, END, FRONT, INVERSE_MASS, MAGNET, POSITION, Train
 from printhammer.kernel.model.modes import (
     BACKSTOP,
     FREE,
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_value
     from printhammer.kernel.single.resample import branch_of, memory_of
     from printhammer.kernel.variational.forcing import rebound_change
-    from printhammer.kernel.variational.layout import Forcing
+    from printhammer.kernel.variational.layout import Setting
     from printhammer.kernel.variational.slopes import field_at
 
 SPEED_SPACING = 1e-3
@@ -68,8 +68,9 @@ def is_rebound(node: Any, after: Any) -> bool:
 
 
 @compiled
-def pass_rebound(node: Any, after: Any, columns: Any, hammer: Hammer, drive: Drive, forcing: Forcing) -> None:
+def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
     """Carry the columns through an impact on a rigid backstop."""
+    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
     c = hammer[BACKSTOP_PART:MAGNET]
     v_in, v_out = node[2], after[2]
     spacing = -SPEED_SPACING * v_in
@@ -99,13 +100,12 @@ def pass_rebound(node: Any, after: Any, columns: Any, hammer: Hammer, drive: Dri
 
 
 @compiled
-def pass_reversal(
-    node: Any, after: Any, mode: int, following: int, columns: Any, hammer: Hammer, drive: Drive
-) -> bool:
+def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any, setting: Setting) -> bool:
     """Carry the columns through a reversal inside the pack; tell whether that is differentiable.
 
     The velocity is zero, and so are all powers.
     """
+    hammer, drive = setting.hammer, setting.drive
     before = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
     behind = acceleration_at(after, following, after[4], 0.0, hammer, drive)
     # Along the unloading curve: the old maximum is met without velocity.
@@ -123,17 +123,10 @@ def pass_reversal(
 
 @compiled
 def pass_level(
-    node: Any,
-    after: Any,
-    mode: int,
-    following: int,
-    jump: int,
-    columns: Any,
-    hammer: Hammer,
-    drive: Drive,
-    forcing: Forcing,
+    node: Any, after: Any, mode: int, following: int, jump: int, columns: Any, setting: Setting
 ) -> bool:
     """Carry the columns through a touch, a leaving or the old maximum; tell whether differentiable."""
+    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
     v = after[2]
     if v == 0.0:
         return False
@@ -154,18 +147,18 @@ def pass_level(
 
 
 @compiled
-def pass_node(node: Any, after: Any, columns: Any, hammer: Hammer, drive: Drive, forcing: Forcing) -> bool:
+def pass_node(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     """Carry the columns through the switch at the node `after`, if it is one; tell whether differentiable."""
     if is_rebound(node, after):
-        pass_rebound(node, after, columns, hammer, drive, forcing)
+        pass_rebound(node, after, columns, setting)
         return True
     mode, following = branch_of(int(node[3])), branch_of(int(after[3]))
     jump = JUMPS[mode, following]
     if jump == NO_JUMP or (mode == following and node[4] == after[4]):
         return True
     if jump == TURN:
-        return pass_reversal(node, after, mode, following, columns, hammer, drive)
-    return pass_level(node, after, mode, following, jump, columns, hammer, drive, forcing)
+        return pass_reversal(node, after, mode, following, columns, setting)
+    return pass_level(node, after, mode, following, jump, columns, setting)
 
 
 @compiled
@@ -178,16 +171,10 @@ def value_of_piece(t: float, fired: float, piece: int, pieces: Any) -> float:
 
 @compiled
 def pass_edge(
-    node: Any,
-    value: float,
-    change: float,
-    pulse: int,
-    piece: int,
-    columns: Any,
-    hammer: Hammer,
-    forcing: Forcing,
+    node: Any, value: float, change: float, pulse: int, piece: int, columns: Any, setting: Setting
 ) -> float:
     """Carry the columns through one edge at which the drive jumps by `change`; return its value after it."""
+    hammer, forcing = setting.hammer, setting.forcing
     new = value + change
     mode = int(node[3])
     if change == 0.0 or mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING):
@@ -206,23 +193,11 @@ def pass_edge(
 
 
 @compiled
-def pass_moving_edges(
-    node: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    first: int,
-    last: int,
-    columns: Any,
-    hammer: Hammer,
-    drive: Drive,
-    forcing: Forcing,
-) -> None:
+def pass_moving_edges(node: Any, train: Train, first: int, last: int, columns: Any, setting: Setting) -> None:
     """Carry the columns through all edges of the drive at a node, which `pass_edges` has not passed yet."""
+    firings, begins, pieces, replace, under_way, live = train
     t = node[0]
-    value = drive_value(t, drive)
+    value = drive_value(t, live)
     for p in range(first, last):
         piece = under_way[p]
         while pieces[piece, 1] != END:
@@ -231,10 +206,10 @@ def pass_moving_edges(
                 break
             change = value_of_piece(t, firings[p], piece, pieces)
             change -= value_of_piece(t, firings[p], piece - 1, pieces)
-            value = pass_edge(node, value, change, p, piece, columns, hammer, forcing)
+            value = pass_edge(node, value, change, p, piece, columns, setting)
     while last < firings.size and firings[last] <= t:
         change = value_of_piece(t, firings[last], begins[last], pieces)
         if replace:
             change -= value
-        value = pass_edge(node, value, change, last, begins[last], columns, hammer, forcing)
+        value = pass_edge(node, value, change, last, begins[last], columns, setting)
         last += 1
