@@ -2,7 +2,7 @@
 
 from .chaos.basins.basins import basins as basins
 from .chaos.basins.quench import quench_map as quench_map
-from .chaos.bifurcation.diagram import bifurcation as bifurcation
+from .chaos.bifurcation.bifurcation import bifurcation as bifurcation
 from .chaos.continuation.continuation import continuation as continuation
 from .chaos.continuation.regimes import regimes as regimes
 from .chaos.continuation.stability_chart import stability_chart as stability_chart

@@ -5,114 +5,29 @@ from __future__ import annotations
 import json
 import tomllib
 from contextlib import suppress
-from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.claims import Context, Result, buzz_search, judge_all
+from printhammer.claims import Context, buzz_search, judge_all
 from printhammer.claims.verdicts import panel_strobes, printed_verdicts
 from printhammer.errors import InputError, PrinthammerError
-from printhammer.reconstruction.results import Results, shipped_results
+from printhammer.reconstruction.results import shipped_results
 from printhammer.report.citations import cited_figures
+from printhammer.report.contents import Drawing, Report
 from printhammer.report.publish import CLAIMS, PAGE, PDF, PICTURES, staged
 from printhammer.support.outputs import write_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
+    from printhammer.claims import Result
     from printhammer.hammer.hammer import Hammer
-    from printhammer.reconstruction.results import BaseRates, Family, Search
+    from printhammer.reconstruction.results import BaseRates, Results
 
 _BUZZ: Final = 7
 _POINCARE: Final = 11
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """One figure of the paper, drawn.
-
-    Attributes
-    ----------
-    number : int
-        Number in the paper.
-    title, caption : str
-        What it is, and what it shows for this hammer.
-    says : str
-        What the paper says of it, in our words.
-    svg : bytes
-        The picture; empty where it could not be drawn.
-    pdf : Path or None
-        Its file as vectors, seen from the folder of the report.
-    reason : str
-        Why it could not be drawn; empty where it was.
-    claims : tuple of Result
-        Claims that cite the figure.
-    seconds : float
-        Time that it took.
-    """
-
-    number: int
-    title: str
-    caption: str
-    says: str
-    svg: bytes
-    pdf: Path | None
-    reason: str
-    claims: tuple[Result, ...]
-    seconds: float
-
-
-@dataclass(frozen=True)
-class Report:
-    """What `write_report` judged, drew and wrote.
-
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    results : list of Result
-        The claims, judged.
-    drawings : list of Drawing
-        The figures.
-    provenance : mapping
-        Versions, fingerprint, tolerance.
-    reconstruction : Results
-        Results of a reconstruction, of this hammer or of another.
-    seconds : float
-        Time that all took.
-    files : list of Path
-        What was written.
-    """
-
-    hammer: Hammer
-    results: list[Result]
-    drawings: list[Drawing]
-    provenance: Mapping[str, Any]
-    reconstruction: Results
-    seconds: float
-    files: list[Path] = field(default_factory=list)
-
-    def count(self, verdict: str) -> int:
-        """Return how many claims have a verdict."""
-        return sum(result.verdict == verdict for result in self.results)
-
-    @property
-    def reconstructed(self) -> bool:
-        """Whether the hammer is the one that the reconstruction is about."""
-        return self.search is not None
-
-    @property
-    def search(self) -> Search | None:
-        """The search for the constants of this hammer."""
-        search = self.reconstruction.search
-        return search if search is not None and search.shipped == self.hammer.fingerprint else None
-
-    @property
-    def family(self) -> Family | None:
-        """The hammers that do as well as this one."""
-        return self.reconstruction.family if self.reconstructed else None
 
 
 def write_report(

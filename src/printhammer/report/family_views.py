@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.reconstruction.results import Family, FamilyMember
-    from printhammer.report.build import Report
+    from printhammer.report.contents import Report
 
 _ROOM: Final = 4.0
 """Free part of a track at each end, in percent."""

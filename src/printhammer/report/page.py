@@ -16,7 +16,7 @@ from printhammer.report.views import failing_view, panels_view, predictions_view
 if TYPE_CHECKING:
     from printhammer.claims import Result
     from printhammer.hammer.hammer import Hammer
-    from printhammer.report.build import Report
+    from printhammer.report.contents import Report
 
 KINDS: Final = {
     "stated": "the paper prints the number or the verdict; the band is the printed precision",

@@ -22,7 +22,7 @@ from printhammer.support.outputs import write_file
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from printhammer.report.build import Report
+    from printhammer.report.contents import Report
 
 _SHOWN = (
     *("has_reconstructed", "statuses", "parts", "verdicts", "kinds", "by_kind", "claims", "failing", "rates"),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.reconstruction.judging.shares import Share
     from printhammer.reconstruction.results import BestFor
-    from printhammer.report.build import Report
+    from printhammer.report.contents import Report
 
 SAME: Final = 1e-9
 """Relative difference up to which two constants are the same."""

@@ -39,9 +39,7 @@ if TYPE_CHECKING:
 JUMP: Final = 8e-6
 """Difference of neighbouring advances from which on they belong to different ways to fire a dot, s."""
 
-_NEAR: Final = 1e-9
-"""Rounding allowed in a rate, relative, and in a time, s."""
-
+_NEAR: Final = 1e-9  # Rounding allowed in a rate, relative, and in a time, s
 _CELLS: Final = "rate history"
 
 

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 VALUES: Final = (*COLUMNS, "deviation")
 """Names of the arrays of a table."""
 
+# Length of the row of dots in every slot before a history, where it has to be right in long patterns too
 _DENSE: Final = 6
-"""Length of the row of dots in every slot before a history, where it has to be right in long patterns too."""
 
 
 @dataclass(frozen=True)

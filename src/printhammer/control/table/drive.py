@@ -33,14 +33,9 @@ MARGIN: Final = 1e-3
 ROUNDING: Final = 1e-9
 """Part by which rounding may go beyond a bound."""
 
-_HALVINGS: Final = 50
-"""Halvings of an interval of widths: more than a double has bits to tell them apart."""
-
-_SAMPLES: Final = 4001
-"""Instants at which a decaying pulse is looked at."""
-
-_WAIT: Final = 1e-6
-"""Step of the wait after a brake pulse, s."""
+_HALVINGS: Final = 50  # Halvings of an interval of widths: more than a double has bits to tell them apart
+_SAMPLES: Final = 4001  # Instants at which a decaying pulse is looked at
+_WAIT: Final = 1e-6  # Step of the wait after a brake pulse, s
 
 
 class Settings(NamedTuple):

@@ -53,8 +53,7 @@ HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "la
 
 _FIRST: Final = f"# {KIND}, format {FORMAT}"
 _UNITS: Final = {"rate": "Hz", **dict.fromkeys(COLUMNS, "s")}
-_ATTRIBUTE: Final = re.compile(r"# \w+: ")
-"""A line of provenance in a CSV file."""
+_ATTRIBUTE: Final = re.compile(r"# \w+: ")  # A line of provenance in a CSV file
 
 
 def columns(gaps: int) -> list[str]:

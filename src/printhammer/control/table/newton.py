@@ -22,8 +22,8 @@ ROUNDS: Final = 7
 LONGEST_STEP: Final = 25e-6
 """Longest change of firing time or width in one step, s."""
 
+# Damping after Levenberg and Marquardt, in parts of the limits for a change of `LONGEST_STEP`
 _DAMPING: Final = 0.02
-"""Damping after Levenberg and Marquardt, in parts of the limits for a change of `LONGEST_STEP`."""
 
 
 def solve(

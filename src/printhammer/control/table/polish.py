@@ -28,8 +28,7 @@ LEAST_OF_WIDEST: Final = 0.3
 ROUGH: Final = 0.2
 """Deviation, in parts of the limits, above which an entry is made less wrong in all patterns."""
 
-_STEP: Final = 0.5e-6
-"""Difference of times from which derivatives are taken, s."""
+_STEP: Final = 0.5e-6  # Difference of times from which derivatives are taken, s
 
 
 def polish(draft: Draft, report: Callable[[], None]) -> None:

@@ -49,8 +49,7 @@ STRATEGIES: Final = ("open loop", "table")
 SETS: Final = ("eight slots", "cycle", "random")
 """Patterns: all 255 of eight slots from rest; the de Bruijn cycle of order 8; long random ones."""
 
-_LONG: Final = 12
-"""Number of rates of a table from which on it is judged between them."""
+_LONG: Final = 12  # Number of rates of a table from which on it is judged between them
 
 RANDOM: Final = 8
 """Number of random patterns."""

@@ -43,57 +43,26 @@ SPACING: Final = 30e-6
 BAD: Final = 0.75
 """Cost from which on more ways are looked for."""
 
-_ROOM: Final = 100e-6
-"""How far before and after its slot a dot is tried, s."""
-
-_GRID: Final = (12, 8)
-"""Numbers of firing times and widths of the grid on which a search begins."""
-
-_FINE: Final = 3
-"""How much finer this grid is without a brake pulse, and how many more searches begin on it."""
-
-_DELAY: Final = 45e-6
-"""Step of the beginnings of brake pulses, s."""
-
+_ROOM: Final = 100e-6  # How far before and after its slot a dot is tried, s
+_GRID: Final = (12, 8)  # Numbers of firing times and widths of the grid on which a search begins
+_FINE: Final = 3  # How much finer this grid is without a brake pulse, and how many more searches begin on it
+_DELAY: Final = 45e-6  # Step of the beginnings of brake pulses, s
+# Widths of brake pulses, in parts of that of the hammer's own
 _BRAKES: Final = (0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0)
-"""Widths of brake pulses, in parts of that of the hammer's own."""
-
-_APART: Final = 30e-6
-"""Least difference of the firing times from which searches begin, s."""
-
-_STARTS: Final = 2
-"""Number of searches for each brake pulse."""
-
-_FAR: Final = 8.0
-"""Deviation, in parts of the limits, beyond which no search begins."""
-
-_KEPT: Final = 5
-"""Number of ways that are kept for a time."""
-
-_ENOUGH: Final = 0.6
-"""Cost of a way without a brake pulse up to which none with one is looked for."""
-
-_HOPELESS: Final = 20.0
-"""Cost above which a way is as bad as any."""
-
-_CLOSE: Final = 8e-6
-"""Between the times at which brake pulses between those of the grid are tried, s."""
-
+_APART: Final = 30e-6  # Least difference of the firing times from which searches begin, s
+_STARTS: Final = 2  # Number of searches for each brake pulse
+_FAR: Final = 8.0  # Deviation, in parts of the limits, beyond which no search begins
+_KEPT: Final = 5  # Number of ways that are kept for a time
+_ENOUGH: Final = 0.6  # Cost of a way without a brake pulse up to which none with one is looked for
+_HOPELESS: Final = 20.0  # Cost above which a way is as bad as any
+_CLOSE: Final = 8e-6  # Between the times at which brake pulses between those of the grid are tried, s
+# By how much these begin later, s: no more than half of `_DELAY`
 _LATER: Final = (-22e-6, -8e-6, 8e-6, 22e-6)
-"""By how much these begin later, s: no more than half of `_DELAY`."""
-
-_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)
-"""How much wider these are: between neighbours of `_BRAKES`."""
-
-_LEAST_BRAKE: Final = 0.05
-"""Least width of a brake pulse, in parts of that of the hammer's own."""
-
+_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)  # How much wider these are: between neighbours of `_BRAKES`
+_LEAST_BRAKE: Final = 0.05  # Least width of a brake pulse, in parts of that of the hammer's own
+# What it costs to go to another way from one time to the next: there nothing is interpolated
 _SWITCH: Final = 0.15
-"""What it costs to go to another way from one time to the next: there nothing is interpolated."""
-
-_SAME: Final = 1e-6
-"""Difference of firing times up to which ways with the same brake pulse are the same, s."""
-
+_SAME: Final = 1e-6  # Difference of firing times up to which ways with the same brake pulse are the same, s
 _ROUNDING: Final = 1e-12
 
 

@@ -31,20 +31,12 @@ if TYPE_CHECKING:
 QUIET: Final = 2e-4
 """Distance from rest below which the hammer counts as settled, in parts of the way to the pack."""
 
-_LONGEST: Final = 20e-3
-"""Time in which the hammer has to settle after a single pulse, s."""
-
-_SAMPLE: Final = 2e-6
-"""Between the instants at which this is looked at, s."""
-
+_LONGEST: Final = 20e-3  # Time in which the hammer has to settle after a single pulse, s
+_SAMPLE: Final = 2e-6  # Between the instants at which this is looked at, s
+# By how much the pulse before a brake pulse may be late or wider than the hammer's own, s
 _WIDE: Final = 50e-6
-"""By how much the pulse before a brake pulse may be late or wider than the hammer's own, s."""
-
-_TAIL: Final = 1e-3
-"""How long runs go on after the last slot, s: until the last contact is over."""
-
-_PIECE: Final = 4096
-"""Number of runs of one ensemble, which bounds the memory."""
+_TAIL: Final = 1e-3  # How long runs go on after the last slot, s: until the last contact is over
+_PIECE: Final = 4096  # Number of runs of one ensemble, which bounds the memory
 
 
 @dataclass(frozen=True)

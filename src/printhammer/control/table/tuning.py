@@ -43,14 +43,11 @@ SPREAD: Final = (
 )
 """By how much the hammers differ on which ways to fire a dot are compared, and a robust table is tuned."""
 
+# Deviation, in parts of the limits, up to which a rate belongs to a table over all rates
 _USABLE: Final = 0.9
-"""Deviation, in parts of the limits, up to which a rate belongs to a table over all rates."""
-
-_POOR: Final = 0.5
-"""Deviation, in parts of the limits, above which a given rate is tuned once more."""
-
+_POOR: Final = 0.5  # Deviation, in parts of the limits, above which a given rate is tuned once more
+# How far from the times between dots ways are then looked for as well, s
 _AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)
-"""How far from the times between dots ways are then looked for as well, s."""
 
 
 def tune(

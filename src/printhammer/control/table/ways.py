@@ -29,18 +29,12 @@ NOMINAL: Final = 8.0
 LEAST_OF_OWN: Final = 0.5
 """Least width, in parts of that of the pulse of the hammer."""
 
+# Deviation of the second dot, in parts of the limits, from which on a way is left as it is
 _SOLVED: Final = 1e-3
-"""Deviation of the second dot, in parts of the limits, from which on a way is left as it is."""
-
-_STEPS: Final = (1e-6, 0.5e-6)
-"""Differences of firing time and width from which derivatives are taken, s."""
-
+_STEPS: Final = (1e-6, 0.5e-6)  # Differences of firing time and width from which derivatives are taken, s
+# Deviation of the second dot, in parts of the limits, above which a way does not make it right
 _RIGHT: Final = 0.02
-"""Deviation of the second dot, in parts of the limits, above which a way does not make it right."""
-
-_WRONG: Final = 1.0
-"""What such a way costs more, so that any that makes it right comes first."""
-
+_WRONG: Final = 1.0  # What such a way costs more, so that any that makes it right comes first
 _ROUNDING: Final = 1e-12
 
 
