@@ -22,11 +22,11 @@ from printhammer.chaos.continuation.events import event_of
 from printhammer.chaos.continuation.family import RegimeFamily, rigid_backstop
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from printhammer.chaos.continuation.events import BranchEvent
-    from printhammer.chaos.continuation.family import Course, Passage
+    from printhammer.chaos.continuation.family import Passage
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
@@ -223,13 +223,7 @@ class Tracer:
     def described(self, family: RegimeFamily, curve: Curve, steps: Steps) -> Branch:
         """Return a branch with all about its orbits."""
         nodes = curve.nodes
-        courses: dict[int, Course] = {}
-
-        def work(begin: int, end: int) -> None:
-            for i in range(begin, end):
-                courses[i] = family.course(nodes[i].state, nodes[i].parameter)
-
-        in_threads([work], [len(nodes)], thread_count(self.threads))
+        courses = mapped(lambda node: family.course(node.state, node.parameter), nodes, self.threads)
         count = len(nodes)
         passages: list[Passage] = [node.value.extra for node in nodes]
         dots = [passage.dots for passage in passages]
@@ -239,7 +233,7 @@ class Tracer:
             return np.array(rows, dtype=np.float64).reshape(count, family.firings)
 
         def of_courses(name: str) -> FloatArray:
-            return np.array([getattr(courses[i], name) for i in range(count)], dtype=np.float64)
+            return np.array([getattr(course, name) for course in courses], dtype=np.float64)
 
         states = of_courses("states").reshape(count, family.firings, 2)
         found = points_of(

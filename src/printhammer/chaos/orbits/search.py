@@ -19,7 +19,7 @@ from printhammer.results import Column, Result, part, scalar
 from printhammer.results.stacking import stacked
 from printhammer.run.problem import TOLERANCE, check_tolerance
 from printhammer.run.regime import Regime
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -349,22 +349,14 @@ class _Search:
 
     def _described(self, closed: Sequence[tuple[Regime, Closing]]) -> list[Orbit]:
         """Return all about the orbits, without those that were found at another section too."""
-        every: dict[int, Orbit] = {}
-
-        def work(begin: int, end: int) -> None:
-            for i in range(begin, end):
-                regime, closing = closed[i]
-                every[i] = orbit_of(regime, closing, self.tolerance)
-
-        in_threads([work], [len(closed)], self.threads)
         found: list[Orbit] = []
-        for i in range(len(closed)):
-            if not every[i].ok:
-                self.failures[every[i].status] += 1
-            elif any(self._same(every[i], other) for other in found):
+        for one in mapped(lambda pair: orbit_of(*pair, self.tolerance), closed, self.threads):
+            if not one.ok:
+                self.failures[one.status] += 1
+            elif any(self._same(one, other) for other in found):
                 self.repeats += 1
             else:
-                found.append(every[i])
+                found.append(one)
         return sorted(found, key=lambda orbit: (orbit.firings, KINDS.index(orbit.kind), *orbit.x, *orbit.v))
 
     def _same(self, one: Orbit, other: Orbit) -> bool:

@@ -22,7 +22,7 @@ from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import Problem, check_tolerance
 from printhammer.run.regime import Regime
 from printhammer.run.start import initial_state
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -183,14 +183,12 @@ def strobe_maps(
     if len(many) != len(rows):
         raise InputError(f"regimes: {len(many)} are given, expected 1 or {len(rows)}")
     many = [Regime.of(regime, phase=phase) for regime in many]
-    found: dict[int, Image] = {}
-
-    def work(begin: int, end: int) -> None:
-        for i in range(begin, end):
-            found[i] = image_of(many[i], rows[i], count, tolerance, contacts=contacts)
-
-    in_threads([work], [len(rows)], thread_count(threads), progress)
-    return [found[i] for i in range(len(rows))]
+    return mapped(
+        lambda i: image_of(many[i], rows[i], count, tolerance, contacts=contacts),
+        range(len(rows)),
+        threads,
+        progress,
+    )
 
 
 def strobe_slope(

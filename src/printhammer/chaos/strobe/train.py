@@ -11,7 +11,7 @@ import numpy as np
 from printhammer.chaos.strobe.verdict import period_of, repeats, verdict
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.window import window_of
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -204,20 +204,17 @@ def exponents_of(
     """Return the largest exponents of trains, from the first to the last of some firings, on all cores."""
     from printhammer.derivatives.states import strobe_exponent
 
-    found: dict[int, Exponent] = {}
-
-    def work(begin: int, end: int) -> None:
-        for i in range(begin, end):
-            train = trains[i]
-            found[i] = strobe_exponent(
-                train.hammer,
-                train.drive,
-                train.period,
-                first=firings[0],
-                last=firings[1],
-                state=train.state,
-                tolerance=tolerance,
-            )
-
-    in_threads([work], [len(trains)], thread_count(threads), progress)
-    return [found[i] for i in range(len(trains))]
+    return mapped(
+        lambda train: strobe_exponent(
+            train.hammer,
+            train.drive,
+            train.period,
+            first=firings[0],
+            last=firings[1],
+            state=train.state,
+            tolerance=tolerance,
+        ),
+        trains,
+        threads,
+        progress,
+    )
