@@ -51,5 +51,5 @@ def _filled_up(arrays: list[Any], dims: int) -> Any:
     nothing: Any = {"U": "", "i": -1}.get(dtype.kind, np.nan)
     table = np.full((len(arrays), *shape), nothing, dtype=dtype)
     for k, array in enumerate(arrays):
-        table[(k, *map(slice, array.shape))] = array
+        table[(k, *(slice(length) for length in array.shape))] = array
     return table
