@@ -49,7 +49,7 @@ def _filled_up(arrays: list[Any], dims: int) -> Any:
     shape = [max(array.shape[axis] for array in arrays) for axis in range(dims)]
     dtype = np.result_type(*arrays)
     nothing: Any = {"U": "", "i": -1}.get(dtype.kind, np.nan)
-    table = np.full((len(arrays), *shape), nothing, dtype=dtype)
+    table: Any = np.full((len(arrays), *shape), nothing, dtype=dtype)
     for k, array in enumerate(arrays):
         table[(k, *(slice(length) for length in array.shape))] = array
     return table

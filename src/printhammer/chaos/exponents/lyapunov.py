@@ -1,4 +1,4 @@
-"""Lyapunov exponents of the strobe map: how fast neighbouring motions part, or come together.
+"""Lyapunov exponents of the stroboscopic map: how fast neighbouring motions part, or come together.
 
 From firing to firing the tangent flow (docs/tangent.md) stretches one direction of the plane of displacement
 and velocity and shrinks the other. The mean logarithms are the exponents lambda_1 >= lambda_2; their sum is

@@ -1,4 +1,4 @@
-"""Impact maps: the state at each touch of the backstop or of the pack.
+"""Impact maps: Poincaré sections at the touches of the backstop or of the pack.
 
 At a touch the displacement is that of the surface. What decides all that follows is the velocity and the time
 since the last firing; from touch to touch these two are an iterated map, as the strobe is from firing to

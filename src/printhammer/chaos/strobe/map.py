@@ -1,4 +1,8 @@
-"""The strobe map: from the state at one section to that some firings later, with its derivative.
+"""The stroboscopic map: from the state at one section to that some firings later, with its derivative.
+
+It is the Poincaré map of a section at a fixed phase of the drive. Its derivative over a period of an orbit is
+the monodromy matrix, whose eigenvalues are the Floquet multipliers; where a motion touches a surface, the
+tangent flow passes it by the saltation matrix (docs/tangent.md).
 
 A section lies at a fixed phase of the period. There the state is displacement and velocity, unless the
 armature is just then in the pack on its way out: then what the pack remembers belongs to it too, and the

@@ -1,8 +1,8 @@
 """Strobe: the state of the armature once a period, as the Poincaré plots of Fig. 11 show it.
 
-A train of firings is an iterated map in the plane of displacement and velocity: from the state at one firing
-to that at the next. Where a firing falls inside a pack contact, the state also has the branch of the pack's
-law and its memory, the latest local maximum.
+A train of firings is an iterated map, the stroboscopic map, in the plane of displacement and velocity: from
+the state at one firing to that at the next. Where a firing falls inside a pack contact, the state also has
+the branch of the pack's law and its memory, the latest local maximum.
 """
 
 from __future__ import annotations
