@@ -12,7 +12,7 @@ from printhammer.chaos.orbits.guesses import PHASES, close_returns, first_state,
 from printhammer.chaos.orbits.maps import ExactMaps, FastMaps
 from printhammer.chaos.orbits.newton import Closing, close_orbits
 from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, no_orbit, orbit_of, orbits_table
-from printhammer.chaos.strobe.map import MAP_TOLERANCE
+from printhammer.chaos.strobe.map import MAP_TOLERANCE, read_state
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, part, scalar
@@ -217,11 +217,7 @@ def orbit(
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     check_tolerance(tolerance)
-    found = np.asarray(state, dtype=np.float64)
-    if found.shape != (2,) or not np.isfinite(found).all():
-        raise InputError(
-            f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
-        )
+    found = read_state(state)
     if count > MOST_FIRINGS:
         raise InputError(f"firings = {count}, expected at most {MOST_FIRINGS}")
     scales = regime.window.half_widths

@@ -139,12 +139,23 @@ def strobe_map(
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     check_tolerance(tolerance)
+    return image_of(regime, read_state(state), count, tolerance, contacts=contacts)
+
+
+def read_state(state: npt.ArrayLike) -> FloatArray:
+    """Read displacement, m, and velocity, m/s.
+
+    Raises
+    ------
+    InputError
+        It is not two finite numbers.
+    """
     found = np.asarray(state, dtype=np.float64)
     if found.shape != (2,) or not np.isfinite(found).all():
         raise InputError(
             f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
         )
-    return image_of(regime, found, count, tolerance, contacts=contacts)
+    return found
 
 
 def strobe_maps(
