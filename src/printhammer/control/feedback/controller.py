@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.loop import Loop
     from printhammer.control.feedback.policy import Choice
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.nominal import Nominal
     from printhammer.support.arrays import FloatArray
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
@@ -108,31 +107,13 @@ class Controller:
             raise InputError(f"{hammer.path}: the hammer has no {missing}, expected one")
         self.limits = Limits() if limits is None else limits
         self.leads = LEADS
-        self.plant = Plant(hammer, driver, nominal(hammer), threads)
-        forces = force_map(self.plant)
-        self.start = launch(self.plant, forces)
-        self.fronts = fronts(self.plant, forces, self.start)
+        self.plant = plant = Plant(hammer, driver, nominal(hammer), threads)
+        self.hammer, self.driver = hammer, driver
+        self.single, self.stroke = plant.single, plant.stroke
+        forces = force_map(plant)
+        self.start = launch(plant, forces)
+        self.fronts = fronts(plant, forces, self.start)
         self._policies: dict[float, Policy] = {}
-
-    @property
-    def hammer(self) -> Hammer:
-        """The nominal hammer."""
-        return self.plant.hammer
-
-    @property
-    def driver(self) -> Driver:
-        """The driver of its coil."""
-        return self.plant.driver
-
-    @property
-    def single(self) -> Nominal:
-        """Its single-pulse dot."""
-        return self.plant.single
-
-    @property
-    def stroke(self) -> float:
-        """Way from backstop to pack, m."""
-        return self.plant.stroke
 
     @cached_property
     def force(self) -> FreeForce:

@@ -59,17 +59,7 @@ class Driver:
 
 
 class BoundedSequence(PulseSequence):
-    """Pulses of a driver; its bound is taken for the largest of them, so that this need not be sought.
-
-    Parameters
-    ----------
-    waveforms : sequence of Switched
-        What each firing does.
-    at : sequence of float
-        Firing times, s.
-    bound : float
-        Largest current of the driver, A.
-    """
+    """Pulses of a driver; its bound, A, is taken for the largest of them, so that this need not be sought."""
 
     bounded = True
 

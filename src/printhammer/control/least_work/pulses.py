@@ -51,16 +51,9 @@ _WRONG: Final = 10.0  # Cost of a contact too many, or a run that failed, in par
 class PulsePlan:
     """Times and widths found so far, and the state in which they leave the armature.
 
-    Parameters
-    ----------
-    task : Task
-        What is asked; the bound on the slope of the current is not looked at.
-    waveform : Waveform
-        The pulse whose widths are sought.
-    period, past, lead, landing : float
-        Times, s: of a slot, from the touch of a dot to the end of its slot, of the first slot, of landing.
-    rest : float
-        Displacement at rest, m.
+    The widths of `waveform` are sought; the bound of the task on the slope of the current is not looked at.
+    Times are in s: of a slot, from the touch of a dot to the end of its slot, of the first slot, of landing.
+    It begins at rest, at a displacement in m.
 
     Raises
     ------

@@ -53,13 +53,8 @@ _INSIDE: Final = 1.0 - 1e-9  # A hair inside a bound, which rounding would excee
 class NodePlan:
     """The currents found so far, straight from node to node, and how they leave the armature.
 
-    Parameters
-    ----------
-    task : Task
-        What is asked.
-    period, past, spacing, flight : float
-        Times, s: of a slot, from the touch of a dot to the end of its slot, between nodes, and of the flight
-        of the single pulse.
+    Times are in s: of a slot, from the touch of a dot to the end of its slot, between nodes, and of the
+    flight of the single pulse.
     """
 
     def __init__(self, task: Task, period: float, past: float, spacing: float, flight: float) -> None:
@@ -116,23 +111,9 @@ def printing_current(
 ) -> FloatArray | None:
     """Find the current of a slot with which its dot costs least.
 
-    Parameters
-    ----------
-    task : Task
-        What is asked.
-    begin : SlotState
-        How the slot begins.
-    duration, arrival : float
-        Of the slot, and from its beginning to the touch, s.
-    nodes : int
-        Number of nodes after the first one.
-    before : array, optional
-        What did for the slot before.
-
-    Returns
-    -------
-    array, shape (nodes,), or None
-        Currents at the nodes, A; None where none was found.
+    The slot lasts for `duration`, and the dot is to touch at `arrival`, s after its beginning. There are some
+    `nodes` after the first one; `before` is what did for the slot before. Returns the currents at the nodes,
+    A; None where none was found.
     """
 
     def asked(found: Outcomes) -> tuple[FloatArray, FloatArray]:
@@ -165,18 +146,7 @@ def printing_current(
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
-    """Find the current after the last dot with which the backstop takes least; it ends at zero.
-
-    Parameters
-    ----------
-    task, begin, duration, nodes
-        As for `printing_current`.
-
-    Returns
-    -------
-    array, shape (nodes,)
-        Currents at the nodes, A, the last one 0.
-    """
+    """Find the currents at the nodes after the last dot with which the backstop takes least, A."""
 
     def whole(currents: FloatArray) -> FloatArray:
         return np.concatenate([currents, np.zeros((len(currents), 1))], axis=1)

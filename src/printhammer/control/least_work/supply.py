@@ -54,20 +54,11 @@ def supply_check(
     least: float,
     changes: npt.ArrayLike,
 ) -> SupplyCheck:
-    """Run the drive of a burst with every current changed, in one ensemble.
+    """Run the drive of a burst with every current changed, in one ensemble, up to an end, s.
 
-    Parameters
-    ----------
-    hammer, drive, end
-        What is run, and how long, s.
-    slots : array, shape (dots,)
-        Times at which the dots are to touch, s.
-    rate : float
-        Dots per second, Hz.
-    single, least : float
-        Force of the single pulse, N, and least force of a dot in parts of it.
-    changes : array
-        Relative changes of the current, each above -1.
+    `slots` are the times at which the dots are to touch, s, at a rate in Hz; `single` is the force of the
+    single pulse, N, and `least` that of an adequate dot in parts of it; `changes` are relative changes of the
+    current.
 
     Raises
     ------

@@ -15,7 +15,6 @@ from printhammer.control.table.histories import (
     histories,
     history_text,
     number_of,
-    shared_numbers,
 )
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
@@ -125,11 +124,6 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
                 f"{where}: advance = {values['advance']!r} s fires {begun:.6g} s after the slot of the dot"
                 f" before, expected a firing after its pulses have ended, at {over:.6g} s"
             )
-
-    @property
-    def shared(self) -> Any:
-        """For every number of a history, that of the history it stands for."""
-        return shared_numbers(self.gaps, self.reach)
 
     @property
     def worst(self) -> FloatArray:

@@ -122,24 +122,11 @@ class Draft:
     ) -> FloatArray:
         """Return deviations of force and arrival of last dots of patterns, in parts of the limits.
 
-        Parameters
-        ----------
-        cells : sequence of tuple
-            The entries.
-        values : array, shape (cells, 2)
-            Advance and width of the last dot, s.
-        shifts : array, shape (shifts, 2)
-            Changes of these to be tried, s.
-        dense : bool, optional
-            Whether to take several patterns for each entry, as `befores` says.
-        whole : bool, optional
-            Whether to return the largest deviations of all dots of a pattern that have the history instead.
-
-        Returns
-        -------
-        array, shape (cells, shifts, deviations)
-            Over hammers, patterns, force and arrival; NaN for a lost dot or a pattern with extra contacts.
-            Where an entry has fewer patterns than others, its first one is repeated.
+        `values` (cells, 2) are advance and width of the last dots, s, and `shifts` (shifts, 2) changes of
+        these to be tried. `dense` takes several patterns for each entry, as `befores` says; `whole` returns
+        the largest deviations of all dots of a pattern that have the history instead. The shape is (cells,
+        shifts, deviations), over hammers, patterns, force and arrival: NaN for a lost dot or a pattern with
+        extra contacts. Where an entry has fewer patterns than others, its first one is repeated.
         """
         task = self.task
         gaps = [befores(history, task.reach) if dense else [()] for _row, history in cells]

@@ -137,16 +137,10 @@ def pulses_of(settings: Settings, gaps: int, reach: int, slots: Sequence[int], r
 def sequence(
     pulses: Pulses, pulse: Waveform, known: dict[tuple[float, float, float], Waveform]
 ) -> PulseSequence:
-    """Return the drive of a pattern.
+    """Return the drive of a pattern, by a pulse that gets other widths.
 
-    Parameters
-    ----------
-    pulses : Pulses
-        What its dots are made with.
-    pulse : Waveform
-        The pulse that gets these widths.
-    known : dict
-        Waveforms that were made before, by width, width of the brake pulse and its offset; added to.
+    `known` holds waveforms that were made before, by width, width of the brake pulse and its offset; added
+    to.
     """
     waveforms = []
     for width, braked, offset in zip(*(values.tolist() for values in pulses[3:]), strict=True):

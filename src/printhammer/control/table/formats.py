@@ -257,18 +257,10 @@ def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
 
 
 def header_text(head: Mapping[str, Any], rates: FloatArray, times: Mapping[str, FloatArray]) -> str:
-    """Return a C header (C99) with the table as whole nanoseconds and a function for the number of a history.
+    """Return a C header (C99) with the table in nanoseconds and a function for the number of a history.
 
+    `head` is what is said of the whole table, see `HEAD`; `times` are arrays (rates, entries) by name, s.
     Every number of a history is there, so that the firmware needs no search.
-
-    Parameters
-    ----------
-    head : mapping
-        What is said of the whole table, see `HEAD`.
-    rates : array, shape (R,)
-        Slots per second, Hz.
-    times : mapping
-        Arrays (R, entries) by name, s.
     """
     gaps, reach = head["gaps"], head["reach"]
     prefix = re.sub(r"\W+", "_", f"printhammer_{head['hammer']}", flags=re.ASCII).lower()

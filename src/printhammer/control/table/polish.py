@@ -32,14 +32,9 @@ _STEP: Final = 0.5e-6  # Difference of times from which derivatives are taken, s
 
 
 def polish(draft: Draft, report: Callable[[], None]) -> None:
-    """Improve all entries.
+    """Improve all entries of a draft in place; that from rest stays as it is.
 
-    Parameters
-    ----------
-    draft : Draft
-        With a first guess for every history; changed in place. The entry from rest stays as it is.
-    report : callable
-        Called after each round.
+    The draft has a first guess for every history. `report` is called after each round.
     """
     task = draft.task
     for known in range(1, task.gaps + 1):

@@ -67,23 +67,10 @@ _ROUNDING: Final = 1e-12
 
 
 def chosen(task: Task, periods: FloatArray, report: Callable[[], None]) -> tuple[FloatArray, Ways]:
-    """Choose a way for each of some times after a dot.
+    """Choose a way for each of some times after a dot, from slot to slot, s, ascending.
 
-    Parameters
-    ----------
-    task : Task
-        What the table is to be like.
-    periods : array
-        Times from slot to slot, s, ascending.
-    report : callable
-        Called after each step of the work.
-
-    Returns
-    -------
-    periods : array
-        Those at which there is a way at all.
-    ways : Ways
-        One for each of these.
+    Returns the times at which there is a way at all, and one for each of these. `report` is called after each
+    step of the work.
     """
     nodes = spaced(periods, SPACING)
     known = []

@@ -131,16 +131,8 @@ class Task:
     ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
         """Run drives, and compare all dots with that of the single pulse.
 
-        Parameters
-        ----------
-        hammer : Hammer
-            What is driven.
-        drives : sequence of Drive
-            One firing for each slot.
-        slots : array, shape (drives, dots)
-            Slot times, s; NaN beyond the last one.
-        ends : array, shape (drives,)
-            Times of the last dots, after which a run goes on for `_TAIL`, s.
+        The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN beyond the last
+        one; a run goes on for `_TAIL` after `ends` (drives,), s.
 
         Returns
         -------
