@@ -45,12 +45,8 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
 
-BURST: Final = "11101101"
-"""Pattern of the run that is shown."""
-
-MOST_GAPS: Final = 500
-"""Number of gaps above which a double-pulse test is refused."""
-
+BURST: Final = "11101101"  # Pattern of the run that is shown
+MOST_GAPS: Final = 500  # Number of gaps above which a double-pulse test is refused
 # First and last gap of the double-pulse test, in flight times of the single pulse, and their number
 _GAPS: Final = (1.5, 6.0, 46)
 

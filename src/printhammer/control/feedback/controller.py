@@ -40,9 +40,7 @@ LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
 """Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,
 and does not begin before it."""
 
-WINDOW: Final = 120e-6
-"""Time over which samples are looked at, s."""
-
+WINDOW: Final = 120e-6  # Time over which samples are looked at, s
 # Standard deviations that are expected at a touch: of the displacement, in parts of the way to the pack, and
 # of the speed, m/s
 _PLACE_ERROR: Final = 0.03

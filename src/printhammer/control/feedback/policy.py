@@ -27,12 +27,9 @@ if TYPE_CHECKING:
     from printhammer.printing.limits import Limits
     from printhammer.support.arrays import FloatArray
 
-NEVER: Final = 50.0
-"""Cost of what leads nowhere."""
-
+NEVER: Final = 50.0  # Cost of what leads nowhere
+# Standard deviation of the front, in parts of the way to the pack, above which it counts as not known
 KNOWN: Final = 0.01
-"""Standard deviation of the front, in parts of the way to the pack, above which it counts as not known."""
-
 _DISCOUNT: Final = 0.9  # Discount of the costs of each further dot
 _ROUNDS: Final = 8  # Number of dots before a rest from which on more make no difference
 _LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, in parts of the limit

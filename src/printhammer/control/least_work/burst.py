@@ -58,27 +58,20 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
 
-FORCE: Final = 0.9
-"""Least force of an adequate dot, in parts of that of the single pulse."""
-
+FORCE: Final = 0.9  # Least force of an adequate dot, in parts of that of the single pulse
 SPACING: Final = 0.6
 """Time between the nodes of the current unless told otherwise, in parts of the time in which a single pulse
 indents the pack; a period holds a whole number of them."""
 
-MOST_DOTS: Final = 1000
-"""Number of dots above which a burst is refused."""
-
+MOST_DOTS: Final = 1000  # Number of dots above which a burst is refused
 Least = Literal["positive work", "heat"]
+# What is made least: the positive work of the coil, or its heat, which goes by the squared current
 LEASTS: Final = get_args(Least)
-"""What is made least: the positive work of the coil, or its heat, which goes by the squared current."""
-
+# Relative changes of the current under which a burst is looked at unless told otherwise
 SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
-"""Relative changes of the current under which a burst is looked at unless told otherwise."""
-
 Shape = Literal["free", "pulses"]
+# What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths
 SHAPES: Final = get_args(Shape)
-"""What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths."""
-
 # End of a slot after its touch, in parts of the time in which a single pulse indents the pack
 _PAST_PEAK: Final = 1.2
 _SPARE: Final = 5e-4  # Part of the force by which a dot is planned to be harder than asked for

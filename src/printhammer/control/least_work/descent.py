@@ -14,21 +14,11 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import FloatArray
 
-LOST: Final = 25.0
-"""What a run that failed counts as, in parts of the tolerances."""
-
-MISSED: Final = 0.05
-"""Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`."""
-
-SLACK: Final = 8e-3
-"""Lack of force up to which a dot has the force asked for, in `FORCE`."""
-
-ARRIVAL: Final = 20e-6
-"""Tolerance by which a time of arrival is measured, s."""
-
-FORCE: Final = 0.05
-"""Tolerance by which a force is measured, relative."""
-
+LOST: Final = 25.0  # What a run that failed counts as, in parts of the tolerances
+MISSED: Final = 0.05  # Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`
+SLACK: Final = 8e-3  # Lack of force up to which a dot has the force asked for, in `FORCE`
+ARRIVAL: Final = 20e-6  # Tolerance by which a time of arrival is measured, s
+FORCE: Final = 0.05  # Tolerance by which a force is measured, relative
 _DIFFERENCE: Final = 1e-5  # Difference from which derivatives are taken
 _ENDS_AT: Final = 1e-5  # Change of the cost at which a descent ends
 

@@ -34,9 +34,7 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.support.arrays import FloatArray
 
-GONE: Final = 1e-2
-"""The current of a pulse has gone where less than this part of its peak is left."""
-
+GONE: Final = 1e-2  # The current of a pulse has gone where less than this part of its peak is left
 _PER_SLOT: Final = 2  # Number of pulses of a slot
 _TRIED: Final = 1024  # Number of times and widths from the best of which a search begins
 _TRIES, _MOST_TRIES = 4, 10  # Number of searches, and while nothing is found

@@ -32,12 +32,8 @@ if TYPE_CHECKING:
     from printhammer.control.least_work.slot import Outcomes, Task
     from printhammer.support.arrays import FloatArray
 
-LEAD: Final = 2.0
-"""Length of the first slot, from rest to the touch, in flight times of the single pulse."""
-
-LANDING: Final = 5.0
-"""Length of the landing, in flight times of the single pulse."""
-
+LEAD: Final = 2.0  # Length of the first slot, from rest to the touch, in flight times of the single pulse
+LANDING: Final = 5.0  # Length of the landing, in flight times of the single pulse
 _FEWEST, _MOST = 8, 96  # Least and largest number of nodes of a slot
 # Part of a step by which the current of a slot lasts longer than the slot, which cuts it off
 _OVERLAP: Final = 0.01

@@ -35,9 +35,8 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray
 
+# Difference of neighbouring advances from which on they belong to different ways to fire a dot, s
 JUMP: Final = 8e-6
-"""Difference of neighbouring advances from which on they belong to different ways to fire a dot, s."""
-
 _NEAR: Final = 1e-9  # Rounding allowed in a rate, relative, and in a time, s
 _CELLS: Final = "rate history"
 

@@ -36,9 +36,7 @@ if TYPE_CHECKING:
 
     IntArray = npt.NDArray[np.int64]
 
-VALUES: Final = (*COLUMNS, "deviation")
-"""Names of the arrays of a table."""
-
+VALUES: Final = (*COLUMNS, "deviation")  # Names of the arrays of a table
 # Length of the row of dots in every slot before a history, where it has to be right in long patterns too
 _DENSE: Final = 6
 

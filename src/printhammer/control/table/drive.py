@@ -21,18 +21,11 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-WIDEST: Final = 2.0
-"""Largest width of a pulse, in parts of that of the hammer's own."""
-
-LARGEST_CURRENT: Final = 2.0
-"""Largest current in any drive unless told otherwise, A."""
-
+WIDEST: Final = 2.0  # Largest width of a pulse, in parts of that of the hammer's own
+LARGEST_CURRENT: Final = 2.0  # Largest current in any drive unless told otherwise, A
+# Part of the largest current that a single pulse stays below it, for what is left of a brake pulse
 MARGIN: Final = 1e-3
-"""Part of the largest current that a single pulse stays below it, for what is left of a brake pulse."""
-
-ROUNDING: Final = 1e-9
-"""Part by which rounding may go beyond a bound."""
-
+ROUNDING: Final = 1e-9  # Part by which rounding may go beyond a bound
 _HALVINGS: Final = 50  # Halvings of an interval of widths: more than a double has bits to tell them apart
 _SAMPLES: Final = 4001  # Instants at which a decaying pulse is looked at
 _WAIT: Final = 1e-6  # Step of the wait after a brake pulse, s
@@ -59,8 +52,7 @@ class Settings(NamedTuple):
     brake_width: FloatArray
 
 
-COLUMNS: Final = Settings._fields
-"""What a table says of a dot."""
+COLUMNS: Final = Settings._fields  # What a table says of a dot
 
 
 def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:

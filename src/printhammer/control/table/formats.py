@@ -36,21 +36,12 @@ if TYPE_CHECKING:
     Head = dict[str, Any]
     Rows = list[dict[str, Any]]
 
-FORMAT: Final = 1
-"""Version of the CSV format, and of the JSON files of former versions."""
-
-KIND: Final = "printhammer compensation table"
-"""What the first line of a CSV file says."""
-
-NANOSECOND: Final = 1e-9
-"""Unit of the times in a C header, s."""
-
-DEVIATION: Final = "deviation"
-"""Name of the array that is no time."""
-
+FORMAT: Final = 1  # Version of the CSV format, and of the JSON files of former versions
+KIND: Final = "printhammer compensation table"  # What the first line of a CSV file says
+NANOSECOND: Final = 1e-9  # Unit of the times in a C header, s
+DEVIATION: Final = "deviation"  # Name of the array that is no time
+# What a file says of the whole table
 HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "largest_current": float}
-"""What a file says of the whole table."""
-
 _FIRST: Final = f"# {KIND}, format {FORMAT}"
 _UNITS: Final = {"rate": "Hz", **dict.fromkeys(COLUMNS, "s")}
 _ATTRIBUTE: Final = re.compile(r"# \w+: ")  # A line of provenance in a CSV file

@@ -16,12 +16,8 @@ if TYPE_CHECKING:
     Measure = Callable[[FloatArray, npt.NDArray[np.int64], FloatArray], FloatArray]
     Bounded = Callable[[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_]], None]
 
-ROUNDS: Final = 7
-"""Largest number of steps."""
-
-LONGEST_STEP: Final = 25e-6
-"""Longest change of firing time or width in one step, s."""
-
+ROUNDS: Final = 7  # Largest number of steps
+LONGEST_STEP: Final = 25e-6  # Longest change of firing time or width in one step, s
 # Damping after Levenberg and Marquardt, in parts of the limits for a change of `LONGEST_STEP`
 _DAMPING: Final = 0.02
 

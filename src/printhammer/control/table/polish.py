@@ -19,15 +19,10 @@ if TYPE_CHECKING:
     from printhammer.control.table.histories import History
     from printhammer.support.arrays import FloatArray
 
-GOOD: Final = 1e-4
-"""Deviation, in parts of the limits, from which on an entry is left as it is."""
-
-LEAST_OF_WIDEST: Final = 0.3
-"""Least width, in parts of the largest one."""
-
+GOOD: Final = 1e-4  # Deviation, in parts of the limits, from which on an entry is left as it is
+LEAST_OF_WIDEST: Final = 0.3  # Least width, in parts of the largest one
+# Deviation, in parts of the limits, above which an entry is made less wrong in all patterns
 ROUGH: Final = 0.2
-"""Deviation, in parts of the limits, above which an entry is made less wrong in all patterns."""
-
 _STEP: Final = 0.5e-6  # Difference of times from which derivatives are taken, s
 
 

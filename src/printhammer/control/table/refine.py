@@ -17,11 +17,9 @@ if TYPE_CHECKING:
 
     from printhammer.control.table.draft import IntArray
 
-HALVINGS: Final = 3
-"""How often the step between two rates is halved at most."""
-
+HALVINGS: Final = 3  # How often the step between two rates is halved at most
+# Deviation between two rates, in parts of the limits, from which on there is one more between them
 BETWEEN: Final = 0.5
-"""Deviation between two rates, in parts of the limits, from which on there is one more between them."""
 
 
 def refined(draft: Draft, report: Callable[[], None]) -> Draft:

@@ -37,12 +37,9 @@ if TYPE_CHECKING:
     from printhammer.control.table.task import Task
     from printhammer.support.arrays import FloatArray
 
+# Between the times at which all ways are looked for; between them those of the neighbours are tried, s
 SPACING: Final = 30e-6
-"""Between the times at which all ways are looked for; between them those of the neighbours are tried, s."""
-
-BAD: Final = 0.75
-"""Cost from which on more ways are looked for."""
-
+BAD: Final = 0.75  # Cost from which on more ways are looked for
 _ROOM: Final = 100e-6  # How far before and after its slot a dot is tried, s
 _GRID: Final = (12, 8)  # Numbers of firing times and widths of the grid on which a search begins
 _FINE: Final = 3  # How much finer this grid is without a brake pulse, and how many more searches begin on it

@@ -28,9 +28,8 @@ if TYPE_CHECKING:
     from printhammer.printing.limits import Limits
     from printhammer.support.arrays import FloatArray
 
+# Distance from rest below which the hammer counts as settled, in parts of the way to the pack
 QUIET: Final = 2e-4
-"""Distance from rest below which the hammer counts as settled, in parts of the way to the pack."""
-
 _LONGEST: Final = 20e-3  # Time in which the hammer has to settle after a single pulse, s
 _SAMPLE: Final = 2e-6  # Between the instants at which this is looked at, s
 # By how much the pulse before a brake pulse may be late or wider than the hammer's own, s

@@ -29,12 +29,8 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-FIRST: Final = 100.0
-"""Lowest rate of a table over all rates, Hz: every dot is printed from rest."""
-
-STEP: Final = 5.0
-"""Step between the rates of such a table, Hz."""
-
+FIRST: Final = 100.0  # Lowest rate of a table over all rates, Hz: every dot is printed from rest
+STEP: Final = 5.0  # Step between the rates of such a table, Hz
 SPREAD: Final = (
     Perturbation(current=0.03),
     Perturbation(current=-0.03),

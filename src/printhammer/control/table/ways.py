@@ -20,15 +20,9 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-ROW: Final = 8
-"""Number of dots of the row that decides."""
-
-NOMINAL: Final = 8.0
-"""How often the hammer that a table is made for counts, beside those that differ."""
-
-LEAST_OF_OWN: Final = 0.5
-"""Least width, in parts of that of the pulse of the hammer."""
-
+ROW: Final = 8  # Number of dots of the row that decides
+NOMINAL: Final = 8.0  # How often the hammer that a table is made for counts, beside those that differ
+LEAST_OF_OWN: Final = 0.5  # Least width, in parts of that of the pulse of the hammer
 # Deviation of the second dot, in parts of the limits, from which on a way is left as it is
 _SOLVED: Final = 1e-3
 _STEPS: Final = (1e-6, 0.5e-6)  # Differences of firing time and width from which derivatives are taken, s
