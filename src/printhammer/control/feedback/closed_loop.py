@@ -160,4 +160,4 @@ class _Run:
         shown = np.where(used, sensor.read(np.nan_to_num(x), numbers, runs, stroke), 0.0)
         samples = Samples(times, shown, used, sensor.error * stroke)
         count = contacts.shape[1]
-        return samples.some((slice(None), slice(count))), samples.some((slice(None), slice(count, None)))
+        return samples.take((slice(None), slice(count))), samples.take((slice(None), slice(count, None)))

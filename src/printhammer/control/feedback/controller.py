@@ -16,7 +16,7 @@ from printhammer.control.feedback.estimator.adaptation import Contacts
 from printhammer.control.feedback.estimator.flight import Expected, FreeForce, flight_from_samples
 from printhammer.control.feedback.fronts import between_fronts, fronts
 from printhammer.control.feedback.impact_map import ALWAYS, FREE, PUSHED, force_map
-from printhammer.control.feedback.interpolation import known
+from printhammer.control.feedback.interpolation import blend_known
 from printhammer.control.feedback.launch import launch
 from printhammer.control.feedback.loop import APART, REMEMBERED, Printed, Pulse, Touched
 from printhammer.control.feedback.plant import Plant
@@ -165,7 +165,7 @@ class Controller:
         for loop in loops:
             loop.learned.drift()
         if rows:
-            self.contacts.learn([loops[k] for k in rows], samples.some(rows))
+            self.contacts.learn([loops[k] for k in rows], samples.take(rows))
 
     def estimate(self, loops: Sequence[Loop], samples: Samples) -> None:
         """Estimate the coming touches from what the sensor shows of flights."""
@@ -334,10 +334,10 @@ class Controller:
         for name in ("release", "brake", "width"):
             tables = np.array([getattr(landing, name) for landing in self.fronts.landings])
             near, far = (
-                known(tables[number, below], tables[number, below + 1], share)
+                blend_known(tables[number, below], tables[number, below + 1], share)
                 for number in (nearer, nearer + 1)
             )
-            found.append(known(near, far, farther))
+            found.append(blend_known(near, far, farther))
         return found
 
     @property

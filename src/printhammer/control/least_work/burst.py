@@ -23,7 +23,7 @@ from printhammer.control.least_work.coil_force import CoilForce
 from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
 from printhammer.control.least_work.slot import Task
-from printhammer.control.least_work.supply import supply_check
+from printhammer.control.least_work.supply import SupplyCheck
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Sampled
@@ -35,6 +35,7 @@ from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
 from printhammer.run.coil_work import coil_power
+from printhammer.run.ensemble import Ensemble
 from printhammer.run.ledger import stored_energy
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import CYCLE, simulate
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
 
-    from printhammer.control.least_work.supply import SupplyCheck
     from printhammer.drive.sequence import PulseSequence
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
@@ -202,16 +202,35 @@ class LeastWork(Result, rows="node"):
         return float(motion.t[min(int(moving[-1]) + 1, motion.t.size - 1)]) if moving.size else 0.0
 
     def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
-        """Run the same drive with every current larger or smaller by given parts of it."""
-        return supply_check(
-            self.hammer,
-            self.drive,
-            self.motion.end,
-            self.slots,
-            rate=self.rate,
-            single=self.single.force,
-            least=self.force,
-            changes=changes,
+        """Run the same drive, in one ensemble, with every current larger or smaller by given parts of it.
+
+        Raises
+        ------
+        InputError
+            A change is not a finite number above -1.
+        """
+        factors = 1.0 + np.atleast_1d(np.asarray(changes, dtype=np.float64))
+        if factors.ndim != 1 or not (np.isfinite(factors) & (factors > 0.0)).all():
+            raise InputError(f"changes = {changes!r}, expected relative changes of the current above -1")
+        drives = [self.drive.scaled(factor) for factor in factors.tolist()]
+        result = Ensemble(self.hammer, drives, self.motion.end).run(dots=True, engine="plain")
+        dots = result.dots
+        assert dots is not None
+        touched = np.where(dots.struck, dots.fired_at + dots.flight_time, np.inf)
+        away = np.abs(touched[:, :, np.newaxis] - self.slots)
+        # The dot of a slot is the touch nearest to it, wherever its pulse was fired.
+        which = away.argmin(axis=1)
+        late = away.min(axis=1)
+        rows = np.arange(len(drives))[:, np.newaxis]
+        made = late < 0.5 / self.rate
+        force = np.where(made, np.nan_to_num(dots.peak_force[rows, which]) / self.single.force, 0.0)
+        good = made & (dots.extra_contacts[rows, which] == 0) & (force >= self.force)
+        return SupplyCheck(
+            changes=factors - 1.0,
+            adequate=good.sum(axis=1),
+            weakest=force.min(axis=1),
+            spread=np.where(made.all(axis=1), late.max(axis=1), np.nan),
+            status=np.array(result.status_names, "U16"),
         )
 
     @property

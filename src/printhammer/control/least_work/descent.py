@@ -95,7 +95,7 @@ def best_of(
     return None if best is None else best[1]
 
 
-def spread(dimensions: int, count: int) -> FloatArray:
+def sobol(dimensions: int, count: int) -> FloatArray:
     """Return points (count, dimensions) that are evenly spread over the unit cube: a Sobol sequence."""
     from scipy.stats import qmc
 

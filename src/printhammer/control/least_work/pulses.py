@@ -19,7 +19,7 @@ from printhammer.control.least_work.descent import (
     SLACK,
     best_of,
     descend,
-    spread,
+    sobol,
 )
 from printhammer.control.least_work.slot import SlotState, end_of
 from printhammer.control.widths import of_width, widest
@@ -91,7 +91,7 @@ class PulsePlan:
             return self._measured(rows, duration, arrival)
 
         # From rest there is nothing to brake.
-        tried = spread(2 * (_PER_SLOT if self.touches else 1), _TRIED)
+        tried = sobol(2 * (_PER_SLOT if self.touches else 1), _TRIED)
 
         def attempt(row: int) -> tuple[float, FloatArray] | None:
             place = _descend(measured, tried[row], conditions=True)
@@ -112,7 +112,7 @@ class PulsePlan:
         def measured(rows: FloatArray) -> FloatArray:
             return self._measured(rows, self._landing, self._landing)
 
-        tried = spread(2 * _PER_SLOT, _TRIED)
+        tried = sobol(2 * _PER_SLOT, _TRIED)
         order = np.argsort(measured(tried)[0], kind="stable")
         places = [_descend(measured, tried[row], conditions=False) for row in order[:_TRIES]]
         costs = measured(np.array(places))[0]

@@ -19,7 +19,7 @@ from printhammer.control.least_work.descent import (
     SLACK,
     best_of,
     descend,
-    spread,
+    sobol,
 )
 from printhammer.control.least_work.slot import RELOADING, SlotState, node_times
 from printhammer.drive.sequence import PulseSequence
@@ -213,7 +213,7 @@ def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero:
 
 def _profiles(task: Task, begin: float, duration: float, arrival: float, nodes: int) -> FloatArray:
     """Return currents that brake, wait and throw, at levels and times evenly spread, within the bounds."""
-    share = spread(5, _PROFILES)
+    share = sobol(5, _PROFILES)
     levels = task.largest * np.stack([share[:, 0], 0.6 * share[:, 1], 0.3 + 0.7 * share[:, 2]], axis=1)
     released = 0.5 * arrival * share[:, 3]
     thrown = released + share[:, 4] * (arrival - released)
@@ -228,7 +228,7 @@ def _profiles(task: Task, begin: float, duration: float, arrival: float, nodes: 
 
 def _landings(task: Task, begin: float, duration: float, nodes: int) -> FloatArray:
     """Return currents that hold the armature back on its way, then a little before the backstop."""
-    share = spread(4, _PROFILES)
+    share = sobol(4, _PROFILES)
     first, second = task.largest * (1.1 * share[:, 0] - 0.1), task.largest * share[:, 1]
     caught = 0.7 * duration * share[:, 2]
     landed = caught + share[:, 3] * (duration - caught)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.table.draft import level_of
+from printhammer.control.table.draft import histories_of_length
 from printhammer.control.table.histories import REST, number_of
 from printhammer.control.table.newton import solve
 
@@ -33,7 +33,7 @@ def polish(draft: Draft, report: Callable[[], None]) -> None:
     """
     task = draft.task
     for known in range(1, task.gaps + 1):
-        level = level_of(task, known)
+        level = histories_of_length(task, known)
         for history in level if known > 1 else []:
             parent = (*history[: known - 1], *[REST] * (task.gaps - known + 1))
             guess = draft.values[:4, :, number_of(parent, task.reach)]
