@@ -1,4 +1,4 @@
-"""Where a flying armature is and will touch the pack, from samples of its position and a model of its forces.
+"""The observer: where a flying armature is and will touch the pack, from samples and a model of its forces.
 
 In flight the acceleration is that of magnet and spring, a function of displacement and current, which the
 controller knows. What it does not know are three numbers: where the armature is at one instant, how fast, and
