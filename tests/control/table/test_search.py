@@ -49,7 +49,7 @@ def row_of(ways: Ways, place: int, dots: int) -> ph.PulseSequence:
 
 
 def test_the_best_way_makes_the_second_dot_right(found: Ways) -> None:
-    plain = found.some(found.brake == 0.0)
+    plain = found.take(found.brake == 0.0)
     single = nominal(quick(), tolerance=TOLERANCE)
     best = int(np.argmin(plain.cost))
     _first, second = ph.simulate(quick(), row_of(plain, best, 2), tolerance=TOLERANCE).dots
@@ -59,7 +59,7 @@ def test_the_best_way_makes_the_second_dot_right(found: Ways) -> None:
 
 
 def test_the_cost_is_that_of_the_worst_dot_of_a_row(task: Task, found: Ways) -> None:
-    plain = found.some(found.brake == 0.0)
+    plain = found.take(found.brake == 0.0)
     best = int(np.argmin(plain.cost))
     single = nominal(quick(), tolerance=TOLERANCE)
     drive = row_of(plain, best, table_ways.ROW)
@@ -79,7 +79,7 @@ def test_the_cost_is_that_of_the_worst_dot_of_a_row(task: Task, found: Ways) -> 
 
 
 def test_the_best_way_comes_first_of_those_without_and_of_those_with_a_brake_pulse(found: Ways) -> None:
-    for some in (found.some(found.brake == 0.0), found.some(found.brake > 0.0)):
+    for some in (found.take(found.brake == 0.0), found.take(found.brake > 0.0)):
         assert (np.diff(some.cost) >= 0.0).all()
     assert np.isfinite(found.cost).all()
 

@@ -41,22 +41,9 @@ def closed_loops(
 ) -> list[Loop]:
     """Run the closed loop for some patterns, from rest.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        What is driven; the controller does not know it.
-    controller : Controller
-        Who drives it.
-    sensor : PositionSensor
-        What the controller sees of it.
-    patterns : sequence of tuple of int
-        Numbers of the slots at which dots are wanted.
-    rate : float
-        Slots per second, Hz.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
-    threads : int, optional
-        By default as many as there are cores; the result does not depend on it.
+    The controller does not know the hammer that is driven, and sees it through the sensor. Patterns are
+    numbers of the slots at which dots are wanted, `rate` slots per second, Hz. The result does not depend on
+    the number of threads.
     """
     rest = np.array([rest_state(hammer), 0.0, -1.0, 0.0])
     loops = []
@@ -160,4 +147,4 @@ class _Run:
         shown = np.where(used, sensor.read(np.nan_to_num(x), numbers, runs, stroke), 0.0)
         samples = Samples(times, shown, used, sensor.error * stroke)
         count = contacts.shape[1]
-        return samples.some((slice(None), slice(count))), samples.some((slice(None), slice(count, None)))
+        return samples.take((slice(None), slice(count))), samples.take((slice(None), slice(count, None)))

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.feedback.driver import Driver
+    from printhammer.control.feedback.loop import Loop
     from printhammer.drive.sequence import PulseSequence
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
@@ -44,12 +45,8 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
 
-BURST: Final = "11101101"
-"""Pattern of the run that is shown."""
-
-MOST_GAPS: Final = 500
-"""Number of gaps above which a double-pulse test is refused."""
-
+BURST: Final = "11101101"  # Pattern of the run that is shown
+MOST_GAPS: Final = 500  # Number of gaps above which a double-pulse test is refused
 # First and last gap of the double-pulse test, in flight times of the single pulse, and their number
 _GAPS: Final = (1.5, 6.0, 46)
 
@@ -83,13 +80,15 @@ class FeedbackStrategy:
         self.sensor = PositionSensor() if sensor is None else sensor
         self._options: dict[str, Any] = {"tolerance": tolerance, "threads": threads}
 
+    def loops(self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Loop]:
+        """Run the closed loop on a hammer for each pattern."""
+        return closed_loops(hammer, self.controller, self.sensor, patterns, rate, **self._options)
+
     def __call__(
         self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
     ) -> list[PulseSequence]:
         """Run the closed loop on a hammer, and return the drive that it gave each pattern."""
-        if not patterns:
-            return []
-        loops = closed_loops(hammer, self.controller, self.sensor, patterns, rate, **self._options)
+        loops = self.loops(hammer, patterns, rate) if patterns else []
         return [loop.drive(self.controller.driver.edge) for loop in loops]
 
 
@@ -273,7 +272,7 @@ def feedback(
         gaps=between,
         gap_force=np.array([double.judgement.force_deviation[:, 1] for double in doubles]),
         gap_arrival=np.array([double.judgement.arrival_deviation[:, 1] for double in doubles]),
-        run=_observed(real, controller, seeing, speed, tolerance, threads),
+        run=_observed(real, own, speed, tolerance),
         tolerance=read_number(tolerance, "1", "tolerance"),
     )
 
@@ -285,22 +284,10 @@ def _checked_gaps(asked: npt.ArrayLike) -> FloatArray:
     return gaps
 
 
-def _observed(
-    hammer: Hammer,
-    controller: Controller,
-    sensor: PositionSensor,
-    rate: float,
-    tolerance: float,
-    threads: int | None,
-) -> ObservedRun:
-    slots = slots_of([mark == "1" for mark in BURST])
-    loop = closed_loops(hammer, controller, sensor, [slots], rate, tolerance=tolerance, threads=threads)[0]
-    drive = loop.drive(controller.driver.edge)
+def _observed(hammer: Hammer, strategy: FeedbackStrategy, rate: float, tolerance: float) -> ObservedRun:
+    loop = strategy.loops(hammer, [slots_of([mark == "1" for mark in BURST])], rate)[0]
+    drive = loop.drive(strategy.controller.driver.edge)
     duration = max(float(loop.due[-1]), float(drive.times[-1])) + 0.5 * WAIT
-    return ObservedRun(
-        pattern=BURST,
-        motion=simulate(hammer, drive, duration=duration, tolerance=tolerance),
-        times=np.concatenate([times for times, _shown in loop.seen]),
-        shown=np.concatenate([shown for _times, shown in loop.seen]),
-        due=loop.due,
-    )
+    motion = simulate(hammer, drive, duration=duration, tolerance=tolerance)
+    times, shown = (np.concatenate(parts) for parts in zip(*loop.seen, strict=True))
+    return ObservedRun(BURST, motion, times, shown, loop.due)

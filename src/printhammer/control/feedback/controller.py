@@ -16,7 +16,7 @@ from printhammer.control.feedback.estimator.adaptation import Contacts
 from printhammer.control.feedback.estimator.flight import Expected, FreeForce, flight_from_samples
 from printhammer.control.feedback.fronts import between_fronts, fronts
 from printhammer.control.feedback.impact_map import ALWAYS, FREE, PUSHED, force_map
-from printhammer.control.feedback.interpolation import known
+from printhammer.control.feedback.interpolation import blend_known
 from printhammer.control.feedback.launch import launch
 from printhammer.control.feedback.loop import APART, REMEMBERED, Printed, Pulse, Touched
 from printhammer.control.feedback.plant import Plant
@@ -34,16 +34,13 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.loop import Loop
     from printhammer.control.feedback.policy import Choice
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import FloatArray
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
 """Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,
 and does not begin before it."""
 
-WINDOW: Final = 120e-6
-"""Time over which samples are looked at, s."""
-
+WINDOW: Final = 120e-6  # Time over which samples are looked at, s
 # Standard deviations that are expected at a touch: of the displacement, in parts of the way to the pack, and
 # of the speed, m/s
 _PLACE_ERROR: Final = 0.03
@@ -108,31 +105,13 @@ class Controller:
             raise InputError(f"{hammer.path}: the hammer has no {missing}, expected one")
         self.limits = Limits() if limits is None else limits
         self.leads = LEADS
-        self.plant = Plant(hammer, driver, nominal(hammer), threads)
-        forces = force_map(self.plant)
-        self.start = launch(self.plant, forces)
-        self.fronts = fronts(self.plant, forces, self.start)
+        self.plant = plant = Plant(hammer, driver, nominal(hammer), threads)
+        self.hammer, self.driver = hammer, driver
+        self.single, self.stroke = plant.single, plant.stroke
+        forces = force_map(plant)
+        self.start = launch(plant, forces)
+        self.fronts = fronts(plant, forces, self.start)
         self._policies: dict[float, Policy] = {}
-
-    @property
-    def hammer(self) -> Hammer:
-        """The nominal hammer."""
-        return self.plant.hammer
-
-    @property
-    def driver(self) -> Driver:
-        """The driver of its coil."""
-        return self.plant.driver
-
-    @property
-    def single(self) -> Nominal:
-        """Its single-pulse dot."""
-        return self.plant.single
-
-    @property
-    def stroke(self) -> float:
-        """Way from backstop to pack, m."""
-        return self.plant.stroke
 
     @cached_property
     def force(self) -> FreeForce:
@@ -186,7 +165,7 @@ class Controller:
         for loop in loops:
             loop.learned.drift()
         if rows:
-            self.contacts.learn([loops[k] for k in rows], samples.some(rows))
+            self.contacts.learn([loops[k] for k in rows], samples.take(rows))
 
     def estimate(self, loops: Sequence[Loop], samples: Samples) -> None:
         """Estimate the coming touches from what the sensor shows of flights."""
@@ -355,10 +334,10 @@ class Controller:
         for name in ("release", "brake", "width"):
             tables = np.array([getattr(landing, name) for landing in self.fronts.landings])
             near, far = (
-                known(tables[number, below], tables[number, below + 1], share)
+                blend_known(tables[number, below], tables[number, below + 1], share)
                 for number in (nearer, nearer + 1)
             )
-            found.append(known(near, far, farther))
+            found.append(blend_known(near, far, farther))
         return found
 
     @property

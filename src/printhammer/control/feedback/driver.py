@@ -16,14 +16,9 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
 
-LARGEST_CURRENT: Final = 2.0
-"""Largest current unless told otherwise, A."""
-
-FASTEST: Final = 1e-6
-"""Least time constant of a driver, s; a shorter one of a hammer counts as this."""
-
-STANDARD: Final = 20e-6
-"""Time constant where the waveform of a hammer has no decay, s."""
+LARGEST_CURRENT: Final = 2.0  # Largest current unless told otherwise, A
+FASTEST: Final = 1e-6  # Least time constant of a driver, s; a shorter one of a hammer counts as this
+STANDARD: Final = 20e-6  # Time constant where the waveform of a hammer has no decay, s
 
 
 @dataclass(frozen=True)
@@ -59,17 +54,7 @@ class Driver:
 
 
 class BoundedSequence(PulseSequence):
-    """Pulses of a driver; its bound is taken for the largest of them, so that this need not be sought.
-
-    Parameters
-    ----------
-    waveforms : sequence of Switched
-        What each firing does.
-    at : sequence of float
-        Firing times, s.
-    bound : float
-        Largest current of the driver, A.
-    """
+    """Pulses of a driver; its bound, A, is taken for the largest of them, so that this need not be sought."""
 
     bounded = True
 

@@ -28,8 +28,7 @@ OFFSETS: Final = (-0.07, 0.0, 0.07)
 """By how much the fronts of the maps lie farther from the armature, in parts of the way to the pack; evenly
 spaced."""
 
-MIDDLE: Final = 1
-"""Number of the nominal one."""
+MIDDLE: Final = 1  # Number of the nominal one
 
 
 @dataclass(frozen=True)

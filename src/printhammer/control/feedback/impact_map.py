@@ -21,15 +21,11 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Switched
     from printhammer.support.arrays import FloatArray
 
-AHEAD: Final = 1e-6
-"""Time before the touch at which the runs of a map begin, s."""
-
+AHEAD: Final = 1e-6  # Time before the touch at which the runs of a map begin, s
 PUSHED, FREE = 0, 1
 """Kinds of touches."""
 
-ALWAYS: Final = 2e-3
-"""Width of a push that is still on at the next touch, s."""
-
+ALWAYS: Final = 2e-3  # Width of a push that is still on at the next touch, s
 # Speeds of the touches, in parts of that of the single pulse
 _PUSHED_SPEEDS: Final = np.linspace(0.3, 1.1, 17)
 _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)

@@ -33,6 +33,6 @@ def bilinear(table: FloatArray, i: IntArray, p: FloatArray, j: IntArray, q: Floa
     return blend(low, high, p)
 
 
-def known(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
+def blend_known(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
     """Return values between two; where one is NaN, the other."""
     return blend(np.where(np.isnan(low), high, low), np.where(np.isnan(high), low, high), share)

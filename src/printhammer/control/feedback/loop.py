@@ -14,18 +14,11 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.driver import BoundedSequence, Driver
     from printhammer.support.arrays import FloatArray
 
-REMEMBERED: Final = 4
-"""Number of the latest pulses of which anything can be left."""
-
-APART: Final = 1e-9
-"""Least time between two switchings, s."""
-
+REMEMBERED: Final = 4  # Number of the latest pulses of which anything can be left
+APART: Final = 1e-9  # Least time between two switchings, s
+# Standard deviation of the front before the first contact, in parts of the way from backstop to pack
 FRONT_ERROR: Final = 0.04
-"""Standard deviation of the front before the first contact, in parts of the way from backstop to pack."""
-
-SCALE_ERROR: Final = 0.03
-"""Standard deviation of the scale of the currents before the first flight."""
-
+SCALE_ERROR: Final = 0.03  # Standard deviation of the scale of the currents before the first flight
 # Standard deviations by which both may change from one decision to the next (process noise)
 _FRONT_DRIFT: Final = 0.002
 _SCALE_DRIFT: Final = 0.002

@@ -27,12 +27,9 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.limits import Limits
     from printhammer.support.arrays import FloatArray
 
-NEVER: Final = 50.0
-"""Cost of what leads nowhere."""
-
+NEVER: Final = 50.0  # Cost of what leads nowhere
+# Standard deviation of the front, in parts of the way to the pack, above which it counts as not known
 KNOWN: Final = 0.01
-"""Standard deviation of the front, in parts of the way to the pack, above which it counts as not known."""
-
 _DISCOUNT: Final = 0.9  # Discount of the costs of each further dot
 _ROUNDS: Final = 8  # Number of dots before a rest from which on more make no difference
 _LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, in parts of the limit
@@ -57,17 +54,7 @@ class Committed(NamedTuple):
 
 
 class Policy:
-    """Costs of the ways to go on at one rate.
-
-    Parameters
-    ----------
-    fronts : Fronts
-        Where they lead, and how well the armature comes to rest.
-    period : float
-        Time from slot to slot, s.
-    limits : Limits
-        How far dots may be off.
-    """
+    """Costs of the ways to go on at one rate, whose period is in s; deviations are measured by limits."""
 
     def __init__(self, fronts: Fronts, period: float, limits: Limits) -> None:
         self.fronts = fronts
@@ -125,19 +112,10 @@ class Policy:
     ) -> tuple[IntArray, FloatArray, Choice]:
         """Return number and cost of the best way for some touches (M,), and where each leads.
 
-        Parameters
-        ----------
-        kind, late, speed : array, shape (M,)
-            How the touches come; lateness in s, speed in m/s.
-        wait : array, shape (M,)
-            Time from this dot to the next one, s.
-        after : int array, shape (M,)
-            Number of dots between the next one and a rest.
-        front, front_error : array, shape (M,)
-            By how much the front of the pack lies farther away, and how well this is known, in parts of the
-            way from backstop to pack.
-        done : Committed, optional
-            What has been done by then, where the throw alone is to be decided.
+        The touches come by `kind`, `late`, s, and `speed`, m/s. The next dot is to come after `wait`, s, and
+        `after` dots follow between that one and a rest. The front of the pack lies farther away by `front`,
+        known to `front_error`, in parts of the way from backstop to pack. Where the throw alone is to be
+        decided, `done` tells what has been done by then.
         """
         choice = Choice(self.fronts, kind, speed, front)
         if done is not None:

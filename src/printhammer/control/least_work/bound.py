@@ -68,18 +68,9 @@ class Bound:
 
 
 def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Bound:
-    """Bound the positive work of dots of a given force.
+    """Bound the positive work of dots of a force, in parts of that of the single pulse.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        A hammer with magnet, pack and backstop.
-    single : Nominal
-        Its single pulse.
-    force : float
-        Force of the dots in parts of that of the single pulse.
-    largest : float
-        Largest current of either sign, A.
+    The hammer has magnet, pack and backstop; `largest` is the largest current of either sign, A.
     """
     static = StaticForce(hammer)
     deepest, loading = _indented(static, single, force)

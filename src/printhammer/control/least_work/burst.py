@@ -23,7 +23,7 @@ from printhammer.control.least_work.coil_force import CoilForce
 from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
 from printhammer.control.least_work.slot import Task
-from printhammer.control.least_work.supply import supply_check
+from printhammer.control.least_work.supply import SupplyCheck
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Sampled
@@ -35,6 +35,7 @@ from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
 from printhammer.run.coil_work import coil_power
+from printhammer.run.ensemble import Ensemble
 from printhammer.run.ledger import stored_energy
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import CYCLE, simulate
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
 
-    from printhammer.control.least_work.supply import SupplyCheck
     from printhammer.drive.sequence import PulseSequence
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
@@ -58,27 +58,20 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
 
-FORCE: Final = 0.9
-"""Least force of an adequate dot, in parts of that of the single pulse."""
-
+FORCE: Final = 0.9  # Least force of an adequate dot, in parts of that of the single pulse
 SPACING: Final = 0.6
 """Time between the nodes of the current unless told otherwise, in parts of the time in which a single pulse
 indents the pack; a period holds a whole number of them."""
 
-MOST_DOTS: Final = 1000
-"""Number of dots above which a burst is refused."""
-
+MOST_DOTS: Final = 1000  # Number of dots above which a burst is refused
 Least = Literal["positive work", "heat"]
+# What is made least: the positive work of the coil, or its heat, which goes by the squared current
 LEASTS: Final = get_args(Least)
-"""What is made least: the positive work of the coil, or its heat, which goes by the squared current."""
-
+# Relative changes of the current under which a burst is looked at unless told otherwise
 SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
-"""Relative changes of the current under which a burst is looked at unless told otherwise."""
-
 Shape = Literal["free", "pulses"]
+# What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths
 SHAPES: Final = get_args(Shape)
-"""What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths."""
-
 # End of a slot after its touch, in parts of the time in which a single pulse indents the pack
 _PAST_PEAK: Final = 1.2
 _SPARE: Final = 5e-4  # Part of the force by which a dot is planned to be harder than asked for
@@ -209,16 +202,35 @@ class LeastWork(Result, rows="node"):
         return float(motion.t[min(int(moving[-1]) + 1, motion.t.size - 1)]) if moving.size else 0.0
 
     def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
-        """Run the same drive with every current larger or smaller by given parts of it."""
-        return supply_check(
-            self.hammer,
-            self.drive,
-            self.motion.end,
-            self.slots,
-            rate=self.rate,
-            single=self.single.force,
-            least=self.force,
-            changes=changes,
+        """Run the same drive, in one ensemble, with every current larger or smaller by given parts of it.
+
+        Raises
+        ------
+        InputError
+            A change is not a finite number above -1.
+        """
+        factors = 1.0 + np.atleast_1d(np.asarray(changes, dtype=np.float64))
+        if factors.ndim != 1 or not (np.isfinite(factors) & (factors > 0.0)).all():
+            raise InputError(f"changes = {changes!r}, expected relative changes of the current above -1")
+        drives = [self.drive.scaled(factor) for factor in factors.tolist()]
+        result = Ensemble(self.hammer, drives, self.motion.end).run(dots=True, engine="plain")
+        dots = result.dots
+        assert dots is not None
+        touched = np.where(dots.struck, dots.fired_at + dots.flight_time, np.inf)
+        away = np.abs(touched[:, :, np.newaxis] - self.slots)
+        # The dot of a slot is the touch nearest to it, wherever its pulse was fired.
+        which = away.argmin(axis=1)
+        late = away.min(axis=1)
+        rows = np.arange(len(drives))[:, np.newaxis]
+        made = late < 0.5 / self.rate
+        force = np.where(made, np.nan_to_num(dots.peak_force[rows, which]) / self.single.force, 0.0)
+        good = made & (dots.extra_contacts[rows, which] == 0) & (force >= self.force)
+        return SupplyCheck(
+            changes=factors - 1.0,
+            adequate=good.sum(axis=1),
+            weakest=force.min(axis=1),
+            spread=np.where(made.all(axis=1), late.max(axis=1), np.nan),
+            status=np.array(result.status_names, "U16"),
         )
 
     @property

@@ -14,21 +14,11 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import FloatArray
 
-LOST: Final = 25.0
-"""What a run that failed counts as, in parts of the tolerances."""
-
-MISSED: Final = 0.05
-"""Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`."""
-
-SLACK: Final = 8e-3
-"""Lack of force up to which a dot has the force asked for, in `FORCE`."""
-
-ARRIVAL: Final = 20e-6
-"""Tolerance by which a time of arrival is measured, s."""
-
-FORCE: Final = 0.05
-"""Tolerance by which a force is measured, relative."""
-
+LOST: Final = 25.0  # What a run that failed counts as, in parts of the tolerances
+MISSED: Final = 0.05  # Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`
+SLACK: Final = 8e-3  # Lack of force up to which a dot has the force asked for, in `FORCE`
+ARRIVAL: Final = 20e-6  # Tolerance by which a time of arrival is measured, s
+FORCE: Final = 0.05  # Tolerance by which a force is measured, relative
 _DIFFERENCE: Final = 1e-5  # Difference from which derivatives are taken
 _ENDS_AT: Final = 1e-5  # Change of the cost at which a descent ends
 
@@ -45,27 +35,10 @@ def descend(
 ) -> tuple[FloatArray, float]:
     """Minimise the first row that `measured` returns; of two more the first is 0, the second not negative.
 
-    Parameters
-    ----------
-    measured : callable
-        Returns rows (1 or 3, places) of many places (places, n).
-    start : array, shape (n,)
-        Where to begin.
-    bounds : tuple of float
-        Least and largest value of every number.
-    rounds : int
-        Number of steps at most.
-    conditions : bool
-        Whether there are the two more.
-    linear : tuple of array, optional
-        Offset and matrix of further numbers that are not to be negative.
-    inward : bool, optional
-        Whether differences are taken away from the nearer of the bounds 0 and 1.
-
-    Returns
-    -------
-    tuple
-        The place, and the first row there.
+    `measured` returns rows (1 or 3, places) of many places (places, n); `conditions` tells whether there are
+    the two more. `bounds` hold for every number of a place. `linear`, an offset and a matrix, are further
+    numbers that are not to be negative. With `inward`, differences are taken away from the nearer of the
+    bounds 0 and 1. Returns the place, and the first row there.
     """
     from scipy import optimize
 
@@ -109,14 +82,8 @@ def best_of(
 ) -> FloatArray | None:
     """Return the best outcome of the best starts: of some tries, or of the first after them that has one.
 
-    Parameters
-    ----------
-    badness : array
-        Of the starts.
-    attempt : callable
-        Returns cost and outcome of a start; None where it has none.
-    tries, most : int
-        Number of starts that are tried, and while none has an outcome; by default no more.
+    `attempt` returns cost and outcome of a start, by its number in `badness`; None where it has none. Starts
+    are tried up to `most` of them while none has an outcome, by default no more than `tries`.
     """
     best: tuple[float, FloatArray] | None = None
     for number, start in enumerate(np.argsort(badness, kind="stable")[: most or tries].tolist()):
@@ -128,7 +95,7 @@ def best_of(
     return None if best is None else best[1]
 
 
-def spread(dimensions: int, count: int) -> FloatArray:
+def sobol(dimensions: int, count: int) -> FloatArray:
     """Return points (count, dimensions) that are evenly spread over the unit cube: a Sobol sequence."""
     from scipy.stats import qmc
 

@@ -19,7 +19,7 @@ from printhammer.control.least_work.descent import (
     SLACK,
     best_of,
     descend,
-    spread,
+    sobol,
 )
 from printhammer.control.least_work.slot import SlotState, end_of
 from printhammer.control.widths import of_width, widest
@@ -34,9 +34,7 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.support.arrays import FloatArray
 
-GONE: Final = 1e-2
-"""The current of a pulse has gone where less than this part of its peak is left."""
-
+GONE: Final = 1e-2  # The current of a pulse has gone where less than this part of its peak is left
 _PER_SLOT: Final = 2  # Number of pulses of a slot
 _TRIED: Final = 1024  # Number of times and widths from the best of which a search begins
 _TRIES, _MOST_TRIES = 4, 10  # Number of searches, and while nothing is found
@@ -51,16 +49,9 @@ _WRONG: Final = 10.0  # Cost of a contact too many, or a run that failed, in par
 class PulsePlan:
     """Times and widths found so far, and the state in which they leave the armature.
 
-    Parameters
-    ----------
-    task : Task
-        What is asked; the bound on the slope of the current is not looked at.
-    waveform : Waveform
-        The pulse whose widths are sought.
-    period, past, lead, landing : float
-        Times, s: of a slot, from the touch of a dot to the end of its slot, of the first slot, of landing.
-    rest : float
-        Displacement at rest, m.
+    The widths of `waveform` are sought; the bound of the task on the slope of the current is not looked at.
+    Times are in s: of a slot, from the touch of a dot to the end of its slot, of the first slot, of landing.
+    It begins at rest, at a displacement in m.
 
     Raises
     ------
@@ -100,7 +91,7 @@ class PulsePlan:
             return self._measured(rows, duration, arrival)
 
         # From rest there is nothing to brake.
-        tried = spread(2 * (_PER_SLOT if self.touches else 1), _TRIED)
+        tried = sobol(2 * (_PER_SLOT if self.touches else 1), _TRIED)
 
         def attempt(row: int) -> tuple[float, FloatArray] | None:
             place = _descend(measured, tried[row], conditions=True)
@@ -121,7 +112,7 @@ class PulsePlan:
         def measured(rows: FloatArray) -> FloatArray:
             return self._measured(rows, self._landing, self._landing)
 
-        tried = spread(2 * _PER_SLOT, _TRIED)
+        tried = sobol(2 * _PER_SLOT, _TRIED)
         order = np.argsort(measured(tried)[0], kind="stable")
         places = [_descend(measured, tried[row], conditions=False) for row in order[:_TRIES]]
         costs = measured(np.array(places))[0]

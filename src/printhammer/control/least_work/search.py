@@ -19,7 +19,7 @@ from printhammer.control.least_work.descent import (
     SLACK,
     best_of,
     descend,
-    spread,
+    sobol,
 )
 from printhammer.control.least_work.slot import RELOADING, SlotState, node_times
 from printhammer.drive.sequence import PulseSequence
@@ -32,12 +32,8 @@ if TYPE_CHECKING:
     from printhammer.control.least_work.slot import Outcomes, Task
     from printhammer.support.arrays import FloatArray
 
-LEAD: Final = 2.0
-"""Length of the first slot, from rest to the touch, in flight times of the single pulse."""
-
-LANDING: Final = 5.0
-"""Length of the landing, in flight times of the single pulse."""
-
+LEAD: Final = 2.0  # Length of the first slot, from rest to the touch, in flight times of the single pulse
+LANDING: Final = 5.0  # Length of the landing, in flight times of the single pulse
 _FEWEST, _MOST = 8, 96  # Least and largest number of nodes of a slot
 # Part of a step by which the current of a slot lasts longer than the slot, which cuts it off
 _OVERLAP: Final = 0.01
@@ -53,13 +49,8 @@ _INSIDE: Final = 1.0 - 1e-9  # A hair inside a bound, which rounding would excee
 class NodePlan:
     """The currents found so far, straight from node to node, and how they leave the armature.
 
-    Parameters
-    ----------
-    task : Task
-        What is asked.
-    period, past, spacing, flight : float
-        Times, s: of a slot, from the touch of a dot to the end of its slot, between nodes, and of the flight
-        of the single pulse.
+    Times are in s: of a slot, from the touch of a dot to the end of its slot, between nodes, and of the
+    flight of the single pulse.
     """
 
     def __init__(self, task: Task, period: float, past: float, spacing: float, flight: float) -> None:
@@ -116,23 +107,9 @@ def printing_current(
 ) -> FloatArray | None:
     """Find the current of a slot with which its dot costs least.
 
-    Parameters
-    ----------
-    task : Task
-        What is asked.
-    begin : SlotState
-        How the slot begins.
-    duration, arrival : float
-        Of the slot, and from its beginning to the touch, s.
-    nodes : int
-        Number of nodes after the first one.
-    before : array, optional
-        What did for the slot before.
-
-    Returns
-    -------
-    array, shape (nodes,), or None
-        Currents at the nodes, A; None where none was found.
+    The slot lasts for `duration`, and the dot is to touch at `arrival`, s after its beginning. There are some
+    `nodes` after the first one; `before` is what did for the slot before. Returns the currents at the nodes,
+    A; None where none was found.
     """
 
     def asked(found: Outcomes) -> tuple[FloatArray, FloatArray]:
@@ -165,18 +142,7 @@ def printing_current(
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
-    """Find the current after the last dot with which the backstop takes least; it ends at zero.
-
-    Parameters
-    ----------
-    task, begin, duration, nodes
-        As for `printing_current`.
-
-    Returns
-    -------
-    array, shape (nodes,)
-        Currents at the nodes, A, the last one 0.
-    """
+    """Find the currents at the nodes after the last dot with which the backstop takes least, A."""
 
     def whole(currents: FloatArray) -> FloatArray:
         return np.concatenate([currents, np.zeros((len(currents), 1))], axis=1)
@@ -247,7 +213,7 @@ def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero:
 
 def _profiles(task: Task, begin: float, duration: float, arrival: float, nodes: int) -> FloatArray:
     """Return currents that brake, wait and throw, at levels and times evenly spread, within the bounds."""
-    share = spread(5, _PROFILES)
+    share = sobol(5, _PROFILES)
     levels = task.largest * np.stack([share[:, 0], 0.6 * share[:, 1], 0.3 + 0.7 * share[:, 2]], axis=1)
     released = 0.5 * arrival * share[:, 3]
     thrown = released + share[:, 4] * (arrival - released)
@@ -262,7 +228,7 @@ def _profiles(task: Task, begin: float, duration: float, arrival: float, nodes: 
 
 def _landings(task: Task, begin: float, duration: float, nodes: int) -> FloatArray:
     """Return currents that hold the armature back on its way, then a little before the backstop."""
-    share = spread(4, _PROFILES)
+    share = sobol(4, _PROFILES)
     first, second = task.largest * (1.1 * share[:, 0] - 0.1), task.largest * share[:, 1]
     caught = 0.7 * duration * share[:, 2]
     landed = caught + share[:, 3] * (duration - caught)

@@ -37,11 +37,9 @@ _IN_PACK: Final = {
 _MANY: Final = 64  # Number of runs from which on threads are worth their while
 _LEAST_SPEED: Final = 0.03  # Speed with which the armature is to leave the pack, m/s
 _CLEAR: Final = 2e-6  # Distance from where it turned from which on it leaves, m
+# Weight of the squared current beside the positive work, so that no current is spent for nothing
 _SMOOTHING: Final = 1e-3
-"""Weight of the squared current beside the positive work, so that no current is spent for nothing."""
-
-RELOADING: Final = 1e-6
-"""Lag in the pack that costs as much as the loading work, m."""
+RELOADING: Final = 1e-6  # Lag in the pack that costs as much as the loading work, m
 
 
 @dataclass(frozen=True)

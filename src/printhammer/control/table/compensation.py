@@ -15,7 +15,6 @@ from printhammer.control.table.histories import (
     histories,
     history_text,
     number_of,
-    shared_numbers,
 )
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
@@ -36,9 +35,8 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray
 
+# Difference of neighbouring advances from which on they belong to different ways to fire a dot, s
 JUMP: Final = 8e-6
-"""Difference of neighbouring advances from which on they belong to different ways to fire a dot, s."""
-
 _NEAR: Final = 1e-9  # Rounding allowed in a rate, relative, and in a time, s
 _CELLS: Final = "rate history"
 
@@ -125,11 +123,6 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
                 f"{where}: advance = {values['advance']!r} s fires {begun:.6g} s after the slot of the dot"
                 f" before, expected a firing after its pulses have ended, at {over:.6g} s"
             )
-
-    @property
-    def shared(self) -> Any:
-        """For every number of a history, that of the history it stands for."""
-        return shared_numbers(self.gaps, self.reach)
 
     @property
     def worst(self) -> FloatArray:

@@ -36,9 +36,7 @@ if TYPE_CHECKING:
 
     IntArray = npt.NDArray[np.int64]
 
-VALUES: Final = (*COLUMNS, "deviation")
-"""Names of the arrays of a table."""
-
+VALUES: Final = (*COLUMNS, "deviation")  # Names of the arrays of a table
 # Length of the row of dots in every slot before a history, where it has to be right in long patterns too
 _DENSE: Final = 6
 
@@ -102,10 +100,10 @@ class Draft:
 
     def judge(self, level: Sequence[History] | None = None) -> None:
         """Put down how far off histories are at all rates; by default all of them."""
-        task = self.task
-        levels = [level] if level is not None else [level_of(task, n) for n in range(1, task.gaps + 1)]
-        for some in levels:
-            cells = [(row, history) for row in range(self.rates.size) for history in some]
+        lengths = range(1, self.task.gaps + 1)
+        levels = [histories_of_length(self.task, n) for n in lengths] if level is None else [level]
+        for same in levels:
+            cells = [(row, history) for row in range(self.rates.size) for history in same]
             places = self.places(cells)
             off = self.last_dots(cells, self.timing[:, *places].T, np.zeros((1, 2)), whole=True)
             size = off.max(axis=(1, 2))
@@ -122,27 +120,14 @@ class Draft:
     ) -> FloatArray:
         """Return deviations of force and arrival of last dots of patterns, in parts of the limits.
 
-        Parameters
-        ----------
-        cells : sequence of tuple
-            The entries.
-        values : array, shape (cells, 2)
-            Advance and width of the last dot, s.
-        shifts : array, shape (shifts, 2)
-            Changes of these to be tried, s.
-        dense : bool, optional
-            Whether to take several patterns for each entry, as `befores` says.
-        whole : bool, optional
-            Whether to return the largest deviations of all dots of a pattern that have the history instead.
-
-        Returns
-        -------
-        array, shape (cells, shifts, deviations)
-            Over hammers, patterns, force and arrival; NaN for a lost dot or a pattern with extra contacts.
-            Where an entry has fewer patterns than others, its first one is repeated.
+        `values` (cells, 2) are advance and width of the last dots, s, and `shifts` (shifts, 2) changes of
+        these to be tried. `dense` takes several patterns for each entry, as `gaps_before` says; `whole`
+        returns the largest deviations of all dots of a pattern that have the history instead. The shape is
+        (cells, shifts, deviations), over hammers, patterns, force and arrival: NaN for a lost dot or a
+        pattern with extra contacts. Where an entry has fewer patterns than others, its first one is repeated.
         """
         task = self.task
-        gaps = [befores(history, task.reach) if dense else [()] for _row, history in cells]
+        gaps = [gaps_before(history, task.reach) if dense else [()] for _row, history in cells]
         most = max(map(len, gaps))
         drives: list[Drive] = []
         due: list[FloatArray] = []
@@ -183,13 +168,13 @@ def blank(task: Task, rates: FloatArray) -> Draft:
     return Draft(task, rates, np.zeros((len(VALUES), rates.size, entries_of(task.gaps, task.reach))))
 
 
-def level_of(task: Task, known: int) -> list[History]:
+def histories_of_length(task: Task, known: int) -> list[History]:
     """List the histories that hold a number of gaps before they are rest."""
     every = histories(task.gaps, task.reach)
     return [history for history in every if task.gaps - history.count(REST) == known]
 
 
-def befores(history: History, reach: int) -> list[tuple[int, ...]]:
+def gaps_before(history: History, reach: int) -> list[tuple[int, ...]]:
     """Return gaps before a history: none, and those of patterns that it comes late in."""
     late = (reach + 1,)
     if REST in history:

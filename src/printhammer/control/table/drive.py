@@ -21,18 +21,11 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-WIDEST: Final = 2.0
-"""Largest width of a pulse, in parts of that of the hammer's own."""
-
-LARGEST_CURRENT: Final = 2.0
-"""Largest current in any drive unless told otherwise, A."""
-
+WIDEST: Final = 2.0  # Largest width of a pulse, in parts of that of the hammer's own
+LARGEST_CURRENT: Final = 2.0  # Largest current in any drive unless told otherwise, A
+# Part of the largest current that a single pulse stays below it, for what is left of a brake pulse
 MARGIN: Final = 1e-3
-"""Part of the largest current that a single pulse stays below it, for what is left of a brake pulse."""
-
-ROUNDING: Final = 1e-9
-"""Part by which rounding may go beyond a bound."""
-
+ROUNDING: Final = 1e-9  # Part by which rounding may go beyond a bound
 _HALVINGS: Final = 50  # Halvings of an interval of widths: more than a double has bits to tell them apart
 _SAMPLES: Final = 4001  # Instants at which a decaying pulse is looked at
 _WAIT: Final = 1e-6  # Step of the wait after a brake pulse, s
@@ -59,8 +52,7 @@ class Settings(NamedTuple):
     brake_width: FloatArray
 
 
-COLUMNS: Final = Settings._fields
-"""What a table says of a dot."""
+COLUMNS: Final = Settings._fields  # What a table says of a dot
 
 
 def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
@@ -137,16 +129,10 @@ def pulses_of(settings: Settings, gaps: int, reach: int, slots: Sequence[int], r
 def sequence(
     pulses: Pulses, pulse: Waveform, known: dict[tuple[float, float, float], Waveform]
 ) -> PulseSequence:
-    """Return the drive of a pattern.
+    """Return the drive of a pattern, by a pulse that gets other widths.
 
-    Parameters
-    ----------
-    pulses : Pulses
-        What its dots are made with.
-    pulse : Waveform
-        The pulse that gets these widths.
-    known : dict
-        Waveforms that were made before, by width, width of the brake pulse and its offset; added to.
+    `known` holds waveforms that were made before, by width, width of the brake pulse and its offset; added
+    to.
     """
     waveforms = []
     for width, braked, offset in zip(*(values.tolist() for values in pulses[3:]), strict=True):

@@ -36,21 +36,12 @@ if TYPE_CHECKING:
     Head = dict[str, Any]
     Rows = list[dict[str, Any]]
 
-FORMAT: Final = 1
-"""Version of the CSV format, and of the JSON files of former versions."""
-
-KIND: Final = "printhammer compensation table"
-"""What the first line of a CSV file says."""
-
-NANOSECOND: Final = 1e-9
-"""Unit of the times in a C header, s."""
-
-DEVIATION: Final = "deviation"
-"""Name of the array that is no time."""
-
+FORMAT: Final = 1  # Version of the CSV format, and of the JSON files of former versions
+KIND: Final = "printhammer compensation table"  # What the first line of a CSV file says
+NANOSECOND: Final = 1e-9  # Unit of the times in a C header, s
+DEVIATION: Final = "deviation"  # Name of the array that is no time
+# What a file says of the whole table
 HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "largest_current": float}
-"""What a file says of the whole table."""
-
 _FIRST: Final = f"# {KIND}, format {FORMAT}"
 _UNITS: Final = {"rate": "Hz", **dict.fromkeys(COLUMNS, "s")}
 _ATTRIBUTE: Final = re.compile(r"# \w+: ")  # A line of provenance in a CSV file
@@ -257,18 +248,10 @@ def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
 
 
 def header_text(head: Mapping[str, Any], rates: FloatArray, times: Mapping[str, FloatArray]) -> str:
-    """Return a C header (C99) with the table as whole nanoseconds and a function for the number of a history.
+    """Return a C header (C99) with the table in nanoseconds and a function for the number of a history.
 
+    `head` is what is said of the whole table, see `HEAD`; `times` are arrays (rates, entries) by name, s.
     Every number of a history is there, so that the firmware needs no search.
-
-    Parameters
-    ----------
-    head : mapping
-        What is said of the whole table, see `HEAD`.
-    rates : array, shape (R,)
-        Slots per second, Hz.
-    times : mapping
-        Arrays (R, entries) by name, s.
     """
     gaps, reach = head["gaps"], head["reach"]
     prefix = re.sub(r"\W+", "_", f"printhammer_{head['hammer']}", flags=re.ASCII).lower()

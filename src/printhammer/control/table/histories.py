@@ -23,15 +23,9 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-REST: Final = 0
-"""Gap of a dot that is printed from rest."""
-
-MOST_GAPS: Final = 4
-"""Largest number of gaps in a history."""
-
-MOST_REACH: Final = 8
-"""Largest reach, slots."""
-
+REST: Final = 0  # Gap of a dot that is printed from rest
+MOST_GAPS: Final = 4  # Largest number of gaps in a history
+MOST_REACH: Final = 8  # Largest reach, slots
 History = tuple[int, ...]
 
 

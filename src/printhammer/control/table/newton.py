@@ -16,12 +16,8 @@ if TYPE_CHECKING:
     Measure = Callable[[FloatArray, npt.NDArray[np.int64], FloatArray], FloatArray]
     Bounded = Callable[[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_]], None]
 
-ROUNDS: Final = 7
-"""Largest number of steps."""
-
-LONGEST_STEP: Final = 25e-6
-"""Longest change of firing time or width in one step, s."""
-
+ROUNDS: Final = 7  # Largest number of steps
+LONGEST_STEP: Final = 25e-6  # Longest change of firing time or width in one step, s
 # Damping after Levenberg and Marquardt, in parts of the limits for a change of `LONGEST_STEP`
 _DAMPING: Final = 0.02
 
@@ -36,25 +32,14 @@ def solve(
     most: float,
     bounded: Bounded,
 ) -> FloatArray:
-    """Return the times and widths at which deviations are least, of all steps that were tried.
+    """Return the times and widths (dots, 2) at which deviations are least, of all steps that were tried.
 
-    Parameters
-    ----------
-    measure : callable
-        Returns deviations (active, shifts, deviations), in parts of the limits and NaN for a lost dot, from
-        all values as they are, the numbers of the dots that are still worked on, and shifts (shifts, 2) of
-        their values.
-    start : array, shape (dots, 2)
-        Firing time, or advance, and width, s.
-    steps : tuple of float
-        Differences from which derivatives are taken, s: forward in time, backward in width.
-    good : float
-        Deviation from which on a dot is left as it is.
-    least, most : float
-        Bounds on the width, s.
-    bounded : callable
-        Puts values in place within their bounds, given all of them, the numbers of the dots that are worked
-        on, and whether each made a step.
+    `measure` returns deviations (active, shifts, deviations), in parts of the limits and NaN for a lost dot,
+    from all values as they are, the numbers of the dots that are still worked on, and shifts (shifts, 2) of
+    their values. `start` are firing time, or advance, and width, s; derivatives are taken from differences of
+    `steps`, s, forward in time and backward in width. A dot whose deviation is `good` is left as it is;
+    widths are between `least` and `most`, s. `bounded` puts values in place within their bounds, given all of
+    them, the numbers of the dots that are worked on, and whether each made a step.
     """
     now, best, best_off = start.copy(), start.copy(), np.full(len(start), np.inf)
     shifts = np.array([(0.0, 0.0), (steps[0], 0.0), (0.0, -steps[1])])
@@ -88,16 +73,10 @@ def largest_of(off: FloatArray) -> FloatArray:
 
 
 def changes(slopes: FloatArray, off: FloatArray, least: FloatArray, most: FloatArray) -> FloatArray:
-    """Return changes (dots, 2) of two times of a dot, s, after which deviations are least in the mean square.
+    """Return changes (dots, 2) of two times, s, after which deviations are least in the mean square.
 
-    Parameters
-    ----------
-    slopes : array, shape (dots, deviations, 2)
-        Derivatives of the deviations after firing time, or advance, and width, 1/s.
-    off : array, shape (dots, deviations)
-        What they are now.
-    least, most : array, shape (dots,)
-        Bounds on the change of the width, s.
+    `slopes` (dots, deviations, 2) are the derivatives of the deviations `off` (dots, deviations) after firing
+    time, or advance, and width, 1/s; the change of the width, s, is between `least` and `most` (dots,).
     """
     turned = slopes.transpose(0, 2, 1)
     # A little of what Levenberg and Marquardt do: a direction in which nothing changes is left alone.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.table.draft import level_of
+from printhammer.control.table.draft import histories_of_length
 from printhammer.control.table.histories import REST, number_of
 from printhammer.control.table.newton import solve
 
@@ -19,31 +19,21 @@ if TYPE_CHECKING:
     from printhammer.control.table.histories import History
     from printhammer.support.arrays import FloatArray
 
-GOOD: Final = 1e-4
-"""Deviation, in parts of the limits, from which on an entry is left as it is."""
-
-LEAST_OF_WIDEST: Final = 0.3
-"""Least width, in parts of the largest one."""
-
+GOOD: Final = 1e-4  # Deviation, in parts of the limits, from which on an entry is left as it is
+LEAST_OF_WIDEST: Final = 0.3  # Least width, in parts of the largest one
+# Deviation, in parts of the limits, above which an entry is made less wrong in all patterns
 ROUGH: Final = 0.2
-"""Deviation, in parts of the limits, above which an entry is made less wrong in all patterns."""
-
 _STEP: Final = 0.5e-6  # Difference of times from which derivatives are taken, s
 
 
 def polish(draft: Draft, report: Callable[[], None]) -> None:
-    """Improve all entries.
+    """Improve all entries of a draft in place; that from rest stays as it is.
 
-    Parameters
-    ----------
-    draft : Draft
-        With a first guess for every history; changed in place. The entry from rest stays as it is.
-    report : callable
-        Called after each round.
+    The draft has a first guess for every history. `report` is called after each round.
     """
     task = draft.task
     for known in range(1, task.gaps + 1):
-        level = level_of(task, known)
+        level = histories_of_length(task, known)
         for history in level if known > 1 else []:
             parent = (*history[: known - 1], *[REST] * (task.gaps - known + 1))
             guess = draft.values[:4, :, number_of(parent, task.reach)]

@@ -17,11 +17,9 @@ if TYPE_CHECKING:
 
     from printhammer.control.table.draft import IntArray
 
-HALVINGS: Final = 3
-"""How often the step between two rates is halved at most."""
-
+HALVINGS: Final = 3  # How often the step between two rates is halved at most
+# Deviation between two rates, in parts of the limits, from which on there is one more between them
 BETWEEN: Final = 0.5
-"""Deviation between two rates, in parts of the limits, from which on there is one more between them."""
 
 
 def refined(draft: Draft, report: Callable[[], None]) -> Draft:
@@ -83,12 +81,12 @@ def _tuned(draft: Draft, lower: IntArray, report: Callable[[], None]) -> Draft:
         ways = solved(task, ways_of(cells))
         cost = costs(task, ways).reshape(-1, 2)
         for place, row in enumerate(near.tolist()):
-            best = ways.some([2 * place + int(cost[place].argmin())])
+            best = ways.take([2 * place + int(cost[place].argmin())])
             if not cost[place].min() <= BAD:
                 # Neither goes on from its rate to here; perhaps there is one more.
                 more = searched(task, float(periods[row]))
                 if more.size and more.cost.min() < cost[place].min():
-                    best = more.some([int(more.cost.argmin())])
+                    best = more.take([int(more.cost.argmin())])
             found.values[:4, row, column] = best.settings[:, 0]
     polish(found, report)
     return found

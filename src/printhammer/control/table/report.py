@@ -46,17 +46,12 @@ PERTURBATIONS: Final = (
 
 STRATEGIES: Final = ("open loop", "table")
 
+# Patterns: all 255 of eight slots from rest; the de Bruijn cycle of order 8; long random ones
 SETS: Final = ("eight slots", "cycle", "random")
-"""Patterns: all 255 of eight slots from rest; the de Bruijn cycle of order 8; long random ones."""
-
 _LONG: Final = 12  # Number of rates of a table from which on it is judged between them
 
-RANDOM: Final = 8
-"""Number of random patterns."""
-
-RANDOM_SLOTS: Final = 128
-"""Length of a random pattern, slots."""
-
+RANDOM: Final = 8  # Number of random patterns
+RANDOM_SLOTS: Final = 128  # Length of a random pattern, slots
 
 _AXES: Final = "strategy driven rate patterns"
 

@@ -37,12 +37,9 @@ if TYPE_CHECKING:
     from printhammer.control.table.task import Task
     from printhammer.support.arrays import FloatArray
 
+# Between the times at which all ways are looked for; between them those of the neighbours are tried, s
 SPACING: Final = 30e-6
-"""Between the times at which all ways are looked for; between them those of the neighbours are tried, s."""
-
-BAD: Final = 0.75
-"""Cost from which on more ways are looked for."""
-
+BAD: Final = 0.75  # Cost from which on more ways are looked for
 _ROOM: Final = 100e-6  # How far before and after its slot a dot is tried, s
 _GRID: Final = (12, 8)  # Numbers of firing times and widths of the grid on which a search begins
 _FINE: Final = 3  # How much finer this grid is without a brake pulse, and how many more searches begin on it
@@ -67,23 +64,10 @@ _ROUNDING: Final = 1e-12
 
 
 def chosen(task: Task, periods: FloatArray, report: Callable[[], None]) -> tuple[FloatArray, Ways]:
-    """Choose a way for each of some times after a dot.
+    """Choose a way for each of some times after a dot, from slot to slot, s, ascending.
 
-    Parameters
-    ----------
-    task : Task
-        What the table is to be like.
-    periods : array
-        Times from slot to slot, s, ascending.
-    report : callable
-        Called after each step of the work.
-
-    Returns
-    -------
-    periods : array
-        Those at which there is a way at all.
-    ways : Ways
-        One for each of these.
+    Returns the times at which there is a way at all, and one for each of these. `report` is called after each
+    step of the work.
     """
     nodes = spaced(periods, SPACING)
     known = []
@@ -102,7 +86,7 @@ def chosen(task: Task, periods: FloatArray, report: Callable[[], None]) -> tuple
     there = [group for group in groups if group.size]
     every = joined(there)
     ends = np.cumsum([group.size for group in there])
-    found = every.some(_path(every, np.split(np.arange(every.size), ends[:-1]) if there else []))
+    found = every.take(_path(every, np.split(np.arange(every.size), ends[:-1]) if there else []))
     return found.period, found
 
 
@@ -120,8 +104,8 @@ def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
     every = solved(task, joined(tried))
     every = every._replace(cost=costs(task, every))
     ends = np.cumsum([group.size for group in tried])
-    groups = [every.some(slice(end - own.size, end)) for end, own in zip(ends.tolist(), tried, strict=True)]
-    return [group.some(np.isfinite(group.cost)) for group in groups]
+    groups = [every.take(slice(end - own.size, end)) for end, own in zip(ends.tolist(), tried, strict=True)]
+    return [group.take(np.isfinite(group.cost)) for group in groups]
 
 
 def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: Callable[[], None]) -> None:
@@ -137,8 +121,8 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: C
     found = []
     for node in nodes:
         known = groups[int(np.searchsorted(periods, node))]
-        known = known.some(known.brake > 0.0)
-        known = known.some(np.argsort(known.cost, kind="stable")[:_KEPT])
+        known = known.take(known.brake > 0.0)
+        known = known.take(np.argsort(known.cost, kind="stable")[:_KEPT])
         cells = [
             (node, max(begin, delay + later), min(max(brake * wider, narrowest), task.widest), fired, width)
             for _period, delay, brake, fired, width, _cost in zip(*(v.tolist() for v in known), strict=True)
@@ -175,7 +159,7 @@ def _grid(task: Task, period: float, brakes: Sequence[tuple[float, float]], fine
     fired = np.linspace(max(period - _ROOM, task.single.left), period + _ROOM, fine * _GRID[0]).tolist()
     widths = np.linspace(LEAST_OF_OWN * task.width, task.widest, fine * _GRID[1]).tolist()
     cells = ways_of([(period, *pair, time, width) for pair in brakes for time in fired for width in widths])
-    return cells.some(fits(task, cells))
+    return cells.take(fits(task, cells))
 
 
 def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
@@ -193,14 +177,14 @@ def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
         if len(others) < more * _STARTS and all(abs(cells.fired[place] - time) > _APART for time in others):
             others.append(float(cells.fired[place]))
             starts.append(place)
-    return _kept(task, solved(task, cells.some(np.array(starts, dtype=np.int64))))
+    return _kept(task, solved(task, cells.take(np.array(starts, dtype=np.int64))))
 
 
 def _kept(task: Task, found: Ways) -> Ways:
     """Return the best of some ways that are solved, the best one first."""
     found = _distinct(found._replace(cost=costs(task, found)))
     best = np.argsort(found.cost, kind="stable")[:_KEPT]
-    return found.some(best[np.isfinite(found.cost[best])])
+    return found.take(best[np.isfinite(found.cost[best])])
 
 
 def _distinct(ways: Ways) -> Ways:
@@ -210,7 +194,7 @@ def _distinct(ways: Ways) -> Ways:
         same = (ways.delay[kept] == delay) & (ways.brake[kept] == brake)
         if not (same & (np.abs(ways.fired[kept] - fired) <= _SAME)).any():
             kept.append(place)
-    return ways.some(np.array(kept, dtype=np.int64))
+    return ways.take(np.array(kept, dtype=np.int64))
 
 
 def _path(ways: Ways, groups: Sequence[npt.NDArray[np.int64]]) -> npt.NDArray[np.int64]:

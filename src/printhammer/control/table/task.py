@@ -28,9 +28,8 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.limits import Limits
     from printhammer.support.arrays import FloatArray
 
+# Distance from rest below which the hammer counts as settled, in parts of the way to the pack
 QUIET: Final = 2e-4
-"""Distance from rest below which the hammer counts as settled, in parts of the way to the pack."""
-
 _LONGEST: Final = 20e-3  # Time in which the hammer has to settle after a single pulse, s
 _SAMPLE: Final = 2e-6  # Between the instants at which this is looked at, s
 # By how much the pulse before a brake pulse may be late or wider than the hammer's own, s
@@ -131,16 +130,8 @@ class Task:
     ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
         """Run drives, and compare all dots with that of the single pulse.
 
-        Parameters
-        ----------
-        hammer : Hammer
-            What is driven.
-        drives : sequence of Drive
-            One firing for each slot.
-        slots : array, shape (drives, dots)
-            Slot times, s; NaN beyond the last one.
-        ends : array, shape (drives,)
-            Times of the last dots, after which a run goes on for `_TAIL`, s.
+        The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN beyond the last
+        one; a run goes on for `_TAIL` after `ends` (drives,), s.
 
         Returns
         -------

@@ -29,12 +29,8 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-FIRST: Final = 100.0
-"""Lowest rate of a table over all rates, Hz: every dot is printed from rest."""
-
-STEP: Final = 5.0
-"""Step between the rates of such a table, Hz."""
-
+FIRST: Final = 100.0  # Lowest rate of a table over all rates, Hz: every dot is printed from rest
+STEP: Final = 5.0  # Step between the rates of such a table, Hz
 SPREAD: Final = (
     Perturbation(current=0.03),
     Perturbation(current=-0.03),
@@ -212,18 +208,8 @@ def _tuned(
 ) -> Draft:
     """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
 
-    Parameters
-    ----------
-    task : Task
-        What is asked.
-    rates : array
-        Of the rows, Hz.
-    report : callable
-        Called after each step of the work.
-    open_ended : bool, optional
-        Whether the table ends below the first rate at which no pulse comes near.
-    around : array, optional
-        How far from the times between dots ways are looked for as well, s.
+    `report` is called after each step of the work. An `open_ended` table ends below the first rate at which
+    no pulse comes near. `around` is how far from the times between dots ways are looked for as well, s.
     """
     draft = blank(task, rates)
     draft.timing[1] = task.width

@@ -20,15 +20,9 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-ROW: Final = 8
-"""Number of dots of the row that decides."""
-
-NOMINAL: Final = 8.0
-"""How often the hammer that a table is made for counts, beside those that differ."""
-
-LEAST_OF_OWN: Final = 0.5
-"""Least width, in parts of that of the pulse of the hammer."""
-
+ROW: Final = 8  # Number of dots of the row that decides
+NOMINAL: Final = 8.0  # How often the hammer that a table is made for counts, beside those that differ
+LEAST_OF_OWN: Final = 0.5  # Least width, in parts of that of the pulse of the hammer
 # Deviation of the second dot, in parts of the limits, from which on a way is left as it is
 _SOLVED: Final = 1e-3
 _STEPS: Final = (1e-6, 0.5e-6)  # Differences of firing time and width from which derivatives are taken, s
@@ -62,7 +56,7 @@ class Ways(NamedTuple):
         """Advance, width, and delay and width of the brake pulse, s, shape (4, ways)."""
         return np.stack([self.period - self.fired, self.width, self.delay, self.brake])
 
-    def some(self, which: Any) -> Ways:
+    def take(self, which: Any) -> Ways:
         """Return some of them."""
         return Ways(*(values[which] for values in self))
 
@@ -100,7 +94,7 @@ def solved(task: Task, ways: Ways) -> Ways:
 
     def measure(now: FloatArray, active: npt.NDArray[np.int64], shifts: FloatArray) -> FloatArray:
         fired, width = (now[active, np.newaxis] + shifts).reshape(-1, 2).T
-        tried = ways.some(np.repeat(active, len(shifts)))._replace(fired=fired, width=width)
+        tried = ways.take(np.repeat(active, len(shifts)))._replace(fired=fired, width=width)
         return seconds(task, tried).reshape(active.size, len(shifts), 2)
 
     def bounded(now: FloatArray, active: npt.NDArray[np.int64], _stepped: Any) -> None:
@@ -132,7 +126,7 @@ def costs(task: Task, ways: Ways) -> FloatArray:
     found = np.full(ways.size, np.inf)
     some = np.flatnonzero(fits(task, ways))
     if some.size:
-        part = ways.some(some)
+        part = ways.take(some)
         drives = rows_of(task, part, ROW)
         own = _deviations(task, task.hammers[0], part, drives)
         worst = NOMINAL * largest_of(own)

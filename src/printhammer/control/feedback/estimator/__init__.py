@@ -1,1 +1,1 @@
-"""The estimator: what the controller knows of the hammer from noisy, late samples."""
+"""The estimator, an observer and a Kalman filter: what noisy, late samples tell of the hammer."""

@@ -1,4 +1,4 @@
-"""Where a flying armature is and will touch the pack, from samples of its position and a model of its forces.
+"""The observer: where a flying armature is and will touch the pack, from samples and a model of its forces.
 
 In flight the acceleration is that of magnet and spring, a function of displacement and current, which the
 controller knows. What it does not know are three numbers: where the armature is at one instant, how fast, and
@@ -116,19 +116,10 @@ class Flight:
 def flight_from_samples(
     samples: Samples, expected: Expected, front: FloatArray, accelerations: Accelerations
 ) -> Flight:
-    """Return what samples tell of a flight and the coming touch of the pack.
+    """Return what samples tell of flights and the coming touches of the pack, whose front is at `front`, m.
 
-    Parameters
-    ----------
-    samples : Samples
-        What the sensor shows.
-    expected : Expected
-        What is expected before.
-    front : array, shape (M,)
-        Front of the pack, m.
-    accelerations : callable
-        Of a flying armature: displacements, m, times, s, and scales, all of shape (M, K) or such that they
-        broadcast to it, to m/s².
+    `accelerations` of a flying armature are a function of displacements, m, times, s, and scales, all of
+    shape (M, K) or such that they broadcast to it, in m/s².
     """
     times, shown, used, error = samples
     reference = expected.time
@@ -185,23 +176,12 @@ def least_squares(
     prior: FloatArray,
     expected: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the step of some unknowns that fits samples best, and its precision, after Gauss and Newton.
+    """Return the step (M, U) of some unknowns that fits samples best, and its precision (Gauss-Newton).
 
-    Parameters
-    ----------
-    slopes : sequence of array, shape (M, N)
-        How the samples depend on each of U unknowns.
-    rest, weight : array, shape (M, N)
-        What is left of the samples, and their weights, 0 for those that do not count.
-    prior : array, shape (M, U, U)
-        Inverse of the covariance of what was expected.
-    expected : array, shape (M, U)
-        The step that was expected.
-
-    Returns
-    -------
-    tuple of array
-        Steps (M, U), and the inverse of their covariance (M, U, U).
+    The samples depend on each of U unknowns by `slopes` (M, N); `rest` (M, N) is left of them, and they count
+    by `weight` (M, N), 0 for those that do not. What was expected is a step `expected` (M, U), and the
+    inverse `prior` (M, U, U) of its covariance. The precision (M, U, U) is the inverse of the covariance of
+    the step.
     """
     precision, pull = prior.copy(), np.empty(expected.shape)
     # Sum by sum, so that a run does not depend on the others, as it may in a product of matrices.

@@ -40,7 +40,7 @@ class Samples(NamedTuple):
     used: npt.NDArray[np.bool_]
     error: float
 
-    def some(self, which: Any) -> Samples:
+    def take(self, which: Any) -> Samples:
         """Return some of the rows or columns."""
         return Samples(self.times[which], self.shown[which], self.used[which], self.error)
 
