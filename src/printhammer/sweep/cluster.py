@@ -222,12 +222,9 @@ def _unable(error: BaseException) -> str:
 
 @contextmanager
 def client_of(dask: Any) -> Iterator[Any]:
-    """Give a client of a cluster; one made here is closed at the end, and logs nothing.
+    """Give a client of a cluster, by the address of its scheduler; one made here is closed, and logs nothing.
 
-    Parameters
-    ----------
-    dask : str or distributed.Client
-        Address of the scheduler, or a client of it, which is given back as it is.
+    A `distributed.Client` is given back as it is.
 
     Raises
     ------

@@ -80,19 +80,7 @@ def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
 def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> dict[str, str]:
     """Read settings such as "force=0.5 %" or "0.2 um", which goes to all quantities of its dimension.
 
-    Parameters
-    ----------
-    texts : list of str
-        As given on the command line.
-    part : str
-        "noise", "resolution" or "offset", for messages.
-    quantities : mapping of str to str
-        SI unit of each quantity that may be named.
-
-    Returns
-    -------
-    dict
-        Text of the amount, by quantity.
+    The text of the amount is returned by quantity; `part`, such as "noise", is for messages.
 
     Raises
     ------

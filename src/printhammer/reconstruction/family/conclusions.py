@@ -123,14 +123,7 @@ class Conclusions:
 
 
 def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
-    """Return the conclusions about a hammer.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer, with magnet, pack, backstop and waveform.
-    context : Context, optional
-        Runs to share; by default a new one.
+    """Return the conclusions about a hammer with magnet, pack, backstop and waveform; a context shares runs.
 
     Raises
     ------
