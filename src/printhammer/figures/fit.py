@@ -143,7 +143,8 @@ def _spread(fit: Fit) -> FloatArray:
     """Return the standard deviation of each datum over the residual scale."""
     used = ~fit.outliers
     spread = 1.0 / np.sqrt(fit.weights)
-    return spread / np.sqrt(np.mean(spread[used] ** 2))
+    relative: FloatArray = spread / np.sqrt(np.mean(spread[used] ** 2))
+    return relative
 
 
 def _ring(ax: Axes, fit: Fit, x: FloatArray, y: FloatArray) -> None:

@@ -21,8 +21,6 @@ def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 
     Parameters
     ----------
-    hammer : Hammer
-        Any hammer with a waveform.
     duration : float or str, optional
         Time of the motion drawn, s, or text with a unit; 4 ms by default.
 

@@ -61,8 +61,6 @@ def poincare(
 
     Parameters
     ----------
-    hammer : Hammer
-        Any hammer with a waveform.
     strobes : sequence of Strobe, optional
         Strobe points from `printhammer.chaos.strobes`; by default those of the hammer.
     periods : sequence, optional

@@ -18,8 +18,6 @@ def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figu
 
     Parameters
     ----------
-    hammer : Hammer
-        Any hammer with a waveform.
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled, at most 4 ms.
 

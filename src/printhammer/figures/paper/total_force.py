@@ -27,8 +27,6 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 
     Parameters
     ----------
-    hammer : Hammer
-        Any hammer with a waveform.
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled, at most 4 ms.
 

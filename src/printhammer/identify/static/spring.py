@@ -27,20 +27,15 @@ _ROWS = 5
 
 
 class SpringLaw:
-    """Equation (4) at measured displacements; p = [Bs, As].
-
-    Parameters
-    ----------
-    travel : array, shape (m,)
-        Displacement from the backstop, x - b, m.
-    """
+    """Equation (4) at displacements from the backstop, x - b, m, shape (m,); p = [Bs, As]."""
 
     def __init__(self, travel: FloatArray) -> None:
         self.travel = travel
 
     def value(self, p: FloatArray) -> FloatArray:
         """Return the force, N."""
-        return p[0] * (1.0 - self.travel / p[1])
+        force: FloatArray = p[0] * (1.0 - self.travel / p[1])
+        return force
 
     def jacobian(self, p: FloatArray) -> FloatArray:
         """Return its derivatives by Bs and As."""
