@@ -71,18 +71,18 @@ def run_dask(
         The scheduler or the last worker is gone, a worker has other versions or cannot do the work, or from
         `write`.
     """
-    work = _Work(client, plan)
+    tasks = _Tasks(client, plan)
     try:
-        for index in work.together(todo, write, told):
-            write(index, work.alone(plan.rows(plan.blocks.members(index))))
+        for index in tasks.side_by_side(todo, write, told):
+            write(index, tasks.alone(plan.rows(plan.blocks.members(index))))
             told(0.0)
     except _GoneError:
         raise InputError("the dask scheduler is gone, what is done is kept") from None
     finally:
-        work.cancel()
+        tasks.cancel()
 
 
-class _Work:
+class _Tasks:
     """The tasks of one sweep on a cluster."""
 
     def __init__(self, client: Any, plan: Plan) -> None:
@@ -93,7 +93,7 @@ class _Work:
         self._idle = 0.0
         self._counted, self._count = -math.inf, 0
 
-    def together(
+    def side_by_side(
         self, todo: Sequence[Index], write: Callable[[Index, Results], None], told: Callable[[float], None]
     ) -> list[Index]:
         """Do blocks side by side; return those that cost several workers."""
