@@ -75,7 +75,7 @@ def plot(
         raise InputError(f"show = {show!r}, expected one of {', '.join(_SHOWN)}")
     figure = new_figure(4.4)
     ax = figure.add_subplot()
-    unit, factor = _AXIS.get(found[0].unit, (found[0].unit, 1.0))
+    heading, factor = axis_of(found[0].parameter, found[0].unit)
     name, _, shown, times = _SHOWN[show]
     for branch in found:
         draw(ax, branch, show, (factor, times))
@@ -85,13 +85,18 @@ def plot(
         ax.set_ylim(*(times * end for end in limits))
     else:
         ax.margins(y=0.04)
-    parameter = found[0].parameter
-    title = parameter[:1].upper() + parameter[1:] if "." not in parameter else parameter
-    ax.set_xlabel(f"{title}  [{unit}]" if unit else title)
+    ax.set_xlabel(heading)
     ax.set_ylabel(f"{name}  [{shown}]")
     _legend(ax, found, marked)
     sign(figure, found[0].regime.hammer, *_remarks(found))
     return figure
+
+
+def axis_of(name: str, si: str) -> tuple[str, float]:
+    """Return what is written on the axis of a constant, and the factor by which its values are multiplied."""
+    unit, factor = _AXIS.get(si, (si, 1.0))
+    title = name[:1].upper() + name[1:] if "." not in name else name
+    return f"{title}  [{unit}]" if unit else title, factor
 
 
 def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> None:

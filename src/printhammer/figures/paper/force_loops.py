@@ -43,11 +43,6 @@ def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     ----------
     duration : float or str, optional
         Time of the motion drawn, s, or text with a unit; 4 ms by default.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
     """
     motion = fired(hammer, duration=duration)
     times = times_of(motion)

@@ -23,11 +23,6 @@ def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     ----------
     duration : float or str, optional
         Time of the motion drawn, s, or text with a unit; 4 ms by default.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
     """
     motion = fired(hammer, duration=duration)
     x, v = orbit(motion, times_of(motion))

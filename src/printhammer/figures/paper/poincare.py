@@ -70,11 +70,6 @@ def poincare(
     printed : mapping, optional
         Verdicts that the paper prints, such as "period-2", by strobe time, s; each is written in its panel
         where the verdict on the points is another.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
     """
     from printhammer.chaos import strobes as strobed
 

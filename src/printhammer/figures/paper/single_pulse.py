@@ -20,11 +20,6 @@ def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figu
     ----------
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled, at most 4 ms.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
     """
     motion = fired(hammer, duration=duration)
     return timeline([motion], motion.end if duration is not None else shown_until(motion))

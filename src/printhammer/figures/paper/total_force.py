@@ -29,11 +29,6 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     ----------
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled, at most 4 ms.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
     """
     motion = fired(hammer, duration=duration)
     until = motion.end if duration is not None else shown_until(motion)

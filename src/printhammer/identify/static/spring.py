@@ -47,21 +47,10 @@ class SpringLaw:
 
 
 def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit:
-    """Fit the spring.
+    """Fit "spring.Bs" and "spring.As" to a table with the columns ``displacement`` and ``force``.
 
-    Parameters
-    ----------
-    path : path
-        Table with the columns ``displacement`` and ``force``.
-    position : float
-        Position b of the backstop, m.
-    robust : bool, optional
-        Whether rows that lie too far off are left out.
-
-    Returns
-    -------
-    Fit
-        With "spring.Bs" and "spring.As".
+    The position b of the backstop is in m; options of all fits are described with
+    `printhammer.identify.fitting.fit`.
 
     Raises
     ------
