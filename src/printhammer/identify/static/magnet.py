@@ -129,7 +129,7 @@ def _current(table: Table, alone: Table | None) -> FloatArray:
 
 
 def _check(table: Table, alone: Table | None, zero: float, position: float | None) -> int:
-    """Refuse a table with which no fit can succeed; return the number of different currents, 0 for very many."""
+    """Refuse a table that allows no fit; return the number of different currents, 0 for very many."""
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     low = int(np.argmin(x))
     if x[low] <= zero:

@@ -155,7 +155,7 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
 
 
 def _start(law: PackLaw, table: Table) -> FloatArray:
-    """Return the parameters to begin with; refuse too few or not positive forces of loading inside the pack."""
+    """Return the parameters to begin with; refuse too few or negative forces of loading in the pack."""
     force, cycles = table.values["force"], law.cycles
     rows = np.flatnonzero(law.inside & ~cycles.unloading)
     if len(rows) < _LOADING_ROWS:
