@@ -82,12 +82,8 @@ def plot(found: Quality) -> Figure:
 def plot_safe_rate(*found: SafeRate) -> Figure:
     """Draw how force and arrival deviate against the rate, and up to which rate all patterns pass.
 
-    Bands from the least to the largest deviation of any dot of any pattern; grey: within limits.
-
-    Parameters
-    ----------
-    found : SafeRate
-        From `printhammer.safe_rate`; several, such as of different strategies, are drawn over each other.
+    Bands from the least to the largest deviation of any dot of any pattern; grey: within limits. Several safe
+    rates, such as of different strategies, are drawn over each other.
     """
     figure = new_figure(4.6)
     axes = figure.subplots(2, 1, sharex=True)

@@ -19,16 +19,11 @@ if TYPE_CHECKING:
 
 @styled
 def plot(found: ToleranceYield, *, bars: int = 8) -> Figure:
-    """Draw a tolerance yield.
+    """Draw a tolerance yield, with the constants that matter most.
 
     Left: the part of the hammers that print every pattern well up to a rate, or, of one rate, the
     single-pulse dots of those that pass and of those that do not. Right: the rank correlation of each
     constant with the safe rate, or with passing; grey: what chance does.
-
-    Parameters
-    ----------
-    bars : int, optional
-        Largest number of constants shown.
     """
     figure = new_figure(3.6, 7.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
@@ -84,8 +79,10 @@ def _singles(ax: Axes, found: ToleranceYield) -> None:
 
 
 def _correlations(ax: Axes, found: ToleranceYield, outcome: np.ndarray, bars: int) -> None:
-    ranks = _ranks(outcome)
-    values = np.array([_correlation(_ranks(column), ranks) for column in found.factors.T])
+    from scipy.stats import rankdata
+
+    ranks = rankdata(outcome)
+    values = np.array([_correlation(rankdata(column), ranks) for column in found.factors.T])
     order = np.argsort(-np.abs(values), kind="stable")[:bars]
     for height, k in enumerate(order.tolist()):
         ax.barh(height, values[k], height=0.62, color=style.BLUE if values[k] > 0.0 else style.ORANGE)
@@ -96,13 +93,6 @@ def _correlations(ax: Axes, found: ToleranceYield, outcome: np.ndarray, bars: in
     ax.set_ylim(max(len(order), 3) - 0.4, -0.6)
     ax.set_xlim(-1.0, 1.0)
     ax.tick_params(axis="y", length=0.0, labelcolor=style.MUTED)
-
-
-def _ranks(values: np.ndarray) -> np.ndarray:
-    """Return ranks; equal values share theirs."""
-    _, place, counts = np.unique(values, return_inverse=True, return_counts=True)
-    ends = np.cumsum(counts)
-    return (ends - 0.5 * (counts - 1.0))[place]
 
 
 def _correlation(first: np.ndarray, second: np.ndarray) -> float:
