@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.derivatives import constants
+from printhammer.derivatives import flow
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
 from printhammer.kernel.compile import specialise
-from printhammer.kernel.compile import variational as specialise_sensitivity
+from printhammer.kernel.compile.variational import _built
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
@@ -274,7 +274,7 @@ def interpreted() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Problem, "kernel", property(lambda problem: _plain(problem.laws)))
-        patch.setattr(constants, "with_sensitivity", _plain_sensitivity)
+        patch.setattr(flow, "variational", _plain_variational)
         yield
 
 
@@ -289,10 +289,10 @@ def _plain(laws: Any) -> specialise.Kernel:
 
 
 @functools.cache
-def _plain_sensitivity(plain: specialise.Kernel) -> specialise.Kernel:
+def _plain_variational(plain: specialise.Kernel, *, forced: bool) -> specialise.Kernel:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numba.config, "DISABLE_JIT", True)
-        return specialise_sensitivity._built.__wrapped__(plain)
+        return _built.__wrapped__(plain, forced)
 
 
 def magnet_table(folder: Path) -> dict[str, str]:

@@ -4,11 +4,59 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
+from tests.chaos.samples import CHAOS
 
 import printhammer as ph
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result
 from printhammer.run.ensemble import EnsembleResult
+
+
+def quality(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.quality import quality
+
+    return quality(hammer, 900.0, "1101")
+
+
+def safe_rate(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.safe_rate import safe_rate
+
+    return safe_rate(hammer, first=600.0, last=700.0, step=100.0, cycle=False)
+
+
+def tolerance_yield(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.tolerance import tolerance_yield
+
+    return tolerance_yield(hammer, number=2, first=600.0, last=700.0, step=100.0)
+
+
+def damping_study(hammer: Hammer) -> Result:
+    from printhammer.printing.rates.damping import damping_study
+    from printhammer.printing.rates.materials import Material
+
+    tried = [Material("as it is", "as it is", {}), Material("hard", "none", {"backstop.stiffness": -1.0})]
+    return damping_study(hammer, tried, first=600.0, last=700.0, step=100.0)
+
+
+def page(hammer: Hammer) -> Result:
+    from printhammer.printing.page.page import print_page
+
+    return print_page(hammer, "Hi", 1500.0)
+
+
+def compensation_table(hammer: Hammer) -> Result:
+    from tests.control.table.by_hand import by_hand
+
+    return by_hand(hammer)
+
+
+def table_report(hammer: Hammer) -> Result:
+    from tests.control.table.by_hand import by_hand
+
+    from printhammer.control.table.report import judge_table
+    from printhammer.printing.rates.perturbation import Perturbation
+
+    return judge_table(hammer, by_hand(hammer), rates=[900.0], perturbations=[Perturbation()])
 
 
 def fit(hammer: Hammer) -> Result:
@@ -48,12 +96,54 @@ def ensemble(hammer: Hammer) -> EnsembleResult:
     return ph.Ensemble(hammer, drives, 6e-3).run(dots=True, strobes="firings", times=[1e-3, 2e-3, 3e-3])
 
 
+def feedback(hammer: Hammer) -> Result:
+    from tests.control.feedback.by_hand import by_hand
+
+    return by_hand(hammer)
+
+
+def least_work(hammer: Hammer) -> Result:
+    import pytest
+    from tests.control.least_work.test_burst import let_go, thrown
+
+    from printhammer.control.least_work import search
+    from printhammer.control.least_work.burst import least_work
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "printing_current", thrown)
+        patch.setattr(search, "landing_current", let_go)
+        return least_work(hammer, rate="400 Hz", dots=2, force=0.3)
+
+
+def least_work_rates(hammer: Hammer) -> Result:
+    import numpy as np
+
+    from printhammer.control.least_work.rates import LeastWorkRates
+
+    ratio = np.array([1.2, np.nan])
+    status = np.array(["ok", "no current found"])
+    return LeastWorkRates(
+        hammer, np.array([400.0, 4e3]), 2, ratio, ratio, ratio, ratio, np.array([2, 0]), status
+    )
+
+
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
+    **CHAOS,
+    "CompensationTable": compensation_table,
+    "DampingStudy": damping_study,
     "DotTable": lambda hammer: not_none(ensemble(hammer).dots),
     "EnsembleResult": ensemble,
+    "Feedback": feedback,
     "Fit": fit,
+    "LeastWork": least_work,
+    "LeastWorkRates": least_work_rates,
     "Measurement": lambda hammer: ph.measure("pack", hammer, seed=1, points=5),
     "Motion": lambda hammer: ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=20),
-    "Strobe": lambda hammer: ph.strobe(hammer, period=1.3e-3, points=5, verdict=False),
+    "Page": page,
+    "Quality": quality,
+    "SafeRate": safe_rate,
+    "Strobe": lambda hammer: ph.strobe(hammer, period=0.0013, points=5, verdict=False),
     "Strobes": lambda hammer: not_none(ensemble(hammer).strobes),
+    "TableReport": table_report,
+    "ToleranceYield": tolerance_yield,
 }

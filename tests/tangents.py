@@ -26,13 +26,9 @@ def arrive(problem: Problem, state: Any, branch: int, start: float, end: float) 
     begin = fresh_carry()
     if branch in (UNLOADING, RELOADING):
         begin[carry.STATE], begin[carry.MODE], begin[carry.PEAK] = carry.ON_BRANCH, branch, state[2]
-    count = problem.firings.size
     nodes = np.empty((20_000, 5))
     status, used, _touched, _steps = problem.kernel.run(
-        problem.firings,
-        problem.begins,
-        problem.pieces,
-        problem.replace,
+        problem.drive_arrays(),
         problem.constants,
         start,
         float(state[0]),
@@ -41,8 +37,6 @@ def arrive(problem: Problem, state: Any, branch: int, start: float, end: float) 
         problem.control,
         problem.bounds,
         100_000,
-        np.zeros(count, np.int64),
-        np.zeros(1 + 7 * count),
         nodes,
         np.empty((500, 7)),
         begin,

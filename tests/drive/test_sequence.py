@@ -17,7 +17,7 @@ from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sine, Trapezoid, Waveform
 from printhammer.errors import InputError
 from printhammer.kernel.model import pulses
-from printhammer.kernel.model.layout import END
+from printhammer.kernel.model.layout import END, Train
 
 PULSE = Rectangle(amplitude=0.9, width=350e-6, rise=1e-5, decay=2.4e-5)
 SHORT = Trapezoid(amplitude=0.5, rise=0.0, width=2e-4, fall=0.0)
@@ -50,19 +50,19 @@ def test_the_kernel_has_the_same_value_wherever_it_begins(drive: PulseSequence) 
     firings, begins, pieces, replace, _force = drive.kernel_arrays()
     given = np.array(firings), np.array(begins), np.array(pieces), replace
     count = len(drive.times)
-    walked = np.zeros(count, np.int64), np.zeros(1 + 7 * count)
-    jumped = np.zeros(count, np.int64), np.zeros(1 + 7 * count)
+    walked = Train(*given, np.zeros(count, np.int64), np.zeros(1 + 7 * count))
+    jumped = Train(*given, np.zeros(count, np.int64), np.zeros(1 + 7 * count))
     first, last = 0, 0
     t = moments(drive)
     expected = drive.value(t)
     for moment, value in zip(t.tolist(), expected.tolist(), strict=True):
-        first, last, edge = pulses.pass_edges(moment, *given, walked[0], first, last, walked[1])
-        _first, _last, edge_too = pulses.edges_at(moment, *given, *jumped)
-        used = 1 + 7 * int(walked[1][0])
-        assert walked[1][:used].tolist() == jumped[1][:used].tolist()
+        first, last, edge = pulses.pass_edges(moment, walked, first, last)
+        _first, _last, edge_too = pulses.edges_at(moment, jumped)
+        used = 1 + 7 * int(walked.live[0])
+        assert walked.live[:used].tolist() == jumped.live[:used].tolist()
         assert edge == edge_too > moment
         assert (first == last) == (used == 1)
-        found = pulses.sum_of_pulses(moment, walked[1]) if used > 1 else 0.0
+        found = pulses.sum_of_pulses(moment, walked.live) if used > 1 else 0.0
         # Beside an edge of a steep piece a rounding of the time since the firing counts.
         assert found == pytest.approx(value, rel=1e-9, abs=1e-6)
 
@@ -72,10 +72,10 @@ def test_the_kernel_has_the_same_value_wherever_it_begins(drive: PulseSequence) 
 def test_edges_are_where_a_pulse_or_a_piece_begins_or_ends(drive: PulseSequence) -> None:
     firings, begins, pieces, replace, _force = drive.kernel_arrays()
     given = np.array(firings), np.array(begins), np.array(pieces), replace
-    under_way, live = np.zeros(len(firings), np.int64), np.zeros(1 + 7 * len(firings))
+    train = Train(*given, np.zeros(len(firings), np.int64), np.zeros(1 + 7 * len(firings)))
     edge, found = -1.0, []
     while edge < math.inf:
-        edge = pulses.edges_at(edge, *given, under_way, live)[2]
+        edge = pulses.edges_at(edge, train)[2]
         found.append(edge)
     ends = [*drive.times[1:].tolist(), math.inf] if replace else [math.inf] * len(firings)
     expected = {

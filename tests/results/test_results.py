@@ -252,3 +252,9 @@ def test_a_table_without_provenance_opens(tmp_path: Path) -> None:
     assert found.dataframe["n"].tolist() == [1, 2]
     assert found.dataframe["name"].tolist() == ["a", ""]
     assert found.dataframe["ok"].tolist() == [True, False]
+
+
+def test_a_row_of_gaps_is_a_row(tmp_path: Path) -> None:
+    path = tmp_path / "gaps.csv"
+    path.write_text("x [m],y [m]\n1,2\n,\n3,4\n")
+    np.testing.assert_array_equal(reopen(path).dataset["x"], [1.0, np.nan, 3.0])

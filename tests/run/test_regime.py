@@ -76,7 +76,7 @@ def test_a_waveform_of_its_own(hammer: ph.Hammer) -> None:
     regime = Regime.of(hammer, period=1e-3, waveform=HalfSine(amplitude=1.0, width=3e-4))
     assert regime.with_("waveform.width", 2e-4).fired == HalfSine(amplitude=1.0, width=2e-4)
     assert "waveform.rise" not in regime.names
-    with pytest.raises(ph.InputError, match=r"waveform\.rise is not known"):
+    with pytest.raises(ph.InputError, match=r"'waveform\.rise' is not known"):
         regime.value("waveform.rise")
 
 

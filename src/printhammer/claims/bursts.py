@@ -9,8 +9,9 @@ import numpy as np
 
 from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.definition import claims
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.claims.shapes import spread
+from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.run.motion import Motion
 
-_WHOLE = ("backstop", "pack", "waveform")
 _CLOSER: Final = 8
 _TOGETHER: Final = 64
 _SAMPLES: Final = 2001
@@ -79,7 +79,7 @@ def onsets(context: Context) -> dict[str, float]:
     return first
 
 
-@measures("order_of_onset", *_WHOLE)
+@measures("order_of_onset", *WHOLE)
 def order_of_onset(context: Context, _claim: Claim) -> Measured:
     """Rates at which flight times vary, forces vary, and a dot is lost, for the first time."""
     first = context.once("onsets", lambda: onsets(context))
@@ -99,7 +99,7 @@ def order_of_onset(context: Context, _claim: Claim) -> Measured:
     )
 
 
-@measures("second_dot_lost", *_WHOLE)
+@measures("second_dot_lost", *WHOLE)
 def second_dot_lost(context: Context, claim: Claim) -> Measured:
     """First interval of rates in which the peak after the second firing stays below the pack."""
     settings = claim.settings
@@ -176,7 +176,7 @@ def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
     return lowest, found, highest
 
 
-@measures("hang_up_at_high_rate", *_WHOLE)
+@measures("hang_up_at_high_rate", *WHOLE)
 def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
     """Lowest rate from which on the armature hangs up."""
     lowest, _, highest = context.once("hang-up", lambda: hang_up_range(context))
@@ -186,7 +186,7 @@ def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
     return Measured(value, f"From {lowest:.0f} to {highest:.0f} Hz the armature stays off the backstop.")
 
 
-@measures("weak_prints_when_hung_up", *_WHOLE)
+@measures("weak_prints_when_hung_up", *WHOLE)
 def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
     """Largest pack force after the first dot where the armature hangs up."""
     lowest, motions, highest = context.once("hang-up", lambda: hang_up_range(context))
@@ -219,17 +219,16 @@ def _rough_force(motion: Motion) -> float:
     return float(-motion.forces_at(later)["pack"].min()) if later.size else 0.0
 
 
-@measures("flight_time_spread", *_WHOLE)
+@measures("flight_time_spread", *WHOLE)
 def flight_time_spread(context: Context, claim: Claim) -> Measured:
     """Spread of the flight times of bursts at the strange strobe times."""
-    settings, figure = claim.settings, claims()["poincare"]
-    pulses = settings["pulses"]
+    settings, pulses = claim.settings, claim.settings["pulses"]
     _, _, slow = spreads(context.train(settings["rate_Hz"], pulses))
     found: dict[str, Any] = {}
-    for period, verdict in zip(figure.settings["strobe_times_s"], figure.band["verdicts"], strict=True):
+    for period, verdict in printed_verdicts().items():
         if verdict == "strange":
             drive = PulseTrain(context.waveform, period=period, pulses=pulses)
-            found[f"{period * 1e3:.2f} ms"] = spreads(context.run(drive, float(drive.times[-1]) + 4e-3))[2]
+            found[panel_name(period)] = spreads(context.run(drive, float(drive.times[-1]) + 4e-3))[2]
     known = [flight for flight in found.values() if flight is not None]
     least = min(known) - slow if slow is not None and len(known) == len(found) else None
     over = {name: sum(flight > settings[name] for flight in known) for name in ("dot_matrix_s", "engraved_s")}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.claims.context import TAIL, Context
 from printhammer.claims.definition import claims
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.printing.dots.buzz import BuzzSearch, BuzzTrain, delayed_train, find_buzz_train, longest_run
 from printhammer.printing.dots.settling import touches
@@ -14,8 +14,6 @@ from printhammer.printing.dots.settling import touches
 if TYPE_CHECKING:
     from printhammer.claims.definition import Claim
     from printhammer.hammer.hammer import Hammer
-
-_WHOLE = ("backstop", "pack", "waveform")
 
 
 def _wanted() -> tuple[int, tuple[float, float]]:
@@ -31,12 +29,12 @@ def buzz_search(context: Context) -> BuzzSearch:
     return context.once("buzz", lambda: find_buzz_train(context.hammer, fewest=fewest, forces=forces))
 
 
-def _told(train: BuzzTrain) -> str:
+def _described(train: BuzzTrain) -> str:
     how = "one every" if train.kind == "uniform" else "each after the leaving of the pack by"
     return f"{len(train.times)} pulses, {how} {train.interval * 1e6:.1f} us"
 
 
-@measures("buzz_printing", *_WHOLE)
+@measures("buzz_printing", *WHOLE)
 def buzz_printing(context: Context, claim: Claim) -> Measured:
     """Dots of the best train without a touch of the backstop, and their forces."""
     found = buzz_search(context)
@@ -60,14 +58,15 @@ def buzz_printing(context: Context, claim: Claim) -> Measured:
         "trains_tried": found.tried,
     }
     if found.train is None:
-        return Measured(value, f"The best of {found.tried} trains tried, {_told(train)}, is not enough.")
+        return Measured(value, f"The best of {found.tried} trains tried, {_described(train)}, is not enough.")
     return Measured(
         value,
-        f"{_told(train)}: {len(struck)} dots of {min(forces):.2f} to {max(forces):.2f} of the single force.",
+        f"{_described(train)}: {len(struck)} dots of {min(forces):.2f} to {max(forces):.2f} of the single"
+        " force.",
     )
 
 
-@measures("buzz_is_delicate", *_WHOLE)
+@measures("buzz_is_delicate", *WHOLE)
 def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
     """How many of four small changes break the train found."""
     train = buzz_search(context).train

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import PrinthammerError
+from printhammer.printing.dots.settling import touches
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.contacts import Dot
+    from printhammer.run.contacts import Contact, Dot
     from printhammer.run.ensemble import DotTable, EnsembleResult
     from printhammer.run.motion import Motion
 
@@ -120,8 +121,8 @@ class Context:
             raise NotMeasurableError(f"A run under {drive!r} did not end: {motion.message}")
         return motion
 
-    def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> DotTable:
-        """Return what the firings of many drives do, each until `tail`, s, after its last firing.
+    def ensemble(self, drives: Sequence[Drive], ends: Any, **options: Any) -> EnsembleResult:
+        """Run many drives, each until its end, s; options as for `Ensemble.run`.
 
         Raises
         ------
@@ -130,23 +131,17 @@ class Context:
         """
         from printhammer.run.ensemble import Ensemble
 
-        ends = [float(drive.times[-1]) + tail for drive in drives]
-        result = Ensemble(self.hammer, list(drives), ends, tolerance=self.tolerance).run(dots=True)
-        self.demand(result, drives)
-        assert result.dots is not None
-        return result.dots
-
-    def demand(self, result: EnsembleResult, drives: Sequence[Drive]) -> None:
-        """Make sure that all runs of an ensemble reached their ends.
-
-        Raises
-        ------
-        NotMeasurableError
-            One did not.
-        """
+        result = Ensemble(self.hammer, list(drives), ends, tolerance=self.tolerance).run(**options)
         for drive, status in zip(drives, result.status_names, strict=True):
             if status != "ok":
                 raise NotMeasurableError(f"A run under {drive!r} did not end: {status}")
+        return result
+
+    def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> DotTable:
+        """Return what the firings of many drives do, each until `tail`, s, after its last firing."""
+        result = self.ensemble(drives, [float(drive.times[-1]) + tail for drive in drives], dots=True)
+        assert result.dots is not None
+        return result.dots
 
     def pulses(self, times: Iterable[float], duration: float) -> Motion:
         """Run pulses fired at given times, s."""
@@ -166,6 +161,14 @@ class Context:
     def single(self) -> Motion:
         """The single-pulse cycle, from rest to rest."""
         return self.pulses([0.0], CYCLE)
+
+    @cached_property
+    def returns(self) -> list[Contact]:
+        """Touches of the backstop after a single pulse."""
+        found = touches(self.single)
+        if not found:
+            raise NotMeasurableError("The armature does not return to the backstop after a single pulse")
+        return found
 
     @cached_property
     def idle(self) -> Motion:

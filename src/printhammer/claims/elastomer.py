@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims.context import CYCLE, NotMeasurableError
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
-from printhammer.printing.dots.settling import touches
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
@@ -19,14 +18,11 @@ _NEVER: Final = 1.0
 """A firing time after the end of every run, s."""
 
 
-@measures("elastomer_backstop", "backstop", "pack", "waveform")
+@measures("elastomer_backstop", *WHOLE)
 def elastomer_backstop(context: Context, claim: Claim) -> Measured:
     """Rebounds from the backstop of the hammer and from an elastomer, at the speed of the first touch."""
     settings = claim.settings
-    found = touches(context.single)
-    if not found:
-        raise NotMeasurableError("The armature does not return to the backstop after a single pulse")
-    speed = found[0].v_in
+    speed = context.returns[0].v_in
     hard_impact = _impact(context, context.hammer, speed)
     if not hard_impact.ok:
         raise NotMeasurableError(f"The impact on the backstop did not end: {hard_impact.message}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.claims.bursts import hang_up_range, onsets
 from printhammer.claims.context import NotMeasurableError
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.maps.frequency import TAIL
 
@@ -24,29 +24,14 @@ _SPACING: Final = 10e-6
 def sensitivity(context: Context, band: tuple[float, float], grid: float, step: float, pulses: int) -> float:
     """Return the root-mean-square change of the displacement record per hertz, m/Hz, in a band of rates.
 
-    The records of two rates are compared at the same times, from the first firing to 1 ms after the last one
-    at the slower rate.
-
-    Parameters
-    ----------
-    context : Context
-        Runs of the hammer.
-    band : tuple of float
-        Lowest and highest rate, Hz.
-    grid : float
-        Between the slower rates of the pairs, Hz.
-    step : float
-        Between the two rates of a pair, Hz.
-    pulses : int
-        Of a burst.
+    Each of the slower rates, `grid` apart, is compared with that `step` above it, Hz, in bursts of some
+    pulses: at the same times, from the first firing to 1 ms after the last one at the slower rate.
 
     Raises
     ------
     NotMeasurableError
         The band is narrower than a step, or a run ended early.
     """
-    from printhammer.run.ensemble import Ensemble
-
     low, high = band
     slower = low + grid * np.arange(math.floor((high - step - low) / grid * (1.0 + 1e-12)) + 1)
     if not len(slower):
@@ -57,15 +42,14 @@ def sensitivity(context: Context, band: tuple[float, float], grid: float, step: 
         PulseTrain(context.waveform, rate=rate, pulses=pulses)
         for rate in np.stack([slower, slower + step], axis=1).ravel().tolist()
     ]
-    result = Ensemble(context.hammer, drives, ends, tolerance=context.tolerance).run(times=times)
-    context.demand(result, drives)
+    result = context.ensemble(drives, ends, times=times)
     assert result.x is not None
     change = (result.x[1::2].astype(np.float64) - result.x[::2]) / step
     # Beyond the end of a record there is nothing.
     return float(np.sqrt(np.nanmean(change**2)))
 
 
-@measures("map_sensitivity", "backstop", "pack", "waveform")
+@measures("map_sensitivity", *WHOLE)
 def map_sensitivity(context: Context, claim: Claim) -> Measured:
     """Change of the displacement record per hertz below, in and above the erratic band."""
     settings = claim.settings

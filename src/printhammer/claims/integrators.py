@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import equilibria
 
@@ -24,7 +24,7 @@ _LARGEST: Final = 32.0
 _RUNGE_KUTTA_LIMIT: Final = math.sqrt(8.0)
 
 
-@measures("integrator_comparison", "backstop", "pack", "waveform")
+@measures("integrator_comparison", *WHOLE)
 def integrator_comparison(context: Context, claim: Claim) -> Measured:
     """Errors of both schemes on the paper's schedule, and how far its steps can be scaled up."""
     reference = context.run(PulseTrain(context.waveform), _CYCLE, tolerance=REFERENCE_TOLERANCE)

@@ -14,6 +14,9 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
+WHOLE: Final = ("backstop", "pack", "waveform")
+"""What most claims are about."""
+
 Verdict = Literal["holds", "fails", "not yet"]
 
 
@@ -87,15 +90,7 @@ JUDGES: Final[dict[str, tuple[tuple[str, ...], Judge]]] = {}
 
 
 def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
-    """Register the function that measures what a claim is about.
-
-    Parameters
-    ----------
-    name : str
-        Name of the claim.
-    *needs : str
-        Attributes of the hammer without which the claim cannot hold.
-    """
+    """Register the function that measures a claim, which cannot hold for a hammer without what it needs."""
 
     def register(function: Judge) -> Judge:
         if name in JUDGES or name not in claims():

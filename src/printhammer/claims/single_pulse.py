@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from printhammer.claims.context import NotMeasurableError
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.claims.shapes import falling, largest, rank_correlation
 from printhammer.printing.dots.settling import rebounds, touches
 
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
     from printhammer.support.arrays import FloatArray
-
-_WHOLE = ("backstop", "pack", "waveform")
 
 
 @measures("single_pulse_stroke", "pack", "waveform")
@@ -30,15 +28,12 @@ def single_pulse_stroke(context: Context, _claim: Claim) -> Measured:
     )
 
 
-@measures("settle_out", *_WHOLE)
+@measures("settle_out", *WHOLE)
 def settle_out(context: Context, _claim: Claim) -> Measured:
     """Rebounds after the first backstop touch."""
     motion, stroke = context.single, context.stroke
-    found = touches(motion)
-    if not found:
-        raise NotMeasurableError("The armature does not return to the backstop after a single pulse")
     times, x = motion.maxima
-    after = x[times > found[0].t_in] - context.position
+    after = x[times > context.returns[0].t_in] - context.position
     bounces = rebounds(motion, context.position)
     value = {
         "largest_excursion_over_stroke": max(float(after.max(initial=0.0)), 0.0) / stroke,
@@ -55,7 +50,7 @@ def settle_out(context: Context, _claim: Claim) -> Measured:
     )
 
 
-@measures("low_restitution", *_WHOLE)
+@measures("low_restitution", *WHOLE)
 def low_restitution(context: Context, _claim: Claim) -> Measured:
     """Speed ratios out/in of the backstop touches."""
     left = [(c.v_in, c.v_out) for c in touches(context.single) if c.v_out is not None and c.v_in != 0.0]
@@ -72,7 +67,7 @@ def low_restitution(context: Context, _claim: Claim) -> Measured:
     return Measured(value, f"Speed ratios from touch to touch: {series}.")
 
 
-@measures("backstop_force_dominates", *_WHOLE)
+@measures("backstop_force_dominates", *WHOLE)
 def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
     """Largest total force during backstop touches, and at any other time of the cycle."""
     motion = context.single
@@ -80,9 +75,7 @@ def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
     def total(t: FloatArray) -> FloatArray:
         return np.abs(motion.forces_at(t)["total"])
 
-    found = touches(motion)
-    if not found:
-        raise NotMeasurableError("The armature does not return to the backstop after a single pulse")
+    found = context.returns
     ends = [motion.end if c.t_out is None else c.t_out for c in found]
     at_stop = max(largest(total, c.t_in, end) for c, end in zip(found, ends, strict=True))
     starts = [motion.start, *ends]
@@ -94,7 +87,7 @@ def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
     return Measured(value, f"{at_stop:.1f} N in the backstop, {elsewhere:.1f} N at any other time.")
 
 
-@measures("quiet_look_loud_force", *_WHOLE)
+@measures("quiet_look_loud_force", *WHOLE)
 def quiet_look_loud_force(context: Context, claim: Claim) -> Measured:
     """Largest backstop force in touches that follow a rebound too low to be seen."""
     static = float(context.idle.forces_at(0.0)["backstop"][0])
@@ -115,7 +108,7 @@ def quiet_look_loud_force(context: Context, claim: Claim) -> Measured:
     )
 
 
-@measures("loops", *_WHOLE)
+@measures("loops", *WHOLE)
 def loops(context: Context, _claim: Claim) -> Measured:
     """Work of every contact on the armature; the ledger from rest to rest."""
     motion = context.single

@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.definition import claims
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.claims.shapes import rank_correlation
-from printhammer.printing.dots.settling import touches
+from printhammer.claims.verdicts import panel_name, printed_verdicts
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
     from printhammer.support.arrays import FloatArray
 
-_WHOLE = ("backstop", "pack", "waveform")
 _ORBIT_TIME: Final = 4e-3
 _ORBIT_POINTS: Final = 200_001
 _LATTICE: Final = 101
@@ -44,16 +42,15 @@ def scaled(points: FloatArray) -> FloatArray:
 
 def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
     """Return the strobe points of the panels of Fig. 11 by strobe time, all or those called strange."""
-    figure, count = claims()["poincare"], claims()["poincare_window"].settings["points"]
-    times, verdicts = figure.settings["strobe_times_s"], figure.band["verdicts"]
+    count = claims()["poincare_window"].settings["points"]
     return {
-        f"{period * 1e3:.2f} ms": strobe_points(context, period, count)
-        for period, verdict in zip(times, verdicts, strict=True)
+        panel_name(period): strobe_points(context, period, count)
+        for period, verdict in printed_verdicts().items()
         if verdict == "strange" or not strange
     }
 
 
-@measures("poincare_window", *_WHOLE)
+@measures("poincare_window", *WHOLE)
 def poincare_window(context: Context, claim: Claim) -> Measured:
     """Share of the strobe points of each panel inside the window; the others."""
     centre, half = window()
@@ -75,7 +72,7 @@ def poincare_window(context: Context, claim: Claim) -> Measured:
     return Measured(value, f"Inside the window: {np.mean(list(shares.values())):.1%} of all points; {told}.")
 
 
-@measures("low_rate_fixed_point", *_WHOLE)
+@measures("low_rate_fixed_point", *WHOLE)
 def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
     """How far the last points of slow trains are from each other."""
     settings = claim.settings
@@ -93,7 +90,7 @@ def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
     )
 
 
-@measures("cloud_grows", *_WHOLE)
+@measures("cloud_grows", *WHOLE)
 def cloud_grows(context: Context, _claim: Claim) -> Measured:
     """95th percentile of the distance of strobe points from rest against rate."""
     rest = scaled(np.array([context.rest, 0.0]))
@@ -111,7 +108,7 @@ def cloud_grows(context: Context, _claim: Claim) -> Measured:
     )
 
 
-@measures("successive_points_apart", *_WHOLE)
+@measures("successive_points_apart", *WHOLE)
 def successive_points_apart(context: Context, claim: Claim) -> Measured:
     """Distance of successive points in parts of that of any two."""
     ratios: dict[str, float | None] = {}
@@ -126,15 +123,12 @@ def successive_points_apart(context: Context, claim: Claim) -> Measured:
     return Measured(value, f"Successive points are apart in {count} of {len(ratios)} panels.")
 
 
-@measures("points_on_single_pulse_orbit", *_WHOLE)
+@measures("points_on_single_pulse_orbit", *WHOLE)
 def points_on_single_pulse_orbit(context: Context, claim: Claim) -> Measured:
     """Distance of strobe points to the single-pulse orbit, over that of points anywhere in the window."""
     from scipy.spatial import cKDTree
 
-    motion, found = context.single, touches(context.single)
-    if not found:
-        raise NotMeasurableError("The armature does not return to the backstop after a single pulse")
-    start = found[0].t_in
+    motion, start = context.single, context.returns[0].t_in
     times = np.linspace(start, min(start + _ORBIT_TIME, motion.end), _ORBIT_POINTS)
     tree = cKDTree(scaled(np.column_stack(motion.at(times))))
     centre, half = window()

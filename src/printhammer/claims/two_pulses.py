@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from printhammer.claims.context import TAIL
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.printing.dots.settling import touches
 
 if TYPE_CHECKING:
@@ -15,10 +15,8 @@ if TYPE_CHECKING:
     from printhammer.claims.definition import Claim
     from printhammer.drive.waveforms.shapes import Waveform
 
-_WHOLE = ("backstop", "pack", "waveform")
 
-
-@measures("two_pulses_660us", *_WHOLE)
+@measures("two_pulses_660us", *WHOLE)
 def two_pulses_660us(context: Context, claim: Claim) -> Measured:
     """Peak after the second of two pulses."""
     _ = context.dot
@@ -40,7 +38,7 @@ def two_pulses_660us(context: Context, claim: Claim) -> Measured:
     )
 
 
-@measures("two_pulses_700us", *_WHOLE)
+@measures("two_pulses_700us", *WHOLE)
 def two_pulses_700us(context: Context, claim: Claim) -> Measured:
     """Force, flight time and phase of the second of two pulses."""
     interval = claim.settings["interval_s"]

@@ -10,7 +10,7 @@ from printhammer.chaos import strobes
 from printhammer.chaos.strobe.scan import scan
 from printhammer.chaos.strobe.verdict import LAST
 from printhammer.claims.definition import claims
-from printhammer.claims.judging import Measured, measures
+from printhammer.claims.judging import WHOLE, Measured, measures
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from printhammer.claims.definition import Claim
     from printhammer.hammer.hammer import Hammer
 
-_WHOLE = ("backstop", "pack", "waveform")
 _CHANGE: Final = 1e-5
 _TIGHTER: Final = 0.1
 _PLAIN: Final = "as it is"
@@ -91,7 +90,7 @@ def _verdicts(found: list[Strobe]) -> list[Verdict]:
     return [strobe.verdict for strobe in found if strobe.verdict is not None]
 
 
-@measures("poincare", *_WHOLE)
+@measures("poincare", *WHOLE)
 def poincare(context: Context, claim: Claim) -> Measured:
     """Verdicts on the panels of Fig. 11, and whether they stay if tolerance and constants are changed."""
     periods = list(claim.settings["strobe_times_s"])
@@ -136,17 +135,7 @@ def poincare(context: Context, claim: Claim) -> Measured:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Successive strobe times with the same verdict.
-
-    Attributes
-    ----------
-    name : str
-        The verdict.
-    longest, shortest : float
-        First and last strobe time, s, the scan going down.
-    count : int
-        Number of strobe times.
-    """
+    """Successive strobe times of one verdict: first and last one, s, of a falling scan, and their number."""
 
     name: str
     longest: float
@@ -172,7 +161,7 @@ def cascades(found: Sequence[Stretch]) -> list[Stretch]:
     ]
 
 
-@measures("no_period_doubling_cascade", *_WHOLE)
+@measures("no_period_doubling_cascade", *WHOLE)
 def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
     """Doublings of the period before chaos as the strobe time falls, and periodic windows inside it."""
     settings = claim.settings

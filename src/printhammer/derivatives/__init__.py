@@ -1,1 +1,1 @@
-"""Derivatives of a motion: with respect to states and to constants."""
+"""Derivatives of states and dots, with respect to states and constants."""

@@ -1,7 +1,7 @@
 """The tangent flow of constants: how a motion changes with the constants of hammer and drive.
 
-The columns of `printhammer.kernel.variational.influence` carried along a recorded run, in a second pass as
-for the tangent flow of the state (`printhammer.derivatives.states`). docs/tangent.md has the derivation.
+The columns of `printhammer.kernel.variational` carried along a recorded run, in a second pass as for the
+tangent flow of the state (`printhammer.derivatives.states`). docs/tangent.md has the derivation.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from printhammer.derivatives.flow import carry_columns, forcing_of
 from printhammer.derivatives.parameters import as_arrays, parameters, rest_changes
 from printhammer.errors import InputError
-from printhammer.kernel.compile.variational import with_sensitivity
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION
 from printhammer.kernel.model.modes import (
     HELD_UNLOADING,
     LOADING,
@@ -26,16 +26,7 @@ from printhammer.kernel.model.modes import (
     STATUS_NAMES,
     UNLOADING,
 )
-from printhammer.kernel.variational.influence import (
-    BACKSTOP_MOVES,
-    FIELD_MOVES,
-    MIDDLE,
-    PACK_MOVES,
-    ROWS,
-    SPACING,
-    VARIED,
-    width,
-)
+from printhammer.kernel.variational.layout import SPACING
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.start import initial_state
 
@@ -44,15 +35,12 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
+    from printhammer.derivatives.flow import Flow
     from printhammer.derivatives.parameters import Parameter
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.compile.specialise import Kernel
     from printhammer.run.problem import Record
     from printhammer.support.arrays import FloatArray
-
-_STAGES: Final = 15
-_VALUE_SPACING: Final = 1e-3
 
 
 @dataclass(frozen=True)
@@ -194,29 +182,6 @@ def constant_map(
     )
 
 
-@dataclass(frozen=True)
-class Flow:
-    """Columns of constants along a run, per ``value / scale`` of each.
-
-    Attributes
-    ----------
-    states : array, shape (m, 4)
-        Displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks; NaN beyond the run.
-    changes : array, shape (m, 7, n)
-        Changes at the marks: displacement, m; velocity, m/s; latest local maximum, m; work of coil and of a
-        drive force, loss in pack and backstop, J, since the first mark.
-    passed : array, shape (q, 2, 7, n)
-        The same at chosen nodes of the record, before and after the switch there.
-    smooth : bool
-        Whether the motion is differentiable from the first mark to the last.
-    """
-
-    states: FloatArray
-    changes: FloatArray
-    passed: FloatArray
-    smooth: bool
-
-
 def flow(
     problem: Problem,
     record: Record,
@@ -243,49 +208,10 @@ def flow(
     Returns
     -------
     Flow
-        NaN where the run did not get.
+        NaN where the run did not get; changes per ``value / scale`` of each constant.
     """
-    count, arrays = len(wanted), as_arrays(wanted)
-    away = SPACING * (np.arange(VARIED) - MIDDLE)
-    varied = problem.constants + away[:, np.newaxis] * arrays["hammer"][:, np.newaxis, :]
-    states = np.full((len(marks), 4), np.nan)
-    changes = np.full((len(marks), ROWS, count), np.nan)
-    passed = np.full((len(nodes), 2, ROWS, count), np.nan)
-    smooth = kernel_of(problem).sensitivity(
-        record.nodes,
-        *problem.drive_arrays(),
-        problem.constants,
-        problem.scales,
-        problem.bounds,
-        varied,
-        arrays["hammer"],
-        _laws_moved(arrays["hammer"]),
-        arrays["firings"],
-        arrays["pieces"],
-        np.zeros((count, 5 * problem.firings.size)),
-        np.zeros((count, VARIED)),
-        _VALUE_SPACING * (problem.drive.largest_pulse or 1.0),
-        np.ascontiguousarray(marks, np.float64),
-        np.asarray(nodes, dtype=np.int64),
-        np.ascontiguousarray(initial, np.float64),
-        np.zeros((ROWS, count)),
-        np.zeros((_STAGES, width(count))),
-        states,
-        changes,
-        passed,
-    )
-    return Flow(states, changes, passed, bool(smooth))
-
-
-def _laws_moved(moves: FloatArray) -> npt.NDArray[np.int64]:
-    """Tell which laws each constant changes, as the kernel wants it."""
-    pack = moves[:, PACK:BACKSTOP_PART].any(axis=1) | (moves[:, FRONT] != 0.0)
-    return np.asarray(
-        FIELD_MOVES * (moves[:, SPRING:PACK].any(axis=1) | moves[:, MAGNET:].any(axis=1))
-        + PACK_MOVES * pack
-        + BACKSTOP_MOVES * moves[:, BACKSTOP_PART:MAGNET].any(axis=1),
-        dtype=np.int64,
-    )
+    forcing = forcing_of(problem, as_arrays(wanted))
+    return carry_columns(problem, [record], marks, initial, forcing, nodes=nodes)
 
 
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
@@ -373,11 +299,6 @@ def _push(problem: Problem, c: FloatArray, state: tuple[float, float, float, flo
     if mode == LOADING or not getattr(part, "MEMORY", False):
         return -float(part.pack_loading(c, x, v))
     return -float(part.pack_unloading(c, x, v, part.pack_memory(c, peak)))
-
-
-def kernel_of(problem: Problem) -> Kernel:
-    """Return the kernel that carries columns of constants for the laws of a problem."""
-    return with_sensitivity(problem.kernel)
 
 
 def _rates(problem: Problem, record: Record, times: FloatArray, states: FloatArray) -> FloatArray:

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.derivatives.constants import Flow, flow, pack_push_changes, pack_push_rate, surface_moves
+from printhammer.derivatives.constants import flow, pack_push_changes, pack_push_rate, surface_moves
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from printhammer.derivatives.flow import Flow
     from printhammer.derivatives.parameters import Parameter
     from printhammer.run.contacts import Contact
     from printhammer.run.motion import Motion

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.derivatives.flow import Flow, carry_columns
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.kernel.model.modes import HELD_UNLOADING, OK, PAUSED, RELOADING, STATUS_NAMES, UNLOADING
-from printhammer.kernel.single import carry
-from printhammer.run.problem import MAX_STEPS, TOLERANCE, Problem, check_tolerance
+from printhammer.kernel.model.modes import HELD_UNLOADING, OK, RELOADING, STATUS_NAMES, UNLOADING
+from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.start import initial_state
 from printhammer.support.threads import in_threads, thread_count
 
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from printhammer.support.threads import Progress
 
 _NODES: Final = 4096
-_CONTACTS: Final = 16
-_WORK: Final = (15, 9)
 _WARM_UP: Final = 100
 """Firings over which the directions of growth settle before growth counts."""
 _FEWEST: Final = 8
@@ -189,7 +187,7 @@ def tangent_map(
         raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
     problem = _problem(hammer, drive, state, tolerance)
     followed = follow(problem, np.array([start, end]), np.eye(3), renormalise=False)
-    found, status = followed.found, followed.status
+    found, status = followed.states, followed.status
     branches = [int(code) if code >= 0.0 else -1 for code in found[:, 2]]
     shape = [3 if branch in (UNLOADING, RELOADING, HELD_UNLOADING) else 2 for branch in branches]
     matrix = (
@@ -258,7 +256,7 @@ def strobe_exponent(
     scale, speed = problem.scales
     initial = np.array([[scale, 0.0], [0.0, speed], [0.0, 0.0]])
     followed = follow(problem, times[before:], initial, renormalise=True)
-    growth = followed.found[first - before :, 4:]
+    growth = followed.growth[first - before :]
     factors = growth[:, 0].copy()
     if followed.status == OK:
         value, second = (float(mean) for mean in growth.mean(axis=0))
@@ -274,7 +272,7 @@ def strobe_exponent(
         smooth=followed.smooth,
         status=STATUS_NAMES[followed.status],
         second_factors=growth[:, 1].copy(),
-        states=followed.found[first - 1 - before :, :4].copy(),
+        states=followed.states[first - 1 - before :].copy(),
     )
 
 
@@ -378,81 +376,13 @@ def _strobes(
     return drive, times[:last], float(spacing)
 
 
-@dataclass(frozen=True)
-class Followed:
-    """Status code, differentiability, the kernel's `found` at the marks (NaN beyond), columns at the last."""
-
-    status: int
-    smooth: bool
-    found: FloatArray
-    columns: FloatArray
-
-    @property
-    def status_name(self) -> str:
-        """Name of the status."""
-        return STATUS_NAMES[self.status]
-
-
-def follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> Followed:
-    """Run a problem to the last mark and carry columns along from the first.
+def follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> Flow:
+    """Run a problem to the last mark and carry columns of initial states along from the first.
 
     The record is kept in stretches: memory does not grow with the length of the run.
     """
-    capacity = _NODES
-    while True:
-        followed = _stretches(problem, marks, initial, renormalise, capacity)
-        if followed is not None:
-            return followed
-        capacity *= 4
-
-
-def _stretches(
-    problem: Problem, marks: FloatArray, initial: FloatArray, renormalise: bool, capacity: int
-) -> Followed | None:
-    """Do as `follow` with a record of at most `capacity` nodes; None where one contact alone needs more."""
-    count = initial.shape[1]
-    columns = np.zeros((3, count))
-    found = np.full((len(marks), 4 + count), np.nan)
-    track = np.zeros(2 + count)
-    track[1] = 1.0
-    work = np.zeros(_WORK)
-    nodes, contacts = np.empty((capacity, 5)), np.empty((_CONTACTS, 7))
-    state = np.zeros(carry.SIZE)
-    state[carry.PAUSE_AFTER] = capacity // 2
-    arrays: tuple[Any, ...] = problem.drive_arrays()
-    own: tuple[Any, ...] = problem.drive_arrays()
-    status = PAUSED
-    while status == PAUSED:
-        status, used, _touched, _steps = problem.kernel.run(
-            *arrays[:4],
-            problem.constants,
-            problem.start,
-            float(problem.state[0]),
-            float(problem.state[1]),
-            float(marks[-1]),
-            problem.control,
-            problem.bounds,
-            MAX_STEPS,
-            *arrays[4:],
-            nodes,
-            contacts,
-            state,
-        )
-        if used > capacity:
-            return None
-        problem.kernel.tangent(
-            nodes[:used],
-            *own,
-            problem.constants,
-            problem.scales,
-            problem.bounds,
-            marks,
-            renormalise,
-            status != PAUSED,
-            initial,
-            columns,
-            work,
-            track,
-            found,
-        )
-    return Followed(status, bool(track[1]), found, columns)
+    return problem.in_stretches(
+        float(marks[-1]),
+        _NODES,
+        lambda stretches: carry_columns(problem, stretches, marks, initial, renormalise=renormalise),
+    )

@@ -143,8 +143,7 @@ def _spread(fit: Fit) -> FloatArray:
     """Return the standard deviation of each datum over the residual scale."""
     used = ~fit.outliers
     spread = 1.0 / np.sqrt(fit.weights)
-    relative: FloatArray = spread / np.sqrt(np.mean(spread[used] ** 2))
-    return relative
+    return np.asarray(spread / np.sqrt(np.mean(spread[used] ** 2)))
 
 
 def _ring(ax: Axes, fit: Fit, x: FloatArray, y: FloatArray) -> None:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.support.csv_table import heading, number, read_rows
+from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import parse, to_si
 
 if TYPE_CHECKING:
@@ -76,7 +76,15 @@ class Cells:
             if gaps and text.lower() in _GAPS:
                 values[k] = math.nan
                 continue
-            values[k] = number(text, f"{self.what}: line {self.lines[k]}, column {name!r}")
+            try:
+                values[k] = float(text)
+            except ValueError:
+                values[k] = math.nan
+            if not math.isfinite(values[k]):
+                raise InputError(
+                    f"{self.what}: line {self.lines[k]}, column {name!r}: {text!r} is expected to be a finite"
+                    " number"
+                )
         return values * factor
 
 
@@ -180,7 +188,7 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
 
 def _named(what: str, cell: str) -> tuple[str, str]:
     """Split the cell of a heading into its name and its unit."""
-    name, unit = heading(cell)
+    name, unit = split_heading(cell)
     if not unit:
         raise InputError(f"{what}: column {cell!r} is expected to carry its unit, such as 'time [us]'")
     return (name.lower() if name.lower() in _SI else name), unit
@@ -188,12 +196,12 @@ def _named(what: str, cell: str) -> tuple[str, str]:
 
 def _cells(path: Path) -> Cells:
     what = str(path)
-    found = read_rows(path, "measured map")
-    lines, rows = [line for line, _ in found], [row for _, row in found]
+    rows = read_sheet(path, "the measured map").rows
     if len(rows) < 2:
         raise InputError(f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples")
-    names = [cell.strip() for cell in rows[0]]
-    for line, row in zip(lines[1:], rows[1:], strict=True):
-        if len(row) != len(names):
-            raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(names)}")
-    return Cells(what, names, np.array(lines[1:], dtype=np.int64), rows[1:])
+    heading = [cell.strip() for cell in rows[0][1]]
+    for line, row in rows[1:]:
+        if len(row) != len(heading):
+            raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(heading)}")
+    lines = np.array([line for line, _row in rows[1:]], dtype=np.int64)
+    return Cells(what, heading, lines, [row for _line, row in rows[1:]])

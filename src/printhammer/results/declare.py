@@ -74,9 +74,10 @@ class Column:
             **(self.attrs or {}),
         }
 
-    def heading(self, name: str) -> str:
-        """Heading in the table of the variable of some name, such as "x [m]"."""
-        return heading(self.head or name, self.unit)
+    @property
+    def heading(self) -> str:
+        """Heading in the table, such as "x [m]"."""
+        return heading(self.head or self.name, self.unit)
 
     @property
     def sentence(self) -> str:

@@ -13,7 +13,6 @@ JSON is strict: nan is null, and infinite numbers are "inf" and "-inf".
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import shutil
@@ -22,7 +21,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from io import BytesIO
-from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from warnings import catch_warnings, simplefilter
@@ -33,6 +31,7 @@ from printhammer.errors import InputError
 from printhammer.results.declare import heading
 from printhammer.results.provenance import KEYS
 from printhammer.support.outputs import write_file
+from printhammer.support.sheets import read_sheet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -234,16 +233,21 @@ def frame(
     return table
 
 
+def csv_text(table: pd.DataFrame) -> str:
+    """Return a table as CSV with all digits, its `attrs` as lines ``# key: value`` above the heading."""
+    head = "".join(f"# {key}: {_text(value)}\n" for key, value in table.attrs.items())
+    return head + str(table.to_csv(index=False, float_format="%.17g", lineterminator="\n"))
+
+
 def write_csv(table: pd.DataFrame, path: str | Path) -> None:
-    """Write a table as CSV with all digits, its `attrs` as lines ``# key: value`` above the heading.
+    """Write a table as CSV, see `csv_text`.
 
     Raises
     ------
     InputError
         The file cannot be written; what was there stays.
     """
-    head = "".join(f"# {key}: {_text(value)}\n" for key, value in table.attrs.items())
-    write_file(path, head + table.to_csv(index=False, float_format="%.17g", lineterminator="\n"))
+    write_file(path, csv_text(table))
 
 
 def write_parquet(table: pd.DataFrame, path: str | Path) -> None:
@@ -324,18 +328,23 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
 
 
 def _json(dataset: xr.Dataset) -> str:
+    def text(value: Any) -> str:
+        return json.dumps(_strict(value), allow_nan=False, ensure_ascii=False)
+
     columns = {
         str(name): {
             "dims": list(map(str, values.dims)),
             **plain(values.attrs),
             "dtype": values.dtype.str[1:],
             "coordinate": name in dataset.coords,
-            "values": _strict(values.values.tolist()),
+            "values": values.values.tolist(),
         }
         for name, values in dataset.variables.items()
     }
-    content = {**_strict(plain(dict(dataset.attrs))), _COLUMNS: columns}
-    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    # A line for each attribute and each array.
+    head = "".join(f"  {text(str(key))}: {text(plain(value))},\n" for key, value in dataset.attrs.items())
+    body = ",\n".join(f"    {text(name)}: {text(entry)}" for name, entry in columns.items())
+    return f"{{\n{head}  {text(_COLUMNS)}: {{\n{body}\n  }}\n}}\n"
 
 
 def _strict(value: Any) -> Any:
@@ -383,17 +392,13 @@ def _read_arrays(source: Path) -> xr.Dataset:
 def _read_csv(source: Path) -> pd.DataFrame:
     import pandas as pd
 
-    lines = source.read_text("utf-8-sig").splitlines(keepends=True)
-    attributes = {}
-    head = list(takewhile(lambda line: line.startswith("#"), lines))
-    for line in head:
-        key, colon, value = line[1:].partition(":")
-        if colon:
-            attributes[key.strip()] = _number(_decoded(value.strip()))
-    rows = list(csv.reader(lines[len(head) :]))
-    if not rows or {len(row) for row in rows} != {len(rows[0])}:
+    sheet = read_sheet(source, "the result", gaps=True)
+    lengths = {len(cells) for _line, cells in sheet.rows}
+    if len(lengths) != 1:
         raise InputError(f"{source}: expected a heading, and rows with as many cells")
-    table = pd.DataFrame({head: _typed([row[k] for row in rows[1:]]) for k, head in enumerate(rows[0])})
+    (_line, heads), *rows = sheet.rows
+    table = pd.DataFrame({head: _typed([cells[k] for _line, cells in rows]) for k, head in enumerate(heads)})
+    attributes = {key: _number(_decoded(value)) for key, value in sheet.comments.items()}
     table.attrs.update(attributes)
     return table
 

@@ -8,21 +8,25 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.kernel.model import layout
 from printhammer.kernel.model.laws import Laws
-from printhammer.kernel.model.modes import OK, STATUS_NAMES, STEP_LIMIT
+from printhammer.kernel.model.modes import OK, PAUSED, STATUS_NAMES, STEP_LIMIT
 from printhammer.kernel.single import carry
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.compile.specialise import Kernel
     from printhammer.support.arrays import FloatArray
+
+T = TypeVar("T")
 
 TOLERANCE: Final = 2e-11
 """Default tolerance: error allowed in one step, in units of the stroke and of a typical speed."""
@@ -66,6 +70,31 @@ class Record:
     def status_name(self) -> str:
         """Name of the status."""
         return STATUS_NAMES[self.status]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Part of a record, up to a pause or the end; its arrays are overwritten by the next one.
+
+    Attributes
+    ----------
+    status : int
+        Code of the status, PAUSED but for the last.
+    nodes, contacts : array, shapes (n, 5) and (m, 7)
+        As in `Record`; the first node is the last one of the stretch before, a contact that is open at a
+        pause the first one of the stretch after it.
+    reached : float
+        Time that the run got to, s.
+    """
+
+    status: int
+    nodes: FloatArray
+    contacts: FloatArray
+    reached: float
+
+
+class _TooLong(Exception):
+    """A stretch does not fit."""
 
 
 def fresh_carry(pause_after: float = math.inf) -> FloatArray:
@@ -207,7 +236,7 @@ class Problem:
         return specialise(self.laws)
 
     def drive_arrays(self) -> tuple[Any, ...]:
-        """Return what the kernel needs of the drive, with working space of its own."""
+        """Return what the kernel needs of the drive, with working space: see its `Train`."""
         count = self.firings.size
         under_way, live = np.zeros(count, np.int64), np.zeros(1 + 7 * count)
         return (self.firings, self.begins, self.pieces, self.replace, under_way, live)
@@ -219,43 +248,89 @@ class Problem:
         capacity = _NODES + int(_NODES_A_FLIGHT * flights)
         contact_capacity = _CONTACTS + int(flights)
         while True:
-            firings, begins, pieces, replace, under_way, live = self.drive_arrays()
-            nodes = np.empty((capacity, 5))
-            contacts = np.empty((contact_capacity, 7))
-            status, used, touched, steps = self.kernel.run(
-                firings,
-                begins,
-                pieces,
-                replace,
-                self.constants,
-                self.start,
-                float(self.state[0]),
-                float(self.state[1]),
-                float(end),
-                self.control,
-                self.bounds,
-                self.max_steps or MAX_STEPS,
-                under_way,
-                live,
-                nodes,
-                contacts,
-                fresh_carry(),
+            nodes, contacts = np.empty((capacity, 5)), np.empty((contact_capacity, 7))
+            status, used, touched, steps = self._advance(
+                end, self.max_steps or MAX_STEPS, self.drive_arrays(), nodes, contacts, fresh_carry()
             )
             if used <= capacity and touched <= contact_capacity:
                 return Record(status, nodes[:used].copy(), contacts[:touched].copy(), steps)
             capacity = max(capacity, used)
             contact_capacity = max(contact_capacity, touched)
 
+    def _advance(
+        self,
+        end: float,
+        max_steps: int,
+        drive: tuple[Any, ...],
+        nodes: FloatArray,
+        contacts: FloatArray,
+        state: FloatArray,
+    ) -> tuple[int, int, int, int]:
+        """Run to time `end`, s, or to a pause, from the start or from where `state` says."""
+        status, used, touched, steps = self.kernel.run(
+            drive,
+            self.constants,
+            self.start,
+            float(self.state[0]),
+            float(self.state[1]),
+            float(end),
+            self.control,
+            self.bounds,
+            max_steps,
+            nodes,
+            contacts,
+            state,
+        )
+        return status, used, touched, steps
+
+    def in_stretches(self, end: float, capacity: int, take: Callable[[Iterator[Stretch]], T]) -> T:
+        """Integrate to time `end`, s, and have the record taken in stretches: memory does not grow with it.
+
+        Parameters
+        ----------
+        end : float
+            End of the run, s.
+        capacity : int
+            Nodes that are kept at a time.
+        take : callable
+            Gets the stretches one after the other and need not take all; where one contact alone has more
+            nodes than fit, it is called again with longer ones.
+
+        Returns
+        -------
+        object
+            What `take` returns.
+        """
+        while True:
+            try:
+                return take(self._stretches(end, capacity))
+            except _TooLong:
+                capacity *= 4
+
+    def _stretches(self, end: float, capacity: int) -> Iterator[Stretch]:
+        drive, nodes, contacts = self.drive_arrays(), np.empty((capacity, 5)), np.empty((capacity, 7))
+        state = fresh_carry(max(capacity // 2, 2))
+        status = PAUSED
+        while status == PAUSED:
+            status, used, touched, _steps = self._advance(end, MAX_STEPS, drive, nodes, contacts, state)
+            # A contact begins with a node: where the nodes fit, the contacts do.
+            if used > capacity:
+                raise _TooLong
+            yield Stretch(status, nodes[:used], contacts[:touched], float(state[carry.TIME]))
+            if touched:
+                # A contact that is open at a pause is the first one of the next stretch.
+                contacts[0] = contacts[touched - 1]
+
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
         """Return states and forces, shape (n, 9), at ascending times, s; see the kernel's `resample`."""
         out = np.empty((times.size, 9))
-        self.kernel.resample(times, record.nodes, *self.drive_arrays(), self.constants, out)
+        self.kernel.resample(times, record.nodes, self.drive_arrays(), self.constants, out)
         return out
 
     def peaks(self, record: Record) -> FloatArray:
         """Return time, depth and force, shape (m, 3), at the peaks of all contacts."""
         out = np.empty((len(record.contacts), 3))
-        self.kernel.peaks(record.contacts, record.nodes, *self.drive_arrays(), self.constants, out)
+        self.kernel.peaks(record.contacts, record.nodes, self.drive_arrays(), self.constants, out)
         return out
 
     def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
@@ -266,7 +341,7 @@ class Problem:
             np.ascontiguousarray(starts, np.float64),
             np.ascontiguousarray(ends, np.float64),
             record.nodes,
-            *self.drive_arrays(),
+            self.drive_arrays(),
             self.constants,
             out,
         )

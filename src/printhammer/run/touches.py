@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from printhammer.kernel.model.modes import BACKSTOP_SURFACE, PACK_SURFACE, PAUSED, STATUS_NAMES
-from printhammer.kernel.single import carry
-from printhammer.run.problem import MAX_STEPS, fresh_carry
 
 if TYPE_CHECKING:
-    from printhammer.run.problem import Problem
+    from collections.abc import Iterator
+
+    from printhammer.run.problem import Problem, Stretch
     from printhammer.support.arrays import FloatArray
 
 Surface = Literal["pack", "backstop"]
@@ -63,50 +63,20 @@ def touches_of(problem: Problem, surface: Surface, after: float, end: float, mos
     Touches
         The first of them, at most that many.
     """
-    capacity = _STRETCH
-    while True:
-        found = _stretches(problem, CODES[surface], after, end, most, capacity)
-        if found is not None:
-            return found
-        capacity *= 4
 
+    def take(stretches: Iterator[Stretch]) -> Touches:
+        kept: list[FloatArray] = []
+        count = 0
+        for stretch in stretches:
+            goes_on = stretch.status == PAUSED and len(stretch.contacts) > 0
+            goes_on = goes_on and bool(np.isnan(stretch.contacts[-1, _OUT]))
+            done = stretch.contacts[:-1] if goes_on else stretch.contacts
+            counts = (done[:, _SURFACE] == CODES[surface]) & (done[:, _IN] >= after)
+            kept.append(done[counts & (done[:, _INITIAL] == 0.0), _IN : _OUT + 2].copy())
+            count += len(kept[-1])
+            if count >= most:
+                break
+        ended = "ok" if stretch.status == PAUSED else STATUS_NAMES[stretch.status]
+        return Touches(np.concatenate(kept)[:most], ended, stretch.reached)
 
-def _stretches(
-    problem: Problem, code: int, after: float, end: float, most: int, capacity: int
-) -> Touches | None:
-    """Do as `touches_of` in stretches; None where one of them has more contacts than `capacity`."""
-    arrays = problem.drive_arrays()
-    nodes, contacts = np.empty((1, 5)), np.empty((capacity, 7))
-    # A contact begins with a node, so that contacts fit; two nodes are the least that is a step.
-    state = fresh_carry(max(capacity // 2, 2))
-    kept: list[FloatArray] = []
-    count, status = 0, PAUSED
-    while status == PAUSED and count < most:
-        status, _used, touched, _steps = problem.kernel.run(
-            *arrays[:4],
-            problem.constants,
-            problem.start,
-            float(problem.state[0]),
-            float(problem.state[1]),
-            float(end),
-            problem.control,
-            problem.bounds,
-            MAX_STEPS,
-            *arrays[4:],
-            nodes,
-            contacts,
-            state,
-        )
-        if touched > capacity:
-            return None
-        seen = contacts[:touched]
-        # A contact that is open at a pause is the first one of the next stretch.
-        goes_on = status == PAUSED and touched > 0 and bool(np.isnan(seen[-1, _OUT]))
-        done = seen[:-1] if goes_on else seen
-        wanted = (done[:, _SURFACE] == code) & (done[:, _IN] >= after) & (done[:, _INITIAL] == 0.0)
-        kept.append(done[wanted, _IN : _OUT + 2].copy())
-        count += len(kept[-1])
-        if goes_on:
-            contacts[0] = seen[-1]
-    ended = "ok" if status == PAUSED else STATUS_NAMES[status]
-    return Touches(np.concatenate(kept)[:most], ended, float(state[carry.TIME]))
+    return problem.in_stretches(end, _STRETCH, take)

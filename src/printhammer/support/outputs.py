@@ -92,9 +92,11 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
         if place in seen:
             raise InputError(f"{path}: expected a file of its own, this one is written twice")
         seen.add(place)
+        store = place.suffix.lower() == ".zarr"
         # A Zarr store is a folder, and written over as a whole.
-        if place.is_dir() and not (place / "zarr.json").is_file():
-            raise InputError(f"{path}: expected a file to write, this is a folder")
+        if place.is_dir() and not (store and (place / "zarr.json").is_file()):
+            wanted = "a new store, this is no Zarr store" if store else "a file to write, this is a folder"
+            raise InputError(f"{path}: expected {wanted}")
         if not place.parent.is_dir():
             raise InputError(f"{path}: expected a file in a folder that exists")
         if not os.access(place.parent, os.W_OK):

@@ -28,17 +28,13 @@ def problem_of(hammer: ph.Hammer, drive: Any, state: tuple[float, float] | None 
 
 def stretches(problem: Problem, end: float, pause_after: float) -> Iterator[tuple[Any, Any, int, int]]:
     """Nodes, contacts, status and steps of each stretch of a run that pauses."""
-    count = problem.firings.size
-    under_way, live = np.zeros(count, np.int64), np.zeros(1 + 7 * count)
+    arrays = problem.drive_arrays()
     nodes, contacts = np.empty((4000, 5)), np.empty((400, 7))
     carried = fresh_carry(pause_after)
     status = PAUSED
     while status == PAUSED:
         status, used, touched, steps = problem.kernel.run(
-            problem.firings,
-            problem.begins,
-            problem.pieces,
-            problem.replace,
+            arrays,
             problem.constants,
             # What a run that goes on does not look at.
             problem.start if carried[carry.STATE] == carry.FRESH else math.nan,
@@ -48,8 +44,6 @@ def stretches(problem: Problem, end: float, pause_after: float) -> Iterator[tupl
             problem.control,
             problem.bounds,
             MAX_STEPS,
-            under_way,
-            live,
             nodes,
             contacts,
             carried,

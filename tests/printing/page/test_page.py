@@ -16,7 +16,6 @@ from printhammer.printing.dots.strategy import open_loop
 from printhammer.printing.page import page as page_module
 from printhammer.printing.page.head import head_of
 from printhammer.printing.page.page import Page, darkness, print_page
-from printhammer.printing.page.page_tables import page_table, save_page
 from printhammer.printing.page.pattern import Pattern
 
 TIGHT = 1e-12
@@ -282,24 +281,24 @@ def test_a_dataset_and_files_hold_every_dot(page: Page, tmp_path: Path) -> None:
     assert chart.attrs["hammer_fingerprint"] == page.hammer.fingerprint
     assert (chart["fault"].values == "lost").sum() == page.lost.sum()
     assert (chart["fault"].values == "none").sum() == page.good.sum()
-    save_page(page, tmp_path / "page.nc")
+    page.save(tmp_path / "page.nc")
     with xr.open_dataset(tmp_path / "page.nc", engine="scipy") as kept:
         np.testing.assert_array_equal(kept["placement_error"], page.placement_error)
         np.testing.assert_array_equal(kept["extra_force"], page.extra_force)
         assert kept.attrs["rate"] == RATE
-    save_page(page, tmp_path / "page.csv")
-    rows = pd.read_csv(tmp_path / "page.csv")
+    page.save(tmp_path / "page.csv")
+    rows = pd.read_csv(tmp_path / "page.csv", comment="#")
     assert len(rows) == page.line.size
     np.testing.assert_allclose(rows["flight_time [s]"], page.flight_time, rtol=1e-15)
-    assert "placement_error [m]" in page_table(page)
+    assert "placement_error [m]" in page.to_dataframe()
     with pytest.raises(ph.InputError, match=r"page\.txt"):
-        save_page(page, tmp_path / "page.txt")
+        page.save(tmp_path / "page.txt")
 
 
 def test_a_page_without_extra_contacts_is_kept_as_well(hammer: ph.Hammer, tmp_path: Path) -> None:
     found = print_page(hammer, Pattern.from_text("é", 24), 500.0)
     assert found.extra_of.size == 0
-    save_page(found, tmp_path / "page.nc")
+    found.save(tmp_path / "page.nc")
     with xr.open_dataset(tmp_path / "page.nc", engine="scipy") as kept:
         assert kept.sizes["extra"] == 0
         assert kept.attrs["pattern"] == "é"

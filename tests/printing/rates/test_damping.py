@@ -12,7 +12,6 @@ from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.settling import settle
 from printhammer.printing.rates.damping import DampingStudy, damping_study, tuned
 from printhammer.printing.rates.materials import Material, materials
-from printhammer.printing.rates.quality_tables import save_result
 
 GRID = {"first": 400.0, "last": 1200.0, "step": 400.0, "limits": Limits(force=0.2, arrival=80e-6)}
 
@@ -67,7 +66,7 @@ def test_the_best_is_within_the_current_limit(hammer: "ph.Hammer", found: Dampin
 
 def test_a_dataset_holds_everything(found: DampingStudy, tmp_path: Path) -> None:
     for name in ("study.nc", "study.json", "study.csv"):
-        save_result(found, tmp_path / name)
+        found.save(tmp_path / name)
     with xr.open_dataset(tmp_path / "study.nc", engine="scipy") as chart:
         np.testing.assert_array_equal(chart["settle_out"], found.settle_out)
         assert chart["loss"].attrs["units"] == "J"

@@ -8,7 +8,6 @@ import xarray as xr
 import printhammer as ph
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.nominal import SinglePulse
-from printhammer.printing.rates.quality_tables import save_result
 from printhammer.printing.rates.safe_rate import rate_grid, safe_rate
 from printhammer.printing.rates.safe_rates import safe_rates
 from printhammer.printing.rates.tolerance import draw, spreads_of, tolerance_yield
@@ -70,7 +69,7 @@ def test_hammers_that_are_none_are_counted(hammer: "ph.Hammer", tmp_path: Path) 
     assert not found.passed[odd].any()
     assert found.share == found.passed.mean()
     assert 0.0 < found.share_error < 0.5
-    save_result(found, tmp_path / "yield.nc")
+    found.save(tmp_path / "yield.nc")
     with xr.open_dataset(tmp_path / "yield.nc", engine="scipy") as chart:
         assert chart.attrs["rate"] == 300.0
         assert chart["status"].values.astype(str).tolist() == found.status.tolist()

@@ -19,7 +19,8 @@ from printhammer.chaos.bifurcation.columns import (
     scales_of_columns,
     usable,
 )
-from printhammer.chaos.strobe.train import Train, exponents_of
+from printhammer.chaos.bifurcation.diagram import train_from, window_of_exponent
+from printhammer.chaos.strobe.train import exponents_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,21 +32,6 @@ if TYPE_CHECKING:
 
 JUMP: Final = 0.2
 """Distance of neighbouring orbits of the same period, in half-widths of the window, that is refined."""
-
-_BEFORE: Final = 100
-"""Firings before an exponent counts."""
-
-
-def window_of_exponent(points: int) -> tuple[int, int]:
-    """Return the first and last firing over which the exponent of a train with so many points is taken."""
-    return _BEFORE + 1, _BEFORE + points
-
-
-def train_from(regime: Regime, state: tuple[float, float], points: int) -> Train:
-    """Return a train that goes on from a state at a firing, for its exponent."""
-    _first, last = window_of_exponent(points)
-    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
-    return Train(regime, regime.pulses(last + 2), state)
 
 
 class DiagramBuilder:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -126,8 +127,11 @@ class Tracer:
         near = abs(place - nodes[0].parameter) < _NEAR * (self.bounds[1] - self.bounds[0])
         return place if abs(last) < abs(margin) and near else None
 
-    def doubled(self, firings: int, event: BranchEvent, most: int) -> Branch:
+    def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
         """Return the branch born at a period doubling of an orbit of so many firings."""
+        if threads != self.threads:
+            other = Tracer(self.regime, self.parameter, self.bounds, self.tolerance, threads)
+            return other.doubled(firings, event, most, threads)
         family = self.family(2 * firings)
         steps = Steps(most=most, precision=PRECISION)
         curve = follow_doubled(
@@ -274,6 +278,7 @@ class Tracer:
             events=tuple(event_of(point) for point in found),
             stops=(self.retold(stops[0]), self.retold(stops[1])),
             curve=curve,
+            follow_doubled=partial(self.doubled, family.firings),
         )
 
     def retold(self, stop: Stop) -> Stop:

@@ -260,7 +260,7 @@ def image_of(
     followed = follow(problem, moments[[0, -1]], np.eye(3), renormalise=False)
     if followed.status_name != _OK:
         return _no_image(followed.status_name)
-    if int(followed.found[-1, 2]) in WITH_MEMORY:
+    if int(followed.states[-1, 2]) in WITH_MEMORY:
         return _no_image(IN_PACK)
     touched: tuple[tuple[str, float], ...] = ()
     margin = math.nan
@@ -269,7 +269,7 @@ def image_of(
         touched = tuple((surface, t - float(moments[0])) for surface, t in touches_of(record))
         margin = margin_of(problem, record)
     return Image(
-        state=followed.found[-1, :2].copy(),
+        state=followed.states[-1, :2].copy(),
         jacobian=followed.columns[:2, :2].copy(),
         status=_OK,
         smooth=followed.smooth,

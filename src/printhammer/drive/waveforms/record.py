@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName
 from printhammer.errors import InputError
-from printhammer.support.csv_table import heading, number, read_rows
+from printhammer.support.sheets import finite, read_sheet, split_heading
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -78,7 +78,7 @@ def read_csv(path: Path) -> Samples:
         increasing times.
     """
     what = str(path)
-    rows = read_rows(path, "sampled waveform")
+    rows = read_sheet(path, "the sampled waveform").rows
     if not rows:
         raise InputError(
             f"{what}: the file is empty, expected the heading {_HEADINGS} and at least 2 samples"
@@ -89,7 +89,7 @@ def read_csv(path: Path) -> Samples:
         if len(row) != 2:
             raise InputError(f"{what}: line {line} has {len(row)} cells, expected 2")
         for cell, column in zip(row, columns, strict=True):
-            column.append(number(cell, f"{what}: line {line}"))
+            column.append(finite(cell, f"{what}: line {line}"))
     return checked(
         _converted(columns[0], time_unit, "s", what),
         _converted(columns[1], unit, _UNITS[name], what),
@@ -102,17 +102,15 @@ def _heading(cells: list[str], what: str) -> tuple[str, QuantityName, str]:
     """Return the unit of time, what is driven, and its unit."""
     if len(cells) != 2:
         raise InputError(f"{what}: {len(cells)} columns, expected the 2 columns {_HEADINGS}")
-    names, units = [], []
-    for cell in cells:
-        name, unit = heading(cell)
+    names, units = zip(*map(split_heading, cells), strict=True)
+    for cell, unit in zip(cells, units, strict=True):
         if not unit:
             raise InputError(
                 f"{what}: heading {cell.strip()!r} is expected to carry its unit, such as 'time [us]'"
             )
-        names.append(name.lower())
-        units.append(unit)
+    names = tuple(name.lower() for name in names)
     for quantity in _UNITS:
-        if names == ["time", quantity]:
+        if names == ("time", quantity):
             return units[0], quantity, units[1]
     raise InputError(f"{what}: columns {names[0]!r} and {names[1]!r}, expected {_HEADINGS}")
 
@@ -123,6 +121,6 @@ def _converted(column: list[float], unit: str, si: str, what: str) -> list[float
 
     try:
         to_si(1.0, unit, si)
-        return [to_si(value, unit, si) for value in column]
+        return [to_si(number, unit, si) for number in column]
     except InputError as error:
         raise InputError(f"{what}: {error}") from None

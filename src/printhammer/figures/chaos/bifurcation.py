@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.tables import meaning_of
-from printhammer.chaos.bifurcation.windows import cells, hysteresis, windows_of
+from printhammer.chaos.bifurcation.diagram import hysteresis, windows_of
+from printhammer.chaos.bifurcation.windows import cells
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import note
@@ -119,7 +119,8 @@ def plot(
 
 def parameter_scale(diagram: Bifurcation) -> Scale:
     """Return how the parameter is shown."""
-    unit, meaning = meaning_of(diagram.regime, diagram.parameter)
+    note = diagram.regime.quantity(diagram.parameter)
+    unit, meaning = note.si, note.meaning
     if diagram.parameter == PERIOD:
         found = scale("time", float(np.abs(diagram.values).max()))
         return Scale(meaning.capitalize(), found.si, found.unit)

@@ -25,7 +25,7 @@ def plot(found: Feedback) -> Figure:
     """
     figure = new_figure(4.6)
     panel, strip = with_strip(figure, 2.6)
-    run, hammer = found.seen.motion, found.driven
+    run, hammer = found.run.motion, found.driven
     assert hammer.front is not None
     ms, um = from_si(1.0, "s", "ms"), from_si(1.0, "m", "um")
     front, stop = um * hammer.front, um * hammer.origin
@@ -35,8 +35,8 @@ def plot(found: Feedback) -> Figure:
     panel.axhspan(low - room, stop, color=style.SURFACES["backstop"], alpha=0.25, lw=0.0)
     panel.plot(ms * run.t, um * run.x, color=style.INK, lw=style.LINE, gid="displacement")
     panel.plot(
-        ms * found.seen.times,
-        um * found.seen.shown,
+        ms * found.run.times,
+        um * found.run.shown,
         color=style.ORANGE,
         ls="none",
         marker=".",
@@ -45,7 +45,7 @@ def plot(found: Feedback) -> Figure:
         gid="samples",
     )
     panel.vlines(
-        ms * found.seen.due,
+        ms * found.run.due,
         front - 0.6 * room,
         front + 0.6 * room,
         color=style.BLUE,
@@ -56,7 +56,7 @@ def plot(found: Feedback) -> Figure:
     panel.set_ylim(low - room, high + 2.0 * room)
     panel.set_ylabel("Displacement  [µm]")
     panel.set_title(
-        f"Slots {found.seen.pattern} at {found.rate:.6g} Hz with feedback", loc="left", fontsize=style.SMALL
+        f"Slots {found.run.pattern} at {found.rate:.6g} Hz with feedback", loc="left", fontsize=style.SMALL
     )
     panel.legend(fontsize=style.SMALL, frameon=False, loc="upper right", ncols=2)
     strip.plot(ms * run.t, run.current, color=style.BLUE, lw=style.THIN, gid="current")
@@ -66,7 +66,7 @@ def plot(found: Feedback) -> Figure:
     strip.set_ylim(-1.2 * found.driver.current, 1.2 * found.driver.current)
     strip.set_ylabel("Current  [A]")
     strip.set_xlabel("Time  [ms]")
-    first, last = float(found.seen.due[0]), float(found.seen.due[-1])
+    first, last = float(found.run.due[0]), float(found.run.due[-1])
     span = found.single.flight_time
     panel.set_xlim(ms * (first - 1.3 * span), ms * min(last + 3.0 * span, float(np.max(run.t))))
     sign(figure, hammer)

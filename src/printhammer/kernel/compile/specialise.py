@@ -21,7 +21,7 @@ from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from printhammer.kernel.model.laws import Laws
 
@@ -39,18 +39,16 @@ TEMPLATES = (
     "methods.quadrature",
     "single.stretch",
     "lanes.members",
-    "model.slopes",
-    "variational.variation",
-    "variational.tangent",
 )
 """Template modules of the kernel in the order in which they use one another."""
 
-ENTRIES = ("run", "resample", "quadratures", "peaks", "members", "tangent", "lanes", "sensitivity")
+ENTRIES = ("run", "resample", "quadratures", "peaks", "members", "lanes", "flow")
 """Names of the entry points."""
 
 _PLAIN = (
     "model.modes",
     "model.layout",
+    "model.transitions",
     "single.carry",
     "methods.hermite",
     "compile.compiling",
@@ -80,8 +78,9 @@ class Kernel:
 
     Attributes
     ----------
-    run, resample, quadratures, peaks, members, tangent
-        Entry points; see the template modules of the same names.
+    run, resample, quadratures, peaks, members
+        Entry points; see the template modules of the same names. Kernels for lanes and for variational
+        equations have an entry point of their own, `lanes` or `flow`.
     label : str
         What the kernel is for.
     digest : str
@@ -196,23 +195,35 @@ def _specialised(laws: Laws) -> Kernel:
         name: _compile_law(value, compiled) if isinstance(value, FunctionType) else value
         for name, value in bindings.items()
     }
+    parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
+    return execute_all(TEMPLATES, namespace, sources, ", ".join(parts) or "a free mass")
+
+
+def execute_all(
+    templates: Sequence[str], namespace: dict[str, Any], sources: hashlib._Hash, label: str
+) -> Kernel:
+    """Execute templates one after the other, each with the functions of those before it in its `namespace`.
+
+    `sources` is a hash of all that the namespace holds already.
+    """
     modules: dict[str, ModuleType] = {}
-    for name in TEMPLATES:
+    for name in templates:
         # A template uses only those before it: a change of a later one leaves its machine code valid.
         sources.update(source_file(name).read_bytes())
-        namespace["DIGEST"] = digest = sources.hexdigest()[:16]
-        module = execute(name, digest, namespace)
-        modules[name] = module
-        namespace.update(
-            {
-                key: value
-                for key, value in vars(module).items()
-                if hasattr(value, "py_func")
-                or (isinstance(value, FunctionType) and value.__module__ == module.__name__)
-            }
-        )
-    parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
-    return Kernel(modules, ", ".join(parts) or "a free mass", namespace, digest)
+        namespace["DIGEST"] = sources.hexdigest()[:16]
+        modules[name] = module = execute(name, namespace["DIGEST"], namespace)
+        namespace.update(functions_of(module))
+    return Kernel(modules, label, namespace, namespace["DIGEST"])
+
+
+def functions_of(module: ModuleType) -> dict[str, Any]:
+    """Return the functions that a template defines or has been given, by name."""
+    return {
+        name: value
+        for name, value in vars(module).items()
+        if hasattr(value, "py_func")
+        or (isinstance(value, FunctionType) and value.__module__ == module.__name__)
+    }
 
 
 def _compile_law(function: FunctionType, compiled: Callable[..., Any]) -> Any:

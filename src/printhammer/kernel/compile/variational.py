@@ -1,47 +1,33 @@
-"""The kernel for sensitivities: templates of its own, bound to the laws of a plain kernel.
+"""The kernel for variational equations: templates of their own, bound to the laws of a plain kernel.
 
-Apart from the plain kernel, so that runs which do not ask for sensitivities compile nothing for them.
+Apart from the plain kernel, so that runs which do not ask for derivatives compile nothing for them; executed
+once for derivatives with respect to states and once more, forced, for those with respect to constants.
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
-from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.specialise import Kernel, execute, one_at_a_time, source_file
+from printhammer.kernel.compile.specialise import Kernel, execute_all, one_at_a_time, source_file
+from printhammer.kernel.variational.layout import changing
 
-if TYPE_CHECKING:
-    from types import ModuleType
-
-TEMPLATES = ("variational.influence", "variational.influence_switches", "variational.sensitivity")
+TEMPLATES = ("slopes", "forcing", "columns", "steps", "switches", "flow")
 
 
-def with_sensitivity(plain: Kernel) -> Kernel:
-    """Return the kernel whose entry point `sensitivity` goes by the laws of a plain one.
+def variational(plain: Kernel, *, forced: bool) -> Kernel:
+    """Return the kernel whose entry point `flow` carries columns along the runs of a plain one.
 
-    See :mod:`printhammer.kernel.variational.sensitivity`.
+    See :mod:`printhammer.kernel.variational.flow`; `forced` says whether constants force the columns.
     """
     with one_at_a_time:
-        return _built(plain)
+        return _built(plain, forced)
 
 
 @functools.cache
-def _built(plain: Kernel) -> Kernel:
-    sources = hashlib.sha256(plain.digest.encode())
-    for name in TEMPLATES:
-        sources.update(source_file(name).read_bytes())
-    digest = sources.hexdigest()[:16]
-    namespace: dict[str, Any] = {**plain.namespace, "DIGEST": digest}
-    modules: dict[str, ModuleType] = {}
-    for name in TEMPLATES:
-        module = execute(name, digest, namespace)
-        modules[name] = module
-        namespace.update(
-            {
-                key: value
-                for key, value in vars(module).items()
-                if hasattr(value, "py_func") or getattr(value, "__module__", "") == module.__name__
-            }
-        )
-    return Kernel(modules, f"sensitivities of {plain.label}", namespace, digest)
+def _built(plain: Kernel, forced: bool) -> Kernel:
+    sources = hashlib.sha256(repr((plain.digest, forced)).encode())
+    sources.update(source_file("variational.layout").read_bytes())
+    namespace = {**plain.namespace, "FORCED": forced, "CHANGING": changing(forced)}
+    label = f"{'sensitivities' if forced else 'the tangent flow'} of {plain.label}"
+    return execute_all([f"variational.{name}" for name in TEMPLATES], namespace, sources, label)

@@ -14,7 +14,7 @@ import numpy as np
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.lanes import layout as R
 from printhammer.kernel.methods.hermite import position_root, rises_through
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION, Train
 from printhammer.kernel.model.modes import (
     BACKSTOP,
     EDGE,
@@ -24,12 +24,12 @@ from printhammer.kernel.model.modes import (
     LOADING,
     NEAR_TOUCH,
     NO_SWITCH,
-    REACHED_BACKSTOP,
     REACHED_FRONT,
     REVERSAL,
     UNLOADING,
     UNRESOLVED,
 )
+from printhammer.kernel.model.transitions import FOLLOWING
 
 if TYPE_CHECKING:
     from printhammer.kernel.lanes.drive import add_up
@@ -192,12 +192,7 @@ def note_strobes(
     slot: Any,
     times: Any,
     strobes: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Drive,
+    train: Train,
     hammer: Hammer,
 ) -> None:
     """Take the strobes of a lane's latest step before the time `until`, and with `last` at it.
@@ -215,9 +210,9 @@ def note_strobes(
         x0 = hammer[POSITION] - kept * kept
     elif which == R.UNLOADING_POOL:
         kept = pool[R.PEAK * R.BLOCK + i]
-    edges_at(t0, firings, begins, pieces, replace, under_way, live)
+    edges_at(t0, train)
     while strobe < times.size and (times[strobe] < until or (last and times[strobe] == until)):
-        x, v, _w = state_in_step(times[strobe], t0, x0, v0, mode, kept, hammer, live)
+        x, v, _w = state_in_step(times[strobe], t0, x0, v0, mode, kept, hammer, train.live)
         strobes[strobe, 0] = x
         strobes[strobe, 1] = v
         strobes[strobe, 2] = mode
@@ -316,11 +311,14 @@ def after_switch(
     """Go on after a switch; return the pool in which, or that the member leaves the lanes."""
     remember_step(pool, i, which, slot)
     pool[R.T * R.BLOCK + i] = t
-    if switch == REACHED_BACKSTOP:
-        if not v < 0.0:
+    if switch == REVERSAL:
+        if x <= hammer[FRONT]:
             return LEAVES
-        return enter_contact(pool, i, v, slot, control)
-    if switch == REACHED_FRONT:
+        return turn_in_pack(pool, i, t, x, which, slot, dots, hammer, control)
+    following = FOLLOWING[MODE_OF[which], switch]
+    if following == BACKSTOP:
+        return enter_contact(pool, i, v, slot, control) if v < 0.0 else LEAVES
+    if following == LOADING:
         if not v > 0.0:
             return LEAVES
         slot[R.DOT] = -1.0
@@ -333,24 +331,18 @@ def after_switch(
                 dots[fired, 2] = v
         enter(pool, i, t, x, v, LOADING, slot[R.PACK_STEP], 0.0)
         return R.LOADING_POOL
-    if switch == REVERSAL:
-        if x <= hammer[FRONT]:
-            return LEAVES
-        return turn_in_pack(pool, i, t, x, which, slot, dots, hammer, control)
+    if following != FREE:
+        return LEAVES
+    away, level = v, hammer[POSITION]
     if switch == LEFT_FRONT:
+        away, level = -v, hammer[FRONT]
         if int(slot[R.DOT]) >= 0:
             dots[int(slot[R.DOT]), 3] = t
         slot[R.DOT] = -1.0
-        if not v < 0.0:
-            return LEAVES
-        enter(pool, i, t, hammer[FRONT], v, FREE, slot[R.FREE_STEP], 0.0)
-        return R.FREE_POOL
-    if switch == LEFT_BACKSTOP:
-        if not v > 0.0:
-            return LEAVES
-        enter(pool, i, t, hammer[POSITION], v, FREE, slot[R.FREE_STEP], 0.0)
-        return R.FREE_POOL
-    return LEAVES
+    if not away > 0.0:
+        return LEAVES
+    enter(pool, i, t, level, v, FREE, slot[R.FREE_STEP], 0.0)
+    return R.FREE_POOL
 
 
 @compiled
@@ -359,18 +351,13 @@ def new_edge(
     i: int,
     which: int,
     end: float,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Drive,
+    train: Train,
     rates: Any,
 ) -> None:
     """Take over the pieces of the drive that begin at the time of a lane."""
     t = pool[R.T * R.BLOCK + i]
-    _first, _last, edge = edges_at(t, firings, begins, pieces, replace, under_way, live)
-    add_up(t, live, rates, pool, i)
+    _first, _last, edge = edges_at(t, train)
+    add_up(t, train.live, rates, pool, i)
     pool[R.NEXT * R.BLOCK + i] = min(edge, end)
     x, v = pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i]
     if which == R.CONTACT_POOL:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry, inlined
 from printhammer.kernel.lanes import layout as R
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING, Train
 from printhammer.kernel.model.modes import BACKSTOP, EDGE, FREE, NEAR_TOUCH, NO_SWITCH, OK, UNRESOLVED
 
 if TYPE_CHECKING:
@@ -83,12 +83,7 @@ def begin_member(
     state: Any,
     end: float,
     rates: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Any,
+    train: Train,
     hammer: Hammer,
     control: Any,
     slot: Any,
@@ -103,14 +98,14 @@ def begin_member(
     slot[R.DOT] = -1.0
     slot[R.END] = end
     slot[R.CAREFUL] = 0.0
-    _first, _last, edge = edges_at(t, firings, begins, pieces, replace, under_way, live)
-    a = acceleration(t, x, v, FREE, 0.0, hammer, live)
+    _first, _last, edge = edges_at(t, train)
+    a = acceleration(t, x, v, FREE, 0.0, hammer, train.live)
     mode = first_mode(x, v, a, hammer)
     if state[3] >= 0.0 or not end > t:
         return LEAVES
     for row in range(R.RATES):
         pool[row * R.BLOCK + i] = 0.0
-    add_up(t, live, rates, pool, i)
+    add_up(t, train.live, rates, pool, i)
     pool[i] = t
     pool[R.NEXT * R.BLOCK + i] = min(edge, end)
     pool[R.V * R.BLOCK + i] = v
@@ -124,7 +119,7 @@ def begin_member(
     if mode == BACKSTOP and x < hammer[POSITION]:
         w = math.sqrt(hammer[POSITION] - x)
         pool[R.X * R.BLOCK + i] = w
-        pool[R.A * R.BLOCK + i] = contact_rate(w, v, t, hammer, live)
+        pool[R.A * R.BLOCK + i] = contact_rate(w, v, t, hammer, train.live)
         pool[R.H * R.BLOCK + i] = slot[R.FREE_STEP] / (2.0 * w)
         return R.CONTACT_POOL
     return LEAVES
@@ -150,12 +145,7 @@ def look_after(
     which: int,
     slot: Any,
     rates: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Any,
+    train: Train,
     hammer: Hammer,
     control: Any,
     grid: Any,
@@ -187,8 +177,8 @@ def look_after(
                 return STAYS
         if switch == NEAR_TOUCH:
             slot[R.CAREFUL] = 0.0
-            edges_at(pool[i], firings, begins, pieces, replace, under_way, live)
-            switch, t, x, v = locate(pool, i, which, hammer, live, control)
+            edges_at(pool[i], train)
+            switch, t, x, v = locate(pool, i, which, hammer, train.live, control)
         if switch == UNRESOLVED:
             pool[R.H * R.BLOCK + i] = 0.5 * pool[R.LENGTH * R.BLOCK + i]
             return STAYS if pool[R.H * R.BLOCK + i] > 1e-12 * control[0] / control[1] else LEAVES
@@ -200,23 +190,7 @@ def look_after(
     done = t >= slot[R.END] and switch in (NO_SWITCH, EDGE)
     if pool[R.SAMPLE * R.BLOCK + i] <= t:
         if slot[R.NEXT_TIME] <= t:
-            note_strobes(
-                pool,
-                i,
-                which,
-                t,
-                done,
-                slot,
-                times,
-                strobes,
-                firings,
-                begins,
-                pieces,
-                replace,
-                under_way,
-                live,
-                hammer,
-            )
+            note_strobes(pool, i, which, t, done, slot, times, strobes, train, hammer)
         note_samples(pool, i, which, t, done, control[3] < FINE, slot, grid, x_of, hammer[POSITION])
     if done:
         close_member(pool, i, which, slot, dots, hammer)
@@ -224,13 +198,13 @@ def look_after(
     target = STAYS
     if switch not in (NO_SWITCH, EDGE):
         target = after_switch(
-            switch, pool, i, t, x, v, which, slot, dots, want_dots, firings, hammer, control
+            switch, pool, i, t, x, v, which, slot, dots, want_dots, train.firings, hammer, control
         )
         if target == LEAVES:
             return LEAVES
         which = target
     if t >= pool[R.NEXT * R.BLOCK + i]:
-        new_edge(pool, i, which, slot[R.END], firings, begins, pieces, replace, under_way, live, rates)
+        new_edge(pool, i, which, slot[R.END], train, rates)
     return target
 
 
@@ -329,6 +303,14 @@ def lanes(
             row = hammer_of[m]
             control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
             wave = waveform_of[m]
+            train = Train(
+                firings[firing_starts[m] : firing_starts[m + 1]],
+                begins[firing_starts[m] : firing_starts[m + 1]],
+                pieces[piece_starts[wave] : piece_starts[wave + 1]],
+                replace,
+                under_way,
+                live,
+            )
             if want_dots:
                 clear_dots(dots[firing_starts[m] : firing_starts[m + 1]])
             slot[R.MEMBER] = m
@@ -342,12 +324,7 @@ def lanes(
                 states[m],
                 ends[m],
                 rates[wave],
-                firings[firing_starts[m] : firing_starts[m + 1]],
-                begins[firing_starts[m] : firing_starts[m + 1]],
-                pieces[piece_starts[wave] : piece_starts[wave + 1]],
-                replace,
-                under_way,
-                live,
+                train,
                 hammers[row],
                 control,
                 slot,
@@ -387,6 +364,14 @@ def lanes(
                     continue
                 control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
                 wave = waveform_of[m]
+                train = Train(
+                    firings[firing_starts[m] : firing_starts[m + 1]],
+                    begins[firing_starts[m] : firing_starts[m + 1]],
+                    pieces[piece_starts[wave] : piece_starts[wave + 1]],
+                    replace,
+                    under_way,
+                    live,
+                )
                 own_times = strobe_times[strobe_starts[m] : strobe_starts[m + 1]]
                 own_strobes = strobes[strobe_starts[m] : strobe_starts[m + 1]]
                 target = look_after(
@@ -395,12 +380,7 @@ def lanes(
                     p,
                     slot,
                     rates[wave],
-                    firings[firing_starts[m] : firing_starts[m + 1]],
-                    begins[firing_starts[m] : firing_starts[m + 1]],
-                    pieces[piece_starts[wave] : piece_starts[wave + 1]],
-                    replace,
-                    under_way,
-                    live,
+                    train,
                     hammers[row],
                     control,
                     grid,

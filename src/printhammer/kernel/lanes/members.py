@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import entry
+from printhammer.kernel.model.layout import Train
 from printhammer.kernel.model.modes import BACKSTOP, PAUSED
 from printhammer.kernel.single import carry as C
 
@@ -107,6 +108,7 @@ def members(
         own_begins = begins[firing_starts[m] : firing_starts[m + 1]]
         wave = waveform_of[m]
         table = pieces[piece_starts[wave] : piece_starts[wave + 1]]
+        taken = Train(own, own_begins, table, replace, under_way[1], live[1])
         own_dots = dots[firing_starts[m] : firing_starts[m + 1]]
         own_times = strobe_times[strobe_starts[m] : strobe_starts[m + 1]]
         own_strobes = strobes[strobe_starts[m] : strobe_starts[m + 1]]
@@ -129,10 +131,7 @@ def members(
         code, count = PAUSED, 0
         while code == PAUSED:
             code, used, touched, count = run(
-                own,
-                own_begins,
-                table,
-                replace,
+                (own, own_begins, table, replace, under_way[0], live[0]),
                 hammer,
                 begin,
                 states[m, 1],
@@ -141,8 +140,6 @@ def members(
                 control,
                 limits,
                 max_steps,
-                under_way[0],
-                live[0],
                 nodes,
                 contacts,
                 carry,
@@ -151,18 +148,7 @@ def members(
                 return number
             record = nodes[:used]
             if want_dots:
-                note_dots(
-                    own_dots,
-                    contacts[:touched],
-                    record,
-                    own,
-                    own_begins,
-                    table,
-                    replace,
-                    under_way[1],
-                    live[1],
-                    hammer,
-                )
+                note_dots(own_dots, contacts[:touched], record, taken, hammer)
             strobe, sample = note_states(
                 own_strobes,
                 own_times,
@@ -172,12 +158,7 @@ def members(
                 sample,
                 code != PAUSED,
                 record,
-                own,
-                own_begins,
-                table,
-                replace,
-                under_way[1],
-                live[1],
+                taken,
                 hammer,
             )
             if code == PAUSED and carry[C.MODE] == BACKSTOP:

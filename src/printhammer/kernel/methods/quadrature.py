@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, POSITION
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, POSITION, Train
 from printhammer.kernel.model.modes import (
     ANY_SCALES,
     BACKSTOP,
@@ -75,12 +75,7 @@ def quadratures(
     starts: Any,
     ends: Any,
     nodes: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Any,
+    train: Any,
     hammer: Hammer,
     out: Any,
 ) -> None:
@@ -92,16 +87,17 @@ def quadratures(
         Number of the node at which the step begins; ascending.
     starts, ends : float64 array, shape (n,)
         Times [s] between which to integrate, inside that step.
-    nodes, firings, begins, pieces, replace, under_way, live, hammer
+    nodes, train, hammer
         As in :func:`printhammer.kernel.single.resample.resample`.
     """
+    train = Train(*train)
     first, last = 0, 0
     for row in range(steps.size):
         i = steps[row]
         if row == 0:
-            first, last, _edge = edges_at(nodes[i, 0], firings, begins, pieces, replace, under_way, live)
+            first, last, _edge = edges_at(nodes[i, 0], train)
         t0, x0, v0, mode, kept = nodes[i, 0], nodes[i, 1], nodes[i, 2], int(nodes[i, 3]), nodes[i, 4]
-        first, last, _edge = pass_edges(t0, firings, begins, pieces, replace, under_way, first, last, live)
+        first, last, _edge = pass_edges(t0, train, first, last)
         for j in range(4):
             out[row, j] = 0.0
         if i + 1 < nodes.shape[0] and nodes[i + 1, 0] == t0 and nodes[i + 1, 1] == x0:
@@ -112,31 +108,31 @@ def quadratures(
         if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING) or ends[row] <= starts[row]:
             continue
         memory = memory_of(mode, kept, hammer)
-        kv0 = contact_rate(kept, v0, t0, hammer, live) if mode == BACKSTOP else 0.0
+        kv0 = contact_rate(kept, v0, t0, hammer, train.live) if mode == BACKSTOP else 0.0
         regular = mode == BACKSTOP and not (kept == 0.0 and v0 == 0.0)
         low, high = starts[row], ends[row]
         if regular:
-            low = s_at(starts[row], t0, kept, v0, kv0, hammer, live)
-            high = s_at(ends[row], t0, kept, v0, kv0, hammer, live)
+            low = s_at(starts[row], t0, kept, v0, kv0, hammer, train.live)
+            high = s_at(ends[row], t0, kept, v0, kv0, hammer, train.live)
         for j in range(8):
             point = POINTS[j] if j < 4 else -POINTS[j - 4]
             weight = WEIGHTS[j] if j < 4 else WEIGHTS[j - 4]
             place = 0.5 * (low + high) + 0.5 * (high - low) * point
             share = 0.5 * (high - low) * weight
             if regular:
-                t, w, v, _kv, _error = contact_step(t0, kept, v0, kv0, place, hammer, live, ANY_SCALES)
+                t, w, v, _kv, _error = contact_step(t0, kept, v0, kv0, place, hammer, train.live, ANY_SCALES)
                 x = hammer[POSITION] - w * w
                 share *= 2.0 * w
             else:
                 t = place
-                x, v, w = state_in_step(t, t0, x0, v0, mode, kept, hammer, live)
-            coil, force, pack, backstop = powers(t, x, v, w, mode, memory, hammer, live)
+                x, v, w = state_in_step(t, t0, x0, v0, mode, kept, hammer, train.live)
+            coil, force, pack, backstop = powers(t, x, v, w, mode, memory, hammer, train.live)
             out[row, 0] += share * coil
             out[row, 1] += share * force
             out[row, 2] += share * pack
             out[row, 3] += share * backstop
         if mode == BACKSTOP_RELEASED:
             # The backstop has let go: what it still stores is lost as it creeps back.
-            first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, live)
-            last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, live)
+            first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, train.live)
+            last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, train.live)
             out[row, 3] = energy_behind(first_x, hammer) - energy_behind(last_x, hammer)

@@ -57,6 +57,9 @@ FORCE_DRIVE: bool
 PACK_PULLS: bool
 BACKSTOP_PULLS: bool
 RELOAD_ALONG_UNLOADING: bool
+# In variational equations only: whether constants force them, and what of a column changes between switches.
+FORCED: bool
+CHANGING: int
 # In lanes only: what the drive consists of.
 EXPONENTIALS: int
 CUBIC: bool

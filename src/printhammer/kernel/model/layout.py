@@ -5,6 +5,8 @@ pack, backstop and magnet, each from a fixed place on: sixteen places each, the 
 length.
 """
 
+from typing import Any, NamedTuple
+
 INVERSE_MASS = 0
 POSITION = 1
 FRONT = 2
@@ -16,8 +18,35 @@ PLACES = {"spring": SPRING, "pack": PACK, "backstop": BACKSTOP_PART, "magnet": M
 SLOT = 16
 """Number of constants that a spring, pack or backstop may have."""
 
-END = 3.0
-"""Kind of the row of a table of pieces at which a waveform ends, see `printhammer.kernel.model.pulses`."""
+CUBIC_PIECE, EXPONENTIAL_PIECE, SINE_PIECE, END = 0.0, 1.0, 2.0, 3.0
+"""Kinds of the rows of a table of pieces, see `printhammer.kernel.model.pulses`; the last ends a waveform."""
+
+
+class Train(NamedTuple):
+    """A drive of n firings, see `printhammer.kernel.model.pulses`, and working space for a pass over it.
+
+    Attributes
+    ----------
+    firings : float64 array, shape (n,)
+        Firing times [s], ascending.
+    begins : int64 array, shape (n,)
+        Row of `pieces` at which the table of each firing's waveform begins.
+    pieces : float64 array, shape (m, 6)
+        The tables of all waveforms.
+    replace : bool
+        Whether a firing cuts off the pulses before it.
+    under_way : int64 array, shape (n,)
+    live : float64 array, shape (1 + 7 n,)
+        Working space.
+    """
+
+    firings: Any
+    begins: Any
+    pieces: Any
+    replace: bool
+    under_way: Any
+    live: Any
+
 
 Control = tuple[float, float, float, float]
 """Scales of displacement and velocity, allowances of the error estimates of order 6 and 7."""

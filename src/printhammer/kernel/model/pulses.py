@@ -1,11 +1,10 @@
 """The drive at an instant, and the instants at which one of its pieces begins or ends.
 
 A drive is n firing times and the waveform of each: a table of pieces ``[start, kind, p0, p1, p2, p3]``, of
-which the last, of kind `END`, holds the end of support. With s the time since the start of the piece: kind 0
-is a cubic p0 + s (p1 + s (p2 + s p3)), kind 1 an exponential p0 + p1 exp(-p2 s), kind 2 a sine p0 + p1
-sin(p2 s + p3). The tables of different waveforms lie one after the other, the one with the longest support
-last; a firing is told by the row at which its table begins. The pieces under way are known by their rows, not
-by comparing times, so that an instant exactly on an edge belongs to the piece that begins there.
+which the last, of kind `END`, holds the end of support; the other kinds are those of `piece_value`. The
+tables of different waveforms lie one after the other, the one with the longest support last; a firing is told
+by the row at which its table begins. The pieces under way are known by their rows, not by comparing times, so
+that an instant exactly on an edge belongs to the piece that begins there.
 
 While a run goes on, the pieces under way are kept side by side in one array ``live``: their number, then
 seven values each, ``[firing, start, kind, p0, p1, p2, p3]``. It is rewritten at every edge; all the force sum
@@ -20,12 +19,50 @@ from typing import Any
 import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled, inlined
-from printhammer.kernel.model.layout import END
+from printhammer.kernel.model.layout import CUBIC_PIECE, END, EXPONENTIAL_PIECE, Train
 
 Drive = Any
 """The array ``live``."""
 
 LIVE_WIDTH = 7
+
+
+@inlined
+def piece_value(row: Any, i: int, s: float) -> float:
+    """Return the value of a piece [kind, p0, p1, p2, p3] at place `i` of a row, at time `s` [s] in it.
+
+    A cubic p0 + s (p1 + s (p2 + s p3)), an exponential p0 + p1 exp(-p2 s), a sine p0 + p1 sin(p2 s + p3).
+    """
+    kind = row[i]
+    if kind == EXPONENTIAL_PIECE:
+        return float(row[i + 1] + row[i + 2] * math.exp(-row[i + 3] * s))
+    if kind == CUBIC_PIECE:
+        return float(row[i + 1] + s * (row[i + 2] + s * (row[i + 3] + s * row[i + 4])))
+    return float(row[i + 1] + row[i + 2] * math.sin(row[i + 3] * s + row[i + 4]))
+
+
+@compiled
+def piece_rate(row: Any, i: int, s: float) -> float:
+    """Return the rate of a piece in time, as `piece_value`."""
+    kind, p1, p2, p3 = row[i], row[i + 2], row[i + 3], row[i + 4]
+    if kind == EXPONENTIAL_PIECE:
+        return float(-p1 * p2 * math.exp(-p2 * s))
+    if kind == CUBIC_PIECE:
+        return float(p1 + s * (2.0 * p2 + s * 3.0 * p3))
+    return float(p1 * p2 * math.cos(p2 * s + p3))
+
+
+@compiled
+def piece_change(row: Any, i: int, s: float, changes: Any, j: int) -> float:
+    """Return the change of a piece, as `piece_value`, with `changes` of p0 to p3 from place `j` on."""
+    kind, p1, p2, p3 = row[i], row[i + 2], row[i + 3], row[i + 4]
+    d0, d1, d2, d3 = changes[j], changes[j + 1], changes[j + 2], changes[j + 3]
+    if kind == EXPONENTIAL_PIECE:
+        return float(d0 + math.exp(-p2 * s) * (d1 - p1 * s * d2))
+    if kind == CUBIC_PIECE:
+        return float(d0 + s * (d1 + s * (d2 + s * d3)))
+    turn = p2 * s + p3
+    return float(d0 + d1 * math.sin(turn) + p1 * math.cos(turn) * (d2 * s + d3))
 
 
 @compiled
@@ -34,14 +71,7 @@ def sum_of_pulses(t: float, drive: Drive) -> float:
     total = 0.0
     i = 1
     for _ in range(int(drive[0])):
-        s = (t - drive[i]) - drive[i + 1]
-        kind = drive[i + 2]
-        if kind == 1.0:
-            total += drive[i + 3] + drive[i + 4] * math.exp(-drive[i + 5] * s)
-        elif kind == 0.0:
-            total += drive[i + 3] + s * (drive[i + 4] + s * (drive[i + 5] + s * drive[i + 6]))
-        else:
-            total += drive[i + 3] + drive[i + 4] * math.sin(drive[i + 5] * s + drive[i + 6])
+        total += piece_value(drive, i + 2, (t - drive[i]) - drive[i + 1])
         i += LIVE_WIDTH
     return total
 
@@ -57,14 +87,9 @@ def drive_value(t: float, drive: Drive) -> float:
 @compiled
 def pass_edges(
     t: float,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
+    train: Train,
     first: int,
     last: int,
-    live: Drive,
 ) -> tuple[int, int, float]:
     """Begin and end all pieces whose edge is not after time `t` [s] and rewrite `live`.
 
@@ -78,6 +103,7 @@ def pass_edges(
         The new `first` and `last`, equal if no pulse is under way, and the time of the next edge [s],
         infinity if there is none.
     """
+    firings, begins, pieces, replace, under_way, live = train
     while last < firings.size and firings[last] <= t:
         under_way[last] = begins[last]
         last += 1
@@ -106,10 +132,9 @@ def pass_edges(
 
 
 @compiled
-def edges_at(
-    t: float, firings: Any, begins: Any, pieces: Any, replace: bool, under_way: Any, live: Drive
-) -> tuple[int, int, float]:
+def edges_at(t: float, train: Train) -> tuple[int, int, float]:
     """Do as `pass_edges` does from the start, but leave out the pulses that ended before time `t` [s]."""
+    firings, pieces = train.firings, train.pieces
     # The last table has the longest support.
     oldest = t - pieces[pieces.shape[0] - 1, 0]
     low, high = 0, firings.size
@@ -121,4 +146,4 @@ def edges_at(
             high = middle
     # One more than needed: a pulse may end at `t` by rounding.
     low = max(low - 1, 0)
-    return pass_edges(t, firings, begins, pieces, replace, under_way, low, low, live)
+    return pass_edges(t, train, low, low)

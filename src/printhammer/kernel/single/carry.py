@@ -1,6 +1,6 @@
 """Where a run keeps what it needs to go on: places in the array `carry`.
 
-A run that pauses fills it; the next call with the same array, `under_way` and `live` continues to the bit as
+A run that pauses fills it; the next call with the same array and drive continues to the bit as
 if there had been no pause. The caller sets `STATE` to `FRESH` for a run that begins; to `ON_BRANCH` for one
 that begins inside the pack on the branch `MODE` with the latest local maximum at `PEAK` [m]; and
 `PAUSE_AFTER` to the number of nodes after which to pause outside the pack.

@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
-from printhammer.kernel.model.layout import BACKSTOP_PART, MAGNET, PACK, POSITION, SPRING
+from printhammer.kernel.model.layout import BACKSTOP_PART, MAGNET, PACK, POSITION, SPRING, Train
 from printhammer.kernel.model.modes import (
     ANY_SCALES,
     BACKSTOP,
@@ -57,6 +57,8 @@ def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
 @compiled
 def branch_of(mode: int) -> int:
     """Return the mode whose force acts in `mode`, which may be one of rest."""
+    if mode == HELD:
+        return BACKSTOP
     if mode == HELD_LOADING:
         return LOADING
     return UNLOADING if mode == HELD_UNLOADING else mode
@@ -141,12 +143,7 @@ def state_in_step(
 def resample(
     times: Any,
     nodes: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Any,
+    train: Any,
     hammer: Hammer,
     out: Any,
 ) -> None:
@@ -156,13 +153,14 @@ def resample(
     ----------
     times : float64 array, shape (n,)
         Ascending, inside the run [s].
-    nodes, firings, begins, pieces, replace, under_way, live, hammer
+    nodes, train, hammer
         As recorded and given in :func:`printhammer.kernel.single.run.run`.
     out : float64 array, shape (n, 9)
         Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
         the backstop, mode. At the time of an impact or a switch: the state after it.
     """
-    first, last, _edge = edges_at(nodes[0, 0], firings, begins, pieces, replace, under_way, live)
+    train = Train(*train)
+    first, last, _edge = edges_at(nodes[0, 0], train)
     i = 0
     for row in range(times.size):
         t = times[row]
@@ -171,13 +169,11 @@ def resample(
             i += 1
             moved = True
         if moved:
-            first, last, _edge = pass_edges(
-                nodes[i, 0], firings, begins, pieces, replace, under_way, first, last, live
-            )
+            first, last, _edge = pass_edges(nodes[i, 0], train, first, last)
         mode = int(nodes[i, 3])
         kept = nodes[i, 4]
-        x, v, w = state_in_step(t, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, live)
-        value = drive_value(t, live)
+        x, v, w = state_in_step(t, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, train.live)
+        value = drive_value(t, train.live)
         out[row, 0] = x
         out[row, 1] = v
         out[row, 2] = value
@@ -230,12 +226,7 @@ def refined(
 def peaks_of(
     contact: Any,
     nodes: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Any,
+    train: Train,
     hammer: Hammer,
 ) -> tuple[float, float, float]:
     """Return time [s] of the largest depth, that depth [m] and the peak force [N] of a contact.
@@ -249,15 +240,13 @@ def peaks_of(
     strongest = (begin, 0)
     deepest_value = 0.0
     strongest_value = 0.0
-    first, last, _edge = edges_at(nodes[begin, 0], firings, begins, pieces, replace, under_way, live)
+    first, last, _edge = edges_at(nodes[begin, 0], train)
     while end + 1 < nodes.shape[0] and not (nodes[end, 0] >= contact[3]):
         node = nodes[end]
-        first, last, _edge = pass_edges(
-            node[0], firings, begins, pieces, replace, under_way, first, last, live
-        )
+        first, last, _edge = pass_edges(node[0], train, first, last)
         for j in range(SAMPLES + 1):
             t = node[0] + (nodes[end + 1, 0] - node[0]) * j / SAMPLES
-            depth, force = depth_and_force(t, node, surface, hammer, live)
+            depth, force = depth_and_force(t, node, surface, hammer, train.live)
             if depth > deepest_value:
                 best, deepest_value = (end, j), depth
             if force > strongest_value:
@@ -280,8 +269,8 @@ def peaks_of(
             high = nodes[k, 0] + part * min(highest, SAMPLES)
             if not high > low:
                 continue
-            edges_at(nodes[k, 0], firings, begins, pieces, replace, under_way, live)
-            t, value = refined(which, low, high, nodes[k], surface, hammer, live)
+            edges_at(nodes[k, 0], train)
+            t, value = refined(which, low, high, nodes[k], surface, hammer, train.live)
             if which == 0 and value > deepest_value:
                 peak_time, deepest_value = t, value
             elif which == 1 and value > strongest_value:
@@ -293,17 +282,11 @@ def peaks_of(
 def peaks(
     contacts: Any,
     nodes: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Any,
+    train: Any,
     hammer: Hammer,
     out: Any,
 ) -> None:
     """Fill `out`, shape (m, 3), with what `peaks_of` tells of all recorded contacts."""
+    train = Train(*train)
     for row in range(contacts.shape[0]):
-        out[row, 0], out[row, 1], out[row, 2] = peaks_of(
-            contacts[row], nodes, firings, begins, pieces, replace, under_way, live, hammer
-        )
+        out[row, 0], out[row, 1], out[row, 2] = peaks_of(contacts[row], nodes, train, hammer)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
 from printhammer.kernel.methods.landing import FAILED
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control, Train
 from printhammer.kernel.model.modes import (
     BACKSTOP,
     BACKSTOP_RELEASED,
@@ -22,15 +22,11 @@ from printhammer.kernel.model.modes import (
     LOADING,
     NO_SWITCH,
     OK,
-    PACK_RELEASED,
     PACK_SURFACE,
     PAUSED,
-    PUSH_BEGAN,
-    PUSH_ENDED,
     RANGE_LEFT,
     REACHED_BACKSTOP,
     REACHED_FRONT,
-    REACHED_PEAK,
     RELOADING,
     RESTING,
     REVERSAL,
@@ -39,6 +35,7 @@ from printhammer.kernel.model.modes import (
     STEP_UNDERFLOW,
     UNLOADING,
 )
+from printhammer.kernel.model.transitions import FOLLOWING
 from printhammer.kernel.single import carry as C
 
 if TYPE_CHECKING:
@@ -218,10 +215,7 @@ def contact_unit(v: float, control: Control) -> float:
 
 @entry
 def run(
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
+    train: Any,
     hammer: Hammer,
     t: float,
     x: float,
@@ -230,8 +224,6 @@ def run(
     control: Control,
     bounds: Any,
     max_steps: int,
-    under_way: Any,
-    live: Any,
     nodes: Any,
     contacts: Any,
     carry: Any,
@@ -240,14 +232,8 @@ def run(
 
     Parameters
     ----------
-    firings : float64 array, shape (n,)
-        Firing times [s], ascending.
-    begins : int64 array, shape (n,)
-        Row of `pieces` at which the table of each firing's waveform begins.
-    pieces : float64 array, shape (m, 6)
-        The tables of all waveforms, see :mod:`printhammer.kernel.model.pulses`.
-    replace : bool
-        Whether a firing cuts off the pulses before it.
+    train : tuple
+        A plain tuple of the fields of :class:`printhammer.kernel.model.layout.Train`.
     hammer : float64 array
         See :mod:`printhammer.kernel.model.layout`.
     t, x, v, t_end : float
@@ -258,9 +244,6 @@ def run(
         Lowest and highest displacement, origin and farthest distance from it [m].
     max_steps : int
         Largest number of steps.
-    under_way : int64 array, shape (n,)
-    live : float64 array, shape (1 + 7 n,)
-        Working space, see :mod:`printhammer.kernel.model.pulses`.
     nodes : float64 array, shape (any, 5)
     contacts : float64 array, shape (any, 7)
         Filled with the record, see `printhammer.kernel.single.record`. The first node of a run that goes on
@@ -274,7 +257,8 @@ def run(
     tuple
         Status, and the numbers of nodes, contacts and steps; the first two may exceed the arrays' lengths.
     """
-    drive = live
+    train = Train(*train)
+    drive = train.live
     used = 0
     touched = 0
     steps = 0
@@ -298,7 +282,7 @@ def run(
         steps = int(carry[C.STEPS])
         touched = carry_contact(contacts, mode)
     else:
-        first, last, edge = pass_edges(t, firings, begins, pieces, replace, under_way, 0, 0, live)
+        first, last, edge = pass_edges(t, train, 0, 0)
         a = acceleration(t, x, v, FREE, memory, hammer, drive)
         mode = first_mode(x, v, a, hammer)
         if carry[C.STATE] == C.ON_BRANCH:
@@ -336,7 +320,7 @@ def run(
             break
         t_next = min(edge, t_end)
         if t_next <= t:
-            first, last, edge = pass_edges(t, firings, begins, pieces, replace, under_way, first, last, live)
+            first, last, edge = pass_edges(t, train, first, last)
             a = acceleration(t, x, v, mode, memory, hammer, drive)
             entered = True
             continue
@@ -419,7 +403,7 @@ def run(
         status = left if left != OK else out_of_bounds(x, bounds)
         entered = entered or switch != NO_SWITCH
         if switch == EDGE:
-            first, last, edge = pass_edges(t, firings, begins, pieces, replace, under_way, first, last, live)
+            first, last, edge = pass_edges(t, train, first, last)
             a = acceleration(t, x, v, mode, memory, hammer, drive)
             if mode == BACKSTOP:
                 kv = contact_rate(w, v, t, hammer, drive)
@@ -436,14 +420,14 @@ def run(
                     else:
                         close_contact(contacts, touched, t, v)
                 else:
-                    mode = BACKSTOP
+                    mode = FOLLOWING[mode, switch]
                     w = 0.0
             elif switch == REACHED_FRONT:
                 v = max(v, 0.0)
                 # A touch without velocity opens a contact only if the armature is pushed on.
                 if v > 0.0 or acceleration(t, x, v, FREE, memory, hammer, drive) > 0.0:
                     touched = open_contact(contacts, touched, PACK_SURFACE, t, v, used, False)
-                    mode = LOADING
+                    mode = FOLLOWING[mode, switch]
             elif switch == REVERSAL:
                 if x <= hammer[FRONT]:
                     close_contact(contacts, touched, t, v)
@@ -453,19 +437,15 @@ def run(
             elif switch in (LEFT_FRONT, LEFT_BACKSTOP):
                 close_contact(contacts, touched, t, v)
                 x = hammer[POSITION] if switch == LEFT_BACKSTOP else hammer[FRONT]
-                mode = FREE
+                mode = FOLLOWING[mode, switch]
                 if switch == LEFT_BACKSTOP and v <= 0.0:
                     v = 0.0
                     if acceleration(t, x, v, FREE, memory, hammer, drive) < 0.0:
                         touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, used, False)
                         mode = BACKSTOP
                         w = 0.0
-            elif switch == REACHED_PEAK:
-                mode = LOADING
-            elif switch == PUSH_ENDED:
-                mode = BACKSTOP_RELEASED if mode == BACKSTOP else PACK_RELEASED
-            elif switch == PUSH_BEGAN:
-                mode = BACKSTOP if mode == BACKSTOP_RELEASED else LOADING
+            else:
+                mode = FOLLOWING[mode, switch]
                 if mode == BACKSTOP:
                     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
             a = acceleration(t, x, v, mode, memory, hammer, drive)

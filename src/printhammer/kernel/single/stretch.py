@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled
-from printhammer.kernel.model.layout import FRONT
-from printhammer.kernel.model.modes import BACKSTOP, HELD, LOADING, PACK_SURFACE, RELOADING, UNLOADING
+from printhammer.kernel.model.layout import FRONT, Train
+from printhammer.kernel.model.modes import LOADING, PACK_SURFACE, RELOADING, UNLOADING
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.forces import Hammer, pack_force
     from printhammer.kernel.model.laws import MEMORY
-    from printhammer.kernel.model.pulses import Drive, edges_at, pass_edges
+    from printhammer.kernel.model.pulses import edges_at, pass_edges
     from printhammer.kernel.single.resample import branch_of, peaks_of, state_in_step
 
 DOT_WIDTH = 6
@@ -65,12 +65,7 @@ def note_dots(
     dots: Any,
     contacts: Any,
     nodes: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Drive,
+    train: Train,
     hammer: Hammer,
 ) -> None:
     """Enter the pack contacts of a stretch into the dots of its member."""
@@ -78,7 +73,7 @@ def note_dots(
         contact = contacts[row]
         if contact[0] != PACK_SURFACE or contact[6] != 0.0:
             continue
-        fired = firing_before(contact[1], firings)
+        fired = firing_before(contact[1], train.firings)
         if fired < 0:
             continue
         dots[fired, 0] += 1.0
@@ -87,9 +82,7 @@ def note_dots(
         if MEMORY:
             depth, force = deepest_node(contact, nodes, hammer)
         else:
-            _t, depth, force = peaks_of(
-                contact, nodes, firings, begins, pieces, replace, under_way, live, hammer
-            )
+            _t, depth, force = peaks_of(contact, nodes, train, hammer)
         dots[fired, 1] = contact[1]
         dots[fired, 2] = contact[2]
         dots[fired, 3] = contact[3]
@@ -107,12 +100,7 @@ def note_states(
     sample: int,
     final: bool,
     nodes: Any,
-    firings: Any,
-    begins: Any,
-    pieces: Any,
-    replace: bool,
-    under_way: Any,
-    live: Drive,
+    train: Train,
     hammer: Hammer,
 ) -> tuple[int, int]:
     """Fill strobes and samples from the numbers `strobe` and `sample` on, as far as a stretch goes.
@@ -121,7 +109,7 @@ def note_states(
     first strobe and sample that are left.
     """
     n = nodes.shape[0]
-    first, last, _edge = edges_at(nodes[0, 0], firings, begins, pieces, replace, under_way, live)
+    first, last, _edge = edges_at(nodes[0, 0], train)
     i = 0
     while True:
         due = np.inf
@@ -137,12 +125,10 @@ def note_states(
             i += 1
             moved = True
         if moved:
-            first, last, _edge = pass_edges(
-                nodes[i, 0], firings, begins, pieces, replace, under_way, first, last, live
-            )
+            first, last, _edge = pass_edges(nodes[i, 0], train, first, last)
         mode, kept = int(nodes[i, 3]), nodes[i, 4]
         displacement, velocity, _w = state_in_step(
-            due, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, live
+            due, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, train.live
         )
         if is_sample:
             x[sample] = displacement
@@ -150,8 +136,7 @@ def note_states(
         else:
             strobes[strobe, 0] = displacement
             strobes[strobe, 1] = velocity
-            # At rest or not, the same force acts.
-            branch = BACKSTOP if mode == HELD else branch_of(mode)
+            branch = branch_of(mode)
             strobes[strobe, 2] = branch
             strobes[strobe, 3] = kept if branch in (UNLOADING, RELOADING) else 0.0
             strobe += 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from printhammer.errors import InputError
-from printhammer.support.csv_table import heading, number, read_rows
+from printhammer.support.sheets import finite, read_sheet, split_heading
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -105,19 +105,19 @@ def read_csv(path: Path) -> ForceTable:
     from printhammer.units import to_si
 
     what = str(path)
-    lines = read_rows(path, "force table")
+    lines = read_sheet(path, "the force table").rows
     if not lines:
         raise InputError(f"{what}: the file is empty, expected the heading {_HEADING!r} and a grid of forces")
     order, units = _heading(lines[0][1], what)
     rows = []
-    for line, cells in lines[1:]:
+    for number, cells in lines[1:]:
         if len(cells) != len(order):
-            raise InputError(f"{what}: line {line} has {len(cells)} cells, expected {len(order)}")
-        row = dict(zip(order, (number(cell, f"{what}: line {line}") for cell in cells), strict=True))
+            raise InputError(f"{what}: line {number} has {len(cells)} cells, expected {len(order)}")
+        row = dict(zip(order, (finite(cell, f"{what}: line {number}") for cell in cells), strict=True))
         try:
             x, current, force = (to_si(row[name], units[name], si) for name, si in COLUMNS.items())
         except InputError as error:
-            raise InputError(f"{what}: line {line}: {error}") from None
+            raise InputError(f"{what}: line {number}: {error}") from None
         rows.append((x, current, force))
     return gather(rows, what)
 
@@ -128,7 +128,7 @@ def _heading(cells: Sequence[str], what: str) -> tuple[list[str], dict[str, str]
 
     units = {}
     for cell in cells:
-        name, unit = heading(cell)
+        name, unit = split_heading(cell)
         name = name.lower()
         if name not in COLUMNS or name in units:
             break

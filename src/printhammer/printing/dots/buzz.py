@@ -15,12 +15,15 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
+from printhammer.printing.dots.nominal import pulse_of
+from printhammer.printing.dots.settling import touches
+from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Contact
     from printhammer.run.motion import Motion
@@ -143,23 +146,13 @@ def find_buzz_train(
     InputError
         The hammer has no waveform, pack, backstop or rest state, or `pulses` is less than `fewest`.
     """
-    search = _Search(hammer, pulses, fewest, forces, max_current)
-    return search.result()
+    return _Search(hammer, pulses, fewest, forces, max_current).result()
 
 
 def longest_run(
     motion: Motion, reference_force: float, forces: tuple[float, float] = FORCES
 ) -> tuple[int, tuple[float, ...], bool]:
-    """Judge a train: the longest run of dots that counts as buzz printing.
-
-    Parameters
-    ----------
-    motion : Motion
-        A motion under a train of pulses.
-    reference_force : float
-        Peak force of the dot of a single pulse, N.
-    forces : tuple of float, optional
-        Limits of the peak force of a dot, in units of the reference.
+    """Judge a train: the longest run of dots whose peak forces count, in units of a reference, N.
 
     Returns
     -------
@@ -170,7 +163,7 @@ def longest_run(
     clear : bool
         As for `BuzzTrain`.
     """
-    touches = [c.t_in for c in motion.contacts if _is_return(c)]
+    returns = [c.t_in for c in touches(motion)]
     best: tuple[int, tuple[float, ...], bool] = (0, (), False)
     run: list[tuple[int, float, float]] = []
     opening = math.inf
@@ -182,11 +175,11 @@ def longest_run(
             continue
         touch, force = dot.fired_at + dot.flight_time, dot.peak_force / reference_force
         opening = min(opening, touch)
-        clear = clear and not any(opening < t <= touch for t in touches)
+        clear = clear and not any(opening < t <= touch for t in returns)
         if not forces[0] <= force <= forces[1]:
             run = []
             continue
-        if run and any(run[-1][1] < t <= touch for t in touches):
+        if run and any(run[-1][1] < t <= touch for t in returns):
             run = []
         run.append((dot.index, touch, force))
         if len(run) > len(best[1]):
@@ -228,38 +221,21 @@ def delayed_train(
         contact = _dot_contact(motion, len(times) - 1)
         if contact is None or contact.t_out is None or contact.t_out + delay <= times[-1]:
             break
-        if until_touch and any(_is_return(c) and c.t_in < contact.t_in for c in motion.contacts):
+        if until_touch and any(c.t_in < contact.t_in for c in touches(motion)):
             break
         times.append(contact.t_out + delay)
     return tuple(times)
 
 
 def _run(hammer: Hammer, times: Sequence[float], patience: float | None) -> Motion:
-    from printhammer.drive.trains import PulseTrain
-    from printhammer.run.simulate import simulate
-
-    drive = PulseTrain(_waveform(hammer), at=list(times))
+    drive = PulseTrain(pulse_of(hammer), at=list(times))
     duration = None if patience is None else times[-1] + patience
     return simulate(hammer, drive, duration=duration, points=2)
 
 
-def _waveform(hammer: Hammer) -> Waveform:
-    if hammer.waveform is None:
-        raise InputError(f"the hammer {hammer.name!r} has no waveform, expected one for buzz printing")
-    return hammer.waveform
-
-
 def _dot_contact(motion: Motion, firing: int) -> Contact | None:
-    found = (
-        c
-        for c in motion.contacts
-        if c.surface == "pack" and c.firing == firing and not c.initial and not c.extra
-    )
-    return next(found, None)
-
-
-def _is_return(contact: Contact) -> bool:
-    return contact.surface == "backstop" and not contact.initial
+    made = (c for c in motion.contacts if c.surface == "pack" and not c.initial and not c.extra)
+    return next((c for c in made if c.firing == firing), None)
 
 
 class _Search:
@@ -268,18 +244,18 @@ class _Search:
     def __init__(
         self, hammer: Hammer, pulses: int, fewest: int, forces: tuple[float, float], max_current: float
     ) -> None:
-        for part, name in ((hammer.pack, "pack"), (hammer.backstop, "backstop")):
-            if part is None:
+        for name in ("pack", "backstop", "waveform"):
+            if getattr(hammer, name) is None:
                 raise InputError(f"the hammer {hammer.name!r} has no {name}, expected one for buzz printing")
         if not 1 <= fewest <= pulses:
             raise InputError(f"pulses = {pulses}, expected at least the {fewest} dots that must count")
         self.hammer, self.pulses, self.fewest, self.forces = hammer, pulses, fewest, forces
-        self.limit = max_current if _waveform(hammer).quantity == "current" else math.inf
+        self.limit = max_current if pulse_of(hammer).quantity == "current" else math.inf
         self.tried = 0
         self.best: BuzzTrain | None = None
         single = _run(hammer, [0.0], None)
         contact = _dot_contact(single, 0)
-        returned = (c.t_in for c in single.contacts if _is_return(c))
+        returned = (c.t_in for c in touches(single))
         self.reference = 0.0
         if contact is not None and contact.t_out is not None and contact.peak_force:
             self.reference = contact.peak_force

@@ -7,8 +7,8 @@ second ones, and so on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -67,16 +67,10 @@ def extra_dots(
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
-    drives : sequence of Drive
-        Of the members.
-    ends : array
-        Ends of their runs, s.
+    hammer, drives, ends, tolerance, threads
+        Those of the ensemble; `ends` in s.
     dots : DotTable
-        What the firings did.
-    tolerance, threads
-        As for `Ensemble`.
+        What its firings did.
 
     Returns
     -------
@@ -85,8 +79,20 @@ def extra_dots(
     """
     assert hammer.front is not None
     member, firing = np.nonzero(dots.extra_contacts > 0)
-    some = _Windows.at(member, firing, _leaving(dots, member, firing))
+    begin = _leaving(dots, member, firing)
+    known = np.isfinite(begin)
+    member, firing, begin = member[known], firing[known], begin[known]
     found: list[ExtraDots] = []
+    if not member.size:
+        return _joined(found)
+    involved, row = np.unique(member, return_inverse=True)
+    whole = Ensemble(hammer, [drives[one] for one in involved.tolist()], ends[involved], tolerance=tolerance)
+    state = _states(whole, [begin[row == number] for number in range(involved.size)], threads)
+    end = [
+        _window_end(drives[one], shot, float(ends[one]))
+        for one, shot in zip(member.tolist(), firing.tolist(), strict=True)
+    ]
+    some = _Windows(member, firing, begin, np.array(end), state)
 
     def run(windows: _Windows) -> Ensemble:
         return Ensemble(
@@ -98,19 +104,6 @@ def extra_dots(
             tolerance=tolerance,
         )
 
-    if some.member.size:
-        involved, row = np.unique(some.member, return_inverse=True)
-        whole = Ensemble(
-            hammer, [drives[member] for member in involved.tolist()], ends[involved], tolerance=tolerance
-        )
-        state = _states(whole, [some.begin[row == number] for number in range(involved.size)], threads)
-        end = np.array(
-            [
-                _window_end(drives[member], firing, float(ends[member]))
-                for member, firing in zip(some.member.tolist(), some.firing.tolist(), strict=True)
-            ]
-        )
-        some = replace(some, state=state, end=end)
     for _ in range(MOST):
         # A pack that does not pull lets go of an armature that is still in it, where no run can begin.
         some = some.where((some.begin < some.end) & (some.state[:, 0] <= hammer.front))
@@ -133,31 +126,23 @@ def extra_dots(
         some, after = some.where(more), after[more]
         if some.member.size:
             state = _states(run(some), [np.array([moment]) for moment in after], threads)
-            some = replace(some, begin=after, state=state)
+            some = some._replace(begin=after, state=state)
     return _joined(found)
 
 
-@dataclass(frozen=True)
-class _Windows:
+class _Windows(NamedTuple):
     """Runs from the end of a contact to the next firing, each in the member and after the firing given."""
 
     member: IntArray
     firing: IntArray
-    begin: FloatArray = field(default_factory=lambda: np.zeros(0))
-    end: FloatArray = field(default_factory=lambda: np.zeros(0))
-    state: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-
-    @classmethod
-    def at(cls, member: IntArray, firing: IntArray, begin: FloatArray) -> _Windows:
-        """Return windows, of those that have a beginning; ends and states are left out."""
-        known = np.isfinite(begin)
-        return cls(member[known], firing[known], begin[known])
+    begin: FloatArray
+    end: FloatArray
+    state: FloatArray
 
     def where(self, kept: npt.NDArray[np.bool_]) -> _Windows:
         """Return some of the windows."""
-        return _Windows(
-            self.member[kept], self.firing[kept], self.begin[kept], self.end[kept], self.state[kept]
-        )
+        member, firing, begin, end, state = self
+        return _Windows(member[kept], firing[kept], begin[kept], end[kept], state[kept])
 
 
 def _joined(found: Sequence[ExtraDots]) -> ExtraDots:

@@ -37,6 +37,14 @@ class Limits:
             if isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0.0:
                 raise InputError(f"limits: {name} = {value!r}{unit} is expected to be a number not below 0")
 
+    @property
+    def text(self) -> str:
+        """In words."""
+        return (
+            f"force within {100.0 * self.force:g} %, arrival within {1e6 * self.arrival:g} us,"
+            f" {self.extra_contacts} extra contacts"
+        )
+
 
 DOT_MATRIX_SPREAD: Final = 200e-6
 """Peak-to-peak flight-time variation that is "commonly accepted in the industry as long as the impact forces

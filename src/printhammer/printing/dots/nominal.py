@@ -40,14 +40,10 @@ class SinglePulse:
 
 @dataclass(frozen=True)
 class Nominal(SinglePulse):
-    """What one pulse from rest prints.
+    """What one pulse from rest prints, beside force and flight time.
 
     Attributes
     ----------
-    force : float
-        Largest pack force, N.
-    flight_time : float
-        From firing to touch, s.
     impact_speed : float
         At touch, m/s.
     indentation : float
@@ -65,21 +61,7 @@ class Nominal(SinglePulse):
 
 
 def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Nominal:
-    """Fire a hammer once from rest.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        A hammer with a pack.
-    waveform : Waveform, optional
-        By default that of the hammer.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
-
-    Returns
-    -------
-    Nominal
-        What it prints.
+    """Fire a hammer once from rest, its own waveform or another, and return what it prints.
 
     Raises
     ------
@@ -108,18 +90,7 @@ def single_pulses(
     tolerance: float = TOLERANCE,
     threads: int | None = None,
 ) -> list[SinglePulse | None]:
-    """Fire many hammers once each, from rest.
-
-    Parameters
-    ----------
-    hammers : sequence of Hammer
-        Hammers that rest, with packs.
-    waveforms : sequence of Waveform, optional
-        What each fires; by default its own waveform.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
-    threads : int, optional
-        By default as many as there are cores.
+    """Fire many hammers that have packs once each from rest, their own waveforms or others.
 
     Returns
     -------

@@ -103,21 +103,7 @@ class Settling:
 
 
 def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:
-    """Fire a hammer once from rest and watch it settle.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        A hammer with a backstop.
-    waveform : Waveform, optional
-        By default that of the hammer.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
-
-    Returns
-    -------
-    Settling
-        Settle-out time, rebounds and wear.
+    """Fire a hammer once from rest, its own waveform or another, and watch it settle.
 
     Raises
     ------

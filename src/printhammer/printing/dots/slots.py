@@ -82,17 +82,10 @@ def de_bruijn(order: int = SLOTS) -> npt.NDArray[np.bool_]:
 
 
 def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> npt.NDArray[np.bool_]:
-    """Return once around the de Bruijn cycle, its own last slots before it.
+    """Return once around the de Bruijn cycle of an order, its own last slots before it.
 
     The run begins at rest, `lead_in` slots before the cycle does, with what the cycle ends with. So at every
     slot that is judged the past is that of a cycle without end, for `lead_in` slots at least.
-
-    Parameters
-    ----------
-    order : int, optional
-        As for `de_bruijn`.
-    lead_in : int, optional
-        Number of slots before the cycle.
 
     Returns
     -------
@@ -111,15 +104,5 @@ def slots_of(pattern: npt.ArrayLike) -> tuple[int, ...]:
 def slot_times(
     slots: Sequence[int] | npt.NDArray[np.int64], rate: float, first: float = FIRST_SLOT
 ) -> FloatArray:
-    """Return the times of some slots, s.
-
-    Parameters
-    ----------
-    slots : sequence of int
-        Their numbers; an array of any shape.
-    rate : float
-        Slots per second, Hz.
-    first : float, optional
-        Time of slot 0, s.
-    """
+    """Return the times of some slots, s; of an array of numbers of slots an array of the same shape."""
     return first + np.asarray(slots, dtype=np.float64) / rate

@@ -36,20 +36,6 @@ class Strategy(Protocol):
 def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
     """Fire the waveform of the hammer at every slot at which a dot is wanted, whatever the hammer does.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        Whose waveform is fired.
-    patterns : sequence of tuple of int
-        Numbers of the slots at which dots are wanted.
-    rate : float
-        Slots per second, Hz.
-
-    Returns
-    -------
-    list of Drive
-        One for each pattern.
-
     Raises
     ------
     InputError

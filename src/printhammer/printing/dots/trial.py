@@ -102,14 +102,10 @@ def attempt(
         How the hammers are driven.
     limits : Limits
         How far a dot may be off.
-    tolerance : float
-        As for `printhammer.simulate`.
     judged_from : int, optional
         First slot that is judged; those before are a lead-in.
-    threads : int, optional
-        By default as many as there are cores.
-    progress : callable, optional
-        Called now and then with the number of runs done and of all.
+    tolerance, threads, progress
+        As for `Ensemble` and its `run`.
 
     Returns
     -------

@@ -88,17 +88,13 @@ def head_of(
 
     Parameters
     ----------
-    wires : int
-        Number of wires.
+    wires, density, line_gap
+        As for `Head`.
     pitch : float, optional
         From slot to slot, m; by default 1/60 in for 9 wires, else as from wire to wire.
     wire_diameter : float, optional
         Thickness of the wires, m; by default 0.35, 0.25 and 0.2 mm for 9, 18 and 24 wires, else a third more
         than from wire to wire.
-    density : float, optional
-        Optical density of the dot of a single pulse.
-    line_gap : float, optional
-        Between print lines, in parts of the height of the wires.
 
     Raises
     ------

@@ -24,19 +24,9 @@ _NAMED: Final = 8
 
 
 def broken(text: str, columns: int = COLUMNS) -> list[str]:
-    """Break a text into print lines of at most some characters, between words where there are any.
+    """Break a text into print lines of some characters at most, between words where there are any.
 
-    Parameters
-    ----------
-    text : str
-        Line ends in it stay.
-    columns : int, optional
-        Most characters of a line.
-
-    Returns
-    -------
-    list of str
-        The lines; an empty one where the text has one.
+    Line ends in the text stay, and so do empty lines.
     """
     found: list[str] = []
     for line in text.splitlines():
@@ -51,18 +41,7 @@ def broken(text: str, columns: int = COLUMNS) -> list[str]:
 def lettered(
     text: str, wires: int = matrix_font.WIRES, font: str | Path | None = None, columns: int = COLUMNS
 ) -> npt.NDArray[np.bool_]:
-    """Set a text in dots.
-
-    Parameters
-    ----------
-    text : str
-        What to print.
-    wires : int, optional
-        Number of wires.
-    font : path, optional
-        A TrueType font; by default the built-in font for 9 wires, and DejaVu Sans Mono for others.
-    columns : int, optional
-        Most characters of a print line.
+    """Set a text in dots, as `Pattern.from_text` does.
 
     Returns
     -------

@@ -12,8 +12,7 @@ assumption: ink in proportion to force, density in proportion to ink. Dots are a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -28,100 +27,100 @@ from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
 from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.printing.page.head import Head, head_of
 from printhammer.printing.page.pattern import Pattern
+from printhammer.results import Column, Result, column, derived, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
     IntArray = npt.NDArray[np.int64]
     BoolArray = npt.NDArray[np.bool_]
 
+_HEAD: Final = ("wire_pitch", "pitch", "line_pitch", "wire_diameter", "density")
+_FAULTS: Final = np.array([*FAULTS, "none"], "U16")
 _PIECE: Final = 512
 _MOST_DOTS: Final = 5_000_000
 
 
-@dataclass(frozen=True)
-class Page:
-    """What was printed: arrays of shape (N,), one entry for each wanted dot.
+class Page(Result, rows="dot"):
+    """What was printed: every wanted dot, every extra contact, every run."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer of every wire.
-    pattern : Pattern
-        What was wanted.
-    head : Head
-        Where the wires are, and how thick.
-    rate : float
-        Slots per second, Hz.
-    strategy : str
-        Name of the way to drive.
-    nominal : Nominal
-        The dot of the single pulse.
-    limits : Limits
-        By which dots are judged.
-    line, wire, slot : int array
-        Where dots are wanted, counted from 0: print line, wire and slot.
-    run : bool array
-        Whether the run came so far.
-    lost : bool array
-        Whether the firing made no dot.
-    fault : int array
-        Number of the first fault in `printhammer.printing.dots.judging.FAULTS`; -1 for a dot within limits.
-    arrival_deviation : array
-        Touch less slot time and single-pulse flight time, s; NaN for a lost dot, as in all that follows.
-    flight_time : array
-        From firing to touch, s.
-    peak_force : array
-        Largest pack force, N.
-    indentation : array
-        Largest indentation, m.
-    extra_contacts : int array
-        Further pack contacts.
-    extra_of : int array, shape (E,)
-        To which dot each extra contact belongs.
-    extra_arrival : array, shape (E,)
-        Its touch less slot time and single-pulse flight time, s.
-    extra_force : array, shape (E,)
-        Its largest pack force, N.
-    run_line, run_wire : int array, shape (R,)
-        Print line and wire of each run; a wire without a wanted dot in a line has none.
-    status : str array, shape (R,)
-        How the runs ended.
-    tolerance : float
-        Of the integration.
-    """
+    hammer: Hammer = part("the hammer of every wire")
+    pattern: Pattern = part("what was wanted")
+    head: Head = part("where the wires are, and how thick")
+    rate: float = scalar("Hz", "slots per second")
+    strategy: str = scalar("", "name of the way to drive")
+    nominal: Nominal = part("the dot of the single pulse")
+    limits: Limits = part("by which dots are judged")
+    line: IntArray = column("1", "print line", "dot", more="where a dot is wanted, counted from 0")
+    wire: IntArray = column("1", "wire, the topmost one is 0", "dot")
+    slot: IntArray = column("1", "slot", "dot", more="counted from 0")
+    run: BoolArray = column("1", "whether the run came so far", "dot")
+    lost: BoolArray = column("1", "whether the firing made no dot", "dot")
+    fault: IntArray = part(
+        "number of the first fault in `printhammer.printing.dots.judging.FAULTS`",
+        more="-1 for a dot within limits",
+        repr=False,
+    )
+    arrival_deviation: FloatArray = column(
+        "s",
+        "touch less slot time and nominal flight time",
+        "dot",
+        more="NaN for a lost dot, as in all that follows",
+    )
+    flight_time: FloatArray = column("s", "from firing to touch", "dot")
+    peak_force: FloatArray = column("N", "largest pack force", "dot")
+    indentation: FloatArray = column("m", "largest indentation", "dot")
+    extra_contacts: IntArray = column("1", "further pack contacts", "dot")
+    extra_of: IntArray = column("1", "dot that the extra contact belongs to", "extra")
+    extra_arrival: FloatArray = part(
+        "touch of each extra contact less slot time and nominal flight time, s", repr=False
+    )
+    extra_force: FloatArray = column("N", "largest pack force of the extra contact", "extra")
+    run_line: IntArray = column(
+        "1", "print line of the run", "member", more="a wire without a wanted dot in a line has none"
+    )
+    run_wire: IntArray = column("1", "wire of the run", "member")
+    status: npt.NDArray[np.str_] = column("1", "how the run ended", "member")
+    tolerance: float = part("error allowed in one step of the integration")
 
-    hammer: Hammer
-    pattern: Pattern
-    head: Head
-    rate: float
-    strategy: str
-    nominal: Nominal
-    limits: Limits
-    line: IntArray = field(repr=False)
-    wire: IntArray = field(repr=False)
-    slot: IntArray = field(repr=False)
-    run: BoolArray = field(repr=False)
-    lost: BoolArray = field(repr=False)
-    fault: IntArray = field(repr=False)
-    arrival_deviation: FloatArray = field(repr=False)
-    flight_time: FloatArray = field(repr=False)
-    peak_force: FloatArray = field(repr=False)
-    indentation: FloatArray = field(repr=False)
-    extra_contacts: IntArray = field(repr=False)
-    extra_of: IntArray = field(repr=False)
-    extra_arrival: FloatArray = field(repr=False)
-    extra_force: FloatArray = field(repr=False)
-    run_line: IntArray = field(repr=False)
-    run_wire: IntArray = field(repr=False)
-    status: npt.NDArray[np.str_] = field(repr=False)
-    tolerance: float
+    @property
+    def title(self) -> str:
+        """What it is, in a line."""
+        return f"page printed by {self.hammer.name}"
+
+    def notes(self) -> dict[str, Any]:
+        """Return pattern, head, single pulse and limits."""
+        pattern, head, single, limits = self.pattern, self.head, self.nominal, self.limits
+        return {
+            "pattern": pattern.name,
+            **{name: getattr(pattern, name) for name in ("lines", "wires", "slots")},
+            **{name: getattr(head, name) for name in _HEAD},
+            "nominal_force": single.force,
+            "nominal_flight_time": single.flight_time,
+            **{f"limit_{name}": value for name, value in asdict(limits).items()},
+        }
+
+    def entries(self) -> Entries:
+        """Return the columns: those of the fields, faults by name, and places on the paper."""
+        (x, y), (extra_x, extra_y) = self.places, self.extra_places
+        more = (
+            ("fault", "1", "first fault, by the limits", "dot", _FAULTS[self.fault]),
+            ("x", "m", "place of the dot, from the middle of slot 0 to the right", "dot", x),
+            ("y", "m", "place of the dot, from the topmost wire down", "dot", y),
+            ("extra_x", "m", "place of the extra contact, as x", "extra", extra_x),
+            ("extra_y", "m", "place of the extra contact, as y", "extra", extra_y),
+        )
+        columns = {
+            name: (Column(unit, meaning, (dim,), name=name), values)
+            for name, unit, meaning, dim, values in more
+        }
+        return {**super().entries(), **columns}
 
     @property
     def speed(self) -> float:
@@ -139,16 +138,19 @@ class Page:
         return np.asarray(self.fault < 0)
 
     @property
+    @derived("m", "place less wanted place, along the line", "dot")
     def placement_error(self) -> FloatArray:
         """How far each dot is from its place, m, positive where the carriage goes; NaN without a dot."""
         return self.arrival_deviation * self.speed
 
     @property
+    @derived("1", "largest pack force over that of the single pulse", "dot")
     def force_ratio(self) -> FloatArray:
         """Peak force over that of the single pulse; NaN without a dot."""
         return self.peak_force / self.nominal.force
 
     @property
+    @derived("1", "share of the light that does not come back", "dot")
     def darkness(self) -> FloatArray:
         """Share of the light that does not come back from the dot, 0 to 1; NaN without one."""
         return darkness(self.density)
@@ -213,17 +215,6 @@ class Page:
         # Rounding tells no two places apart.
         line, first = np.unravel_index(int(np.argmax(np.round(windows, 9))), windows.shape)
         return int(line), int(first)
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the page as a Dataset over `dot`, `extra` and `run`, with units and provenance."""
-        from printhammer.printing.page.page_tables import page_dataset
-
-        return page_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the page; returns a matplotlib figure, see `printhammer.figures.printing.page`."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.printing.page").plot(self, **options)
 
 
 def darkness(density: npt.ArrayLike) -> FloatArray:

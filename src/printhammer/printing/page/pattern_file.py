@@ -49,14 +49,7 @@ _MOST_PIXELS: Final = 50_000_000
 
 
 def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, npt.NDArray[np.bool_]]:
-    """Read a pattern file or a bitmap.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-    wires : int, optional
-        Number of wires: for a bitmap 9 by default; what a pattern file states has to be that.
+    """Read a pattern file or a bitmap, as `Pattern.load` does.
 
     Returns
     -------
@@ -167,13 +160,7 @@ def pattern_toml(name: str, dots: npt.NDArray[np.bool_]) -> str:
 
 
 def write_pattern(path: str | Path, name: str, dots: npt.NDArray[np.bool_]) -> None:
-    """Write a pattern file or a bitmap, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        The name ends in none of the known ends, or the file cannot be written.
-    """
+    """Write a pattern file or a bitmap, as `Pattern.save` does."""
     target = Path(path)
     suffix = target.suffix.lower()
     content: Any

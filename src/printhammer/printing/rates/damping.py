@@ -9,8 +9,6 @@ hammer is fired once and watched until it settles, and its safe rate is looked f
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -22,15 +20,16 @@ from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
 from printhammer.printing.dots.settling import settle
 from printhammer.printing.rates.materials import Material, materials
 from printhammer.printing.rates.perturbation import changed
-from printhammer.printing.rates.safe_rate import FIRST, LAST, rate_grid
+from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_grid
 from printhammer.printing.rates.safe_rates import safe_rates
+from printhammer.results import Result, column, derived, part, scalar
+from printhammer.results.declare import columns_of
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
@@ -52,81 +51,74 @@ _FINE: Final = 9
 _ROUNDS: Final = 5
 
 
-@dataclass(frozen=True)
-class DampingStudy:
-    """What other materials do at the same print force: arrays of shape (N,), one entry for each material.
+class DampingStudy(Result):
+    """What other materials do at the same print force.
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer that is studied.
-    limits : Limits
-        How far a dot may be off, for the safe rates.
-    current_limit : float
-        Largest current allowed, A.
-    nominal : Nominal
-        Single-pulse dot of the hammer; its force is kept.
-    materials : tuple of Material
-        What is exchanged.
-    status : str array
-        "ok"; "current limit" where the print force takes more current than is allowed (the numbers are those
-        with that current all the same); or "no hammer", "does not rest", "force not reached", or how the run
-        ended: then the numbers are NaN.
-    amplitude : array
-        Factor on the amplitude of the waveform.
-    peak_current : array
-        Largest absolute value of the waveform, A.
-    force : array
-        Single-pulse force, N.
-    flight_time : array
-        Single-pulse flight time, s.
-    settle_out : array
-        Time from the firing until the armature stays within a hundredth of the stroke from rest, s; NaN where
-        it does not within 20 ms.
-    rebounds : array
-        Number of rebounds higher than a hundredth of the stroke.
-    highest : array
-        Highest rebound, in parts of the stroke.
-    restitution : array
-        Speed after the first touch of the backstop over the speed before; 0 where the armature does not
-        leave.
-    impulse : array
-        Change of momentum at the backstop after a single pulse, N s.
-    loss : array
-        Energy that the backstop takes after a single pulse, J.
-    backstop_force : array
-        Largest backstop force, N.
-    coil_work : array
-        Net work of the coil in a single pulse, J.
-    safe_rate : array
-        Safe rate, Hz; NaN where not even the first rate of the grid passes.
-    grid : array
-        Rates that were tried, Hz.
-    tolerance : float
-        Of the integration, settling excepted.
+    Where `status` is neither "ok" nor "current limit", the numbers are NaN.
     """
 
-    hammer: Hammer
-    limits: Limits
-    current_limit: float
-    nominal: Nominal
-    materials: tuple[Material, ...]
-    status: npt.NDArray[np.str_] = field(repr=False)
-    amplitude: FloatArray = field(repr=False)
-    peak_current: FloatArray = field(repr=False)
-    force: FloatArray = field(repr=False)
-    flight_time: FloatArray = field(repr=False)
-    settle_out: FloatArray = field(repr=False)
-    rebounds: FloatArray = field(repr=False)
-    highest: FloatArray = field(repr=False)
-    restitution: FloatArray = field(repr=False)
-    impulse: FloatArray = field(repr=False)
-    loss: FloatArray = field(repr=False)
-    backstop_force: FloatArray = field(repr=False)
-    coil_work: FloatArray = field(repr=False)
-    safe_rate: FloatArray = field(repr=False)
-    grid: FloatArray = field(repr=False)
-    tolerance: float
+    hammer: Hammer = part("the hammer that is studied")
+    limits: Limits = part("how far a dot may be off, for the safe rates")
+    current_limit: float = scalar("A", "largest current allowed")
+    nominal: Nominal = part("single-pulse dot of the hammer", more="its force is kept")
+    materials: tuple[Material, ...] = part("what is exchanged")
+    status: npt.NDArray[np.str_] = column(
+        "",
+        "what became of it",
+        "material",
+        more='"ok"; "current limit" where the print force takes more current than is allowed (the numbers'
+        ' are those with that current all the same); "no hammer", "does not rest", "force not reached", or'
+        " how the run ended",
+    )
+    amplitude: FloatArray = column("1", "factor on the amplitude of the waveform", "material")
+    peak_current: FloatArray = column("A", "largest current", "material", more="the absolute value")
+    force: FloatArray = column("N", "single-pulse force", "material")
+    flight_time: FloatArray = column("s", "single-pulse flight time", "material")
+    settle_out: FloatArray = column(
+        "s",
+        "settle-out time",
+        "material",
+        more="from the firing until the armature stays within a hundredth of the stroke from rest; NaN where"
+        " it does not within 20 ms",
+    )
+    rebounds: FloatArray = column("1", "rebounds higher than a hundredth of the stroke", "material")
+    highest: FloatArray = column("1", "highest rebound, in parts of the stroke", "material")
+    restitution: FloatArray = column(
+        "1",
+        "speed after the first touch of the backstop over the speed before",
+        "material",
+        more="0 where the armature does not leave",
+    )
+    impulse: FloatArray = column("N s", "change of momentum at the backstop after a single pulse", "material")
+    loss: FloatArray = column("J", "energy that the backstop takes after a single pulse", "material")
+    backstop_force: FloatArray = column("N", "largest backstop force", "material")
+    coil_work: FloatArray = column("J", "net work of the coil in a single pulse", "material")
+    safe_rate: FloatArray = column(
+        "Hz", "safe rate", "material", more="NaN where not even the first rate of the grid passes"
+    )
+    grid: FloatArray = part("rates that were tried, Hz", repr=False)
+    tolerance: float = part("error allowed in one step of the integration", more="settling excepted")
+
+    @property
+    def title(self) -> str:
+        """What it is, in a line."""
+        return f"damping study of {self.hammer.name}"
+
+    def notes(self) -> dict[str, Any]:
+        """Return limits, print force and the grid of rates."""
+        return {"limits": self.limits.text, "single_force": self.nominal.force, **grid_notes(self.grid)}
+
+    @property
+    @derived("", "what is exchanged", "material")
+    def kind(self) -> list[str]:
+        """What is exchanged, one of `printhammer.printing.rates.materials.KINDS` each."""
+        return [one.kind for one in self.materials]
+
+    @property
+    @derived("", "for what", "material")
+    def label(self) -> list[str]:
+        """For what it is exchanged, in a few words each."""
+        return [one.label for one in self.materials]
 
     @property
     def best(self) -> int | None:
@@ -134,16 +126,8 @@ class DampingStudy:
         allowed = np.where((self.status == "ok") & ~np.isnan(self.safe_rate), self.safe_rate, -np.inf)
         return int(np.argmax(allowed)) if np.isfinite(allowed).any() else None
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the materials as a Dataset over `material`, with units and provenance in the attributes."""
-        from printhammer.printing.rates.study_tables import damping_dataset
 
-        return damping_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw what each material buys; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.printing.damping").plot(self, **options)
+_NUMBERS: Final = tuple(name for name, note in columns_of(DampingStudy).items() if note.dims and note.unit)
 
 
 def damping_study(
@@ -206,7 +190,7 @@ def damping_study(
         raise InputError("others: expected at least one material")
     made, fate = changed(hammer, [(material.changes, material.label) for material in tried])
     status = np.array(fate, "U17")
-    values = {name: np.full(len(tried), np.nan) for name in _COLUMNS}
+    values = {name: np.full(len(tried), np.nan) for name in _NUMBERS}
     resting = np.flatnonzero(status == "ok")
     factors = tuned([made[k] for k in resting], single.force, tolerance=tolerance, threads=threads)
     values["amplitude"][resting] = factors
@@ -236,14 +220,9 @@ def damping_study(
         }.items():
             values[name][k] = math.nan if value is None else value
     run = [n for n, k in enumerate(left.tolist()) if status[k] == "ok"]
+    hammers, singles = [driven[n] for n in run], [dot for n in run if (dot := dots[n]) is not None]
     values["safe_rate"][left[run]] = safe_rates(
-        [driven[n] for n in run],
-        [dot for n in run if (dot := dots[n]) is not None],
-        grid,
-        limits=bounds,
-        tolerance=tolerance,
-        threads=threads,
-        progress=progress,
+        hammers, singles, grid, limits=bounds, tolerance=tolerance, threads=threads, progress=progress
     )
     over = (status == "ok") & (values["peak_current"] > allowed)
     status[over] = "current limit"
@@ -260,23 +239,6 @@ def damping_study(
     )
 
 
-_COLUMNS: Final = (
-    "amplitude",
-    "peak_current",
-    "force",
-    "flight_time",
-    "settle_out",
-    "rebounds",
-    "highest",
-    "restitution",
-    "impulse",
-    "loss",
-    "backstop_force",
-    "coil_work",
-    "safe_rate",
-)
-
-
 def tuned(
     hammers: Sequence[Hammer], force: float, *, tolerance: float, threads: int | None = None
 ) -> FloatArray:
@@ -284,15 +246,6 @@ def tuned(
 
     The factor is looked for from `LEAST` to `MOST` on a grid, then on ever finer ones: where the force first
     rises through that wanted, of several such places the one nearest to 1.
-
-    Parameters
-    ----------
-    hammers : sequence of Hammer
-        Hammers that rest.
-    force : float
-        Force wanted, N.
-    tolerance, threads
-        As for `printhammer.printing.dots.nominal.single_pulses`.
 
     Returns
     -------

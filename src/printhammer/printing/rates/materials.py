@@ -64,27 +64,17 @@ class Material:
 
 
 def materials(hammer: Hammer, single: Nominal) -> list[Material]:
-    """List the materials that are studied unless others are given.
+    """List the materials that are studied for a hammer, and its single-pulse dot, unless others are given.
 
     Hard backstops have other constants of equations (6) and (7); elastomers are after Kuwabara and Kono;
     packs are softer and harder ones of equation (5), and springs with a dashpot, the spring such that the
     loading work of the single-pulse dot presses it with the force of that dot.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer that is studied.
-    single : Nominal
-        Its single-pulse dot.
     """
     found = [Material("as it is", "as it is", {})]
     backstop, pack = hammer.backstop, hammer.pack
-    if (
-        isinstance(backstop, HertzBackstop)
-        and backstop.damping is not None
-        and backstop.stiffness is not None
-    ):
-        k, damping = backstop.stiffness, backstop.damping
+    hard = backstop if isinstance(backstop, HertzBackstop) else None
+    if hard is not None and hard.damping is not None and hard.stiffness is not None:
+        k, damping = hard.stiffness, hard.damping
         found += [
             # The rebound depends on l v / k alone: with both a factor larger, only the duration changes.
             Material(

@@ -63,18 +63,6 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
     The current enters equation (3) as Bm I. Every current a factor larger is therefore the same as Bm that
     factor larger, and a strategy that knows nothing of it stays as it is.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    by : Perturbation
-        What differs.
-
-    Returns
-    -------
-    Hammer
-        Another hammer.
-
     Raises
     ------
     InputError

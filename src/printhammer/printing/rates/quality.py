@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from importlib import import_module
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.dots.judging import judge
+from printhammer.printing.dots.judging import FAULTS, judge
 from printhammer.printing.dots.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
 from printhammer.printing.dots.nominal import WAIT, rate_of
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.settling import wear_of
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
 from printhammer.printing.dots.strategy import checked_drives, name_of, open_loop
+from printhammer.results import Result, column, derived, part, scalar
 from printhammer.run.coil_work import squared_current
 from printhammer.run.ensemble import DotTable
 from printhammer.run.problem import TOLERANCE
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
@@ -39,8 +38,13 @@ if TYPE_CHECKING:
     from printhammer.run.ledger import Ledger
     from printhammer.support.arrays import FloatArray
 
+    BoolArray = npt.NDArray[np.bool_]
+    IntArray = npt.NDArray[np.int64]
+
 PITCH: Final = 25.4e-3 / 60.0
 """Distance of neighbouring slots on the paper, m, unless told otherwise: sixty to the inch."""
+
+_SPREADS: Final = {"flight_time": "s", "force": "N", "indentation": "m", "arrival": "s", "placement": "m"}
 
 MOST_SLOTS: Final = 20_000
 """Number of slots above which a pattern is refused."""
@@ -72,83 +76,70 @@ class Spread:
         return self.high - self.low
 
 
-@dataclass(frozen=True)
-class Quality:
-    """What a hammer prints at a rate: arrays of shape (N,), one entry for each dot that is judged.
+class Quality(Result):
+    """What a hammer prints at a rate, dot by dot for those that are judged, how evenly, and what it costs."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        What is driven.
-    strategy : str
-        How, in words.
-    drive : Drive
-        What drove it.
-    rate : float
-        Slots per second, Hz.
-    wanted : bool array, shape (slots,)
-        The pattern, the lead-in among it.
-    judged_from : int
-        First slot that is judged; those before are a lead-in.
-    limits : Limits
-        By which dots are judged.
-    nominal : Nominal
-        The single-pulse dot.
-    slot : int array
-        Number of the slot.
-    flight_time : array
-        From firing to touch, s; NaN for a lost dot, as in all that follows.
-    force : array
-        Largest pack force, N.
-    indentation : array
-        Largest indentation, m.
-    arrival_deviation : array
-        Touch less slot time and single-pulse flight time, s.
-    lost : bool array
-        Whether the firing made no dot.
-    extra_contacts : int array
-        Further pack contacts.
-    fault : int array
-        Number of the first fault in `printhammer.printing.dots.judging.FAULTS`; -1 for a dot within limits.
-    wear : Wear
-        What the backstop bears in the whole run, lead-in and settle-out included.
-    energy : Ledger
-        Of the whole run.
-    heat : float or None
-        Of the coil in the whole run, J; None for a hammer without `coil.resistance`.
-    fired : int
-        Number of firings in the whole run.
-    pitch : float
-        Distance of neighbouring slots on the paper, m.
-    status : str
-        How the run ended.
-    tolerance : float
-        Of the integration.
-    """
+    hammer: Hammer = part("what is driven")
+    strategy: str = scalar("", "how, in words")
+    drive: Drive = part("what drove it", repr=False)
+    rate: float = scalar("Hz", "slots per second", name="rate_Hz")
+    wanted: BoolArray = part("the pattern, one for each slot, the lead-in among it", repr=False)
+    judged_from: int = scalar(
+        "1", "first slot that is judged", more="those before are a lead-in", name="judged_from_slot"
+    )
+    limits: Limits = part("by which dots are judged")
+    nominal: Nominal = part("the single-pulse dot")
+    slot: IntArray = column("1", "number of the slot", "dot", dtype=np.int32)
+    flight_time: FloatArray = column(
+        "s", "from firing to touch", "dot", more="NaN for a lost dot, as in all that follows"
+    )
+    force: FloatArray = column("N", "largest pack force", "dot")
+    indentation: FloatArray = column("m", "largest indentation", "dot")
+    arrival_deviation: FloatArray = column("s", "touch less slot time and nominal flight time", "dot")
+    lost: BoolArray = column("1", "whether the firing made no dot", "dot", dtype=np.int8)
+    extra_contacts: IntArray = column("1", "further pack contacts", "dot", dtype=np.int32)
+    fault: IntArray = column(
+        "1",
+        "first fault of the dot, -1 for a good one",
+        "dot",
+        dtype=np.int32,
+        attrs={"codes": ", ".join(f"{code} {name}" for code, name in enumerate(FAULTS))},
+    )
+    wear: Wear = part("what the backstop bears in the whole run", more="lead-in and settle-out included")
+    energy: Ledger = part("energy of the whole run")
+    heat: float | None = part(
+        "heat of the coil in the whole run, J", more="None for a hammer without `coil.resistance`"
+    )
+    fired: int = part("number of firings in the whole run")
+    pitch: float = scalar("m", "distance of neighbouring slots on the paper", name="pitch_m")
+    status: str = part("how the run ended")
+    tolerance: float = part("error allowed in one step of the integration")
 
-    hammer: Hammer
-    strategy: str
-    drive: Drive = field(repr=False)
-    rate: float
-    wanted: npt.NDArray[np.bool_] = field(repr=False)
-    judged_from: int
-    limits: Limits
-    nominal: Nominal
-    slot: npt.NDArray[np.int64] = field(repr=False)
-    flight_time: FloatArray = field(repr=False)
-    force: FloatArray = field(repr=False)
-    indentation: FloatArray = field(repr=False)
-    arrival_deviation: FloatArray = field(repr=False)
-    lost: npt.NDArray[np.bool_] = field(repr=False)
-    extra_contacts: npt.NDArray[np.int64] = field(repr=False)
-    fault: npt.NDArray[np.int64] = field(repr=False)
-    wear: Wear
-    energy: Ledger
-    heat: float | None
-    fired: int
-    pitch: float
-    status: str
-    tolerance: float
+    @property
+    def title(self) -> str:
+        """What it is, in a line."""
+        return f"quality of {self.hammer.name} at {self.rate:g} Hz"
+
+    def notes(self) -> dict[str, Any]:
+        """Return the figures of the report, by names that end in their units."""
+        spreads = {
+            f"{name}_{measure}_{unit}": getattr(getattr(self, f"{name}_spread"), measure)
+            for name, unit in _SPREADS.items()
+            for measure in ("mean", "deviation", "low", "high", "peak_to_peak")
+        }
+        return {
+            "pattern": "".join("1" if dot else "0" for dot in self.wanted),
+            "limits": self.limits.text,
+            "dots": len(self.slot),
+            "within_limits": int((self.fault < 0).sum()),
+            "extra_contacts": int(self.extra_contacts.sum()),
+            "single_force_N": self.nominal.force,
+            "single_flight_time_s": self.nominal.flight_time,
+            **{key: value for key, value in spreads.items() if not math.isnan(value)},
+            "backstop_touches_per_dot": self.wear.touches / self.fired,
+            "backstop_largest_speed_m_per_s": self.wear.largest_speed,
+            "backstop_largest_force_N": self.wear.largest_force,
+        }
 
     @property
     def ok(self) -> bool:
@@ -161,6 +152,7 @@ class Quality:
         return bool((self.fault < 0).all())
 
     @property
+    @derived("1", "part of the wanted dots that are lost")
     def missing(self) -> float:
         """Part of the wanted dots that are lost."""
         return float(self.lost.mean())
@@ -191,6 +183,7 @@ class Quality:
         return spread_of(self.arrival_deviation * self.rate * self.pitch)
 
     @property
+    @derived("1", "whether arrivals vary as little as dot matrix printing bears", name="dot_matrix_tolerance")
     def dot_matrix(self) -> bool:
         """Whether no dot is lost and arrivals vary by 200 us at most, what dot matrix printing bears.
 
@@ -199,6 +192,7 @@ class Quality:
         return self._within(DOT_MATRIX_SPREAD)
 
     @property
+    @derived("1", "whether arrivals vary as little as engraved characters bear", name="engraved_tolerance")
     def engraved(self) -> bool:
         """Whether no dot is lost and arrivals vary by 30 us at most, what engraved characters bear."""
         return self._within(ENGRAVED_SPREAD)
@@ -209,40 +203,34 @@ class Quality:
         return bool(known and self.arrival_spread.peak_to_peak <= peak_to_peak)
 
     @property
+    @derived("N s", "change of momentum at the backstop for each firing", name="backstop_impulse_per_dot_N_s")
     def backstop_impulse(self) -> float:
         """Change of momentum at the backstop for each firing, N s: wear."""
         return self.wear.impulse / self.fired
 
     @property
+    @derived("J", "energy that the backstop takes for each firing", name="backstop_loss_per_dot_J")
     def backstop_loss(self) -> float:
         """Energy that the backstop takes for each firing, J: wear."""
         return self.wear.loss / self.fired
 
     @property
+    @derived("J", "net work of the drive for each firing", name="work_per_dot_J")
     def work(self) -> float:
         """Net work of the drive for each firing, J."""
         return (self.energy.coil_work + self.energy.drive_work) / self.fired
 
     @property
+    @derived("W", "net work of the drive over the duration of all slots", name="mean_power_W")
     def mean_power(self) -> float:
         """Net work of the drive over the duration of all slots, W."""
         return self.work * self.fired * self.rate / len(self.wanted)
 
     @property
+    @derived("W", "heat of the coil over the duration of all slots", name="mean_heat_W")
     def mean_heat(self) -> float | None:
         """Heat of the coil over the duration of all slots, W; None without `coil.resistance`."""
         return None if self.heat is None else self.heat * self.rate / len(self.wanted)
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the dots as a Dataset over `dot`, with units, provenance and all figures as attributes."""
-        from printhammer.printing.rates.quality_tables import quality_dataset
-
-        return quality_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw force and arrival of the dots; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.printing.quality").plot(self, **options)
 
 
 def quality(
@@ -333,17 +321,7 @@ def quality(
 
 
 def pattern_of(given: str | int | npt.ArrayLike) -> npt.NDArray[np.bool_]:
-    """Read a pattern of slots.
-
-    Parameters
-    ----------
-    given : str, int or bool array
-        As for `quality`.
-
-    Returns
-    -------
-    bool array, shape (slots,)
-        Where a dot is wanted.
+    """Read a pattern as `quality` takes it: where dots are wanted, slot by slot.
 
     Raises
     ------
@@ -384,15 +362,7 @@ def spread_of(values: FloatArray) -> Spread:
 
 
 def dot_table(dots: Sequence[Dot], times: FloatArray) -> DotTable:
-    """Return the dots of one motion as the table that an ensemble gives of one member.
-
-    Parameters
-    ----------
-    dots : sequence of Dot
-        What the firings up to the end of the run did.
-    times : array, shape (firings,)
-        All firing times, s.
-    """
+    """Return the dots of a motion with its firing times, s, as the table that an ensemble has of a member."""
 
     def column(name: str) -> FloatArray:
         values = [getattr(dot, name) for dot in dots]

@@ -11,8 +11,7 @@ hammer settles, so that below that every dot is a single pulse from rest.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from importlib import import_module
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -25,19 +24,22 @@ from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.slots import LEAD_IN, SLOTS, cycle_with_lead_in, eight_slot_patterns, slots_of
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case, attempt
+from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import SinglePulse
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.printing.dots.trial import Trial
     from printhammer.support.arrays import FloatArray
+
+    BoolArray = npt.NDArray[np.bool_]
+    IntArray = npt.NDArray[np.int64]
 
 FIRST: Final = 100.0
 """First rate of the grid, Hz."""
@@ -51,7 +53,7 @@ STEP: Final = 5.0
 MOST_RATES: Final = 10_000
 """Number of rates above which a grid is refused."""
 
-_TOGETHER: Final = 16
+_AT_ONCE: Final = 16
 
 
 @dataclass(frozen=True)
@@ -101,88 +103,65 @@ class Failure:
         return f"At {self.rate:g} Hz the last dot {where} {what}."
 
 
-@dataclass(frozen=True)
-class SafeRate:
-    """How fast a hammer prints any pattern well.
+class SafeRate(Result):
+    """How fast a hammer prints any pattern well."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        What is driven.
-    strategy : str
-        How, in words.
-    limits : Limits
-        How far a dot may be off.
-    nominal : SinglePulse
-        The single-pulse dot by which the others are judged.
-    rate : float
-        The safe rate, Hz; NaN where not even the first rate passes.
-    failure : Failure or None
-        What is wrong first at the next rate; None where the grid ends before.
-    rates : array, shape (R,)
-        Rates that were run, Hz.
-    passed : bool array, shape (R,)
-        Which of them pass.
-    force_low, force_high : array, shape (R,)
-        Least and largest deviation of the force of any dot, in parts of the single-pulse force; NaN where no
-        dot is printed.
-    arrival_low, arrival_high : array, shape (R,)
-        Likewise of the arrival, s.
-    lost, extra_contacts : int array, shape (R,)
-        Number of lost dots and of extra contacts.
-    cycle_run : bool array, shape (R,)
-        Whether the cycle was run; it is not where a pattern does not pass.
-    peak_drive : float
-        Largest absolute value of the drives at the safe rate, A, or N of a force; NaN where there is none.
-    step : float
-        Of the grid, Hz.
-    tolerance : float
-        Of the integration.
-    """
+    hammer: Hammer = part("what is driven")
+    strategy: str = scalar("", "how, in words")
+    limits: Limits = part("how far a dot may be off")
+    nominal: SinglePulse = part("the single-pulse dot by which the others are judged")
+    rate: float = scalar(
+        "Hz", "the safe rate", more="NaN where not even the first rate passes", name="safe_rate"
+    )
+    failure: Failure | None = part(
+        "what is wrong first at the next rate", more="None where the grid ends before"
+    )
+    rates: FloatArray = coordinate("Hz", "slots per second", "rate", more="those that were run", name="rate")
+    passed: BoolArray = column("1", "whether all dots are within limits", "rate", dtype=np.int8)
+    force_low: FloatArray = column(
+        "1",
+        "least deviation of a force from that of the single pulse",
+        "rate",
+        more="in parts of the latter; NaN where no dot is printed, as in all three that follow",
+    )
+    force_high: FloatArray = column("1", "largest deviation of a force from that of the single pulse", "rate")
+    arrival_low: FloatArray = column("s", "earliest arrival, less slot time and nominal flight time", "rate")
+    arrival_high: FloatArray = column("s", "latest arrival, less slot time and nominal flight time", "rate")
+    lost: IntArray = column("1", "number of lost dots", "rate", dtype=np.int32)
+    extra_contacts: IntArray = column("1", "number of extra contacts", "rate", dtype=np.int32)
+    cycle_run: BoolArray = column(
+        "1",
+        "whether the cycle was run after the patterns from rest",
+        "rate",
+        more="it is not where one of these does not pass",
+        dtype=np.int8,
+    )
+    peak_drive: float = scalar(
+        "A",
+        "largest absolute value of the drives at the safe rate",
+        more="N of a force; NaN where there is no safe rate",
+    )
+    step: float = scalar("Hz", "step of the grid")
+    tolerance: float = part("error allowed in one step of the integration")
 
-    hammer: Hammer
-    strategy: str
-    limits: Limits
-    nominal: SinglePulse
-    rate: float
-    failure: Failure | None
-    rates: FloatArray = field(repr=False)
-    passed: npt.NDArray[np.bool_] = field(repr=False)
-    force_low: FloatArray = field(repr=False)
-    force_high: FloatArray = field(repr=False)
-    arrival_low: FloatArray = field(repr=False)
-    arrival_high: FloatArray = field(repr=False)
-    lost: npt.NDArray[np.int64] = field(repr=False)
-    extra_contacts: npt.NDArray[np.int64] = field(repr=False)
-    cycle_run: npt.NDArray[np.bool_] = field(repr=False)
-    peak_drive: float
-    step: float
-    tolerance: float
+    @property
+    def title(self) -> str:
+        """What it is, in a line."""
+        return f"safe rate of {self.hammer.name}"
 
     @property
     def at_least(self) -> bool:
         """Whether all rates of the grid pass, so that the safe rate may be higher."""
         return self.failure is None
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the rates as a Dataset over `rate`, with units and provenance in the attributes."""
-        from printhammer.printing.rates.quality_tables import safe_rate_dataset
-
-        return safe_rate_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the deviations against the rate; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.printing.quality").plot_safe_rate(self, **options)
-
-
-class _Row(NamedTuple):
-    passed: bool
-    force: tuple[float, float]
-    arrival: tuple[float, float]
-    lost: int
-    extra_contacts: int
-    cycle_run: bool
+    def notes(self) -> dict[str, Any]:
+        """Return the limits, what fails first and the single pulse."""
+        return {
+            "limits": self.limits.text,
+            "first_failure": "" if self.failure is None else self.failure.text,
+            "single_force": self.nominal.force,
+            "single_flight_time": self.nominal.flight_time,
+        }
 
 
 def safe_rate(
@@ -244,11 +223,11 @@ def safe_rate(
     patterns = from_rest(every=strategy is not open_loop)
     around_it = [slots_of(cycle_with_lead_in())]
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
-    rows: list[_Row] = []
+    rows: list[dict[str, Any]] = []
     failure: Failure | None = None
-    safe, best = math.nan, None
-    for begin in range(0, len(grid), _TOGETHER):
-        cases = [Case(hammer, single, rate) for rate in grid[begin : begin + _TOGETHER].tolist()]
+    safe, best = math.nan, list[_Runs]()
+    for begin in range(0, len(grid), _AT_ONCE):
+        cases = [Case(hammer, single, rate) for rate in grid[begin : begin + _AT_ONCE].tolist()]
         trial = attempt(cases, patterns, strategy, **options)
         good = np.flatnonzero(trial.passed)
         if stop and failure is None and not trial.passed.all():
@@ -257,18 +236,18 @@ def safe_rate(
         if cycle and good.size:
             around = attempt([cases[k] for k in good], around_it, strategy, judged_from=LEAD_IN, **options)
         for k, case in enumerate(cases):
-            place = int(np.searchsorted(good, k))
-            run = around if around is not None and place < good.size and good[place] == k else None
-            row = _row(trial, k, run, place)
-            rows.append(row)
-            if failure is None and row.passed:
-                safe, best = case.rate, (trial, k, run, place)
+            runs = [_Runs(trial, k)]
+            if around is not None and k in good:
+                runs.append(_Runs(around, int(np.searchsorted(good, k))))
+            rows.append(_row(runs))
+            if failure is None and rows[-1]["passed"]:
+                safe, best = case.rate, runs
             elif failure is None:
-                failure = _failure(trial, k) if run is None else _failure(run, place, in_cycle=True)
+                failure = _failure(*runs[-1], in_cycle=len(runs) > 1)
                 if stop:
                     break
         if progress is not None:
-            progress(float(grid[min(len(rows), len(grid)) - 1]))
+            progress(float(grid[len(rows) - 1]))
         if stop and failure is not None:
             break
     return SafeRate(
@@ -279,18 +258,13 @@ def safe_rate(
         rate=safe,
         failure=failure,
         rates=grid[: len(rows)],
-        passed=np.array([row.passed for row in rows]),
-        force_low=np.array([row.force[0] for row in rows]),
-        force_high=np.array([row.force[1] for row in rows]),
-        arrival_low=np.array([row.arrival[0] for row in rows]),
-        arrival_high=np.array([row.arrival[1] for row in rows]),
-        lost=np.array([row.lost for row in rows]),
-        extra_contacts=np.array([row.extra_contacts for row in rows]),
-        cycle_run=np.array([row.cycle_run for row in rows]),
         # Dear where pulses overlap, so only of the rate that is found.
-        peak_drive=math.nan if best is None else _peak(*best),
+        peak_drive=max(
+            (drive.peak for runs in best for drive in runs.trial.drives[runs.rows]), default=math.nan
+        ),
         step=read_positive(step, "Hz", "step"),
         tolerance=tolerance,
+        **{name: np.array([row[name] for row in rows]) for name in rows[0]},
     )
 
 
@@ -314,6 +288,12 @@ def rate_grid(first: float | str, last: float | str, step: float | str) -> Float
     return np.array([low + apart * number for number in range(count)])
 
 
+def grid_notes(grid: FloatArray) -> dict[str, float]:
+    """Return what the attributes of a Dataset say of a grid of rates, Hz."""
+    step = float(grid[1] - grid[0]) if len(grid) > 1 else 0.0
+    return {"first_rate": float(grid[0]), "last_rate": float(grid[-1]), "step": step}
+
+
 def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     """Return the patterns of eight slots, by the numbers of the slots at which dots are wanted.
 
@@ -327,49 +307,52 @@ def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     return [slots for slots in found if every or slots[0] == 0]
 
 
-def _members(trial: Trial, case: int) -> slice:
-    count = len(trial.patterns)
-    return slice(case * count, (case + 1) * count)
+class _Runs(NamedTuple):
+    """The runs of one case of a trial."""
+
+    trial: Trial
+    case: int
+
+    @property
+    def rows(self) -> slice:
+        """Their places among all runs of the trial."""
+        count = len(self.trial.patterns)
+        return slice(self.case * count, (self.case + 1) * count)
 
 
-def _row(trial: Trial, case: int, around: Trial | None, place: int) -> _Row:
-    parts = [(trial, _members(trial, case))]
-    if around is not None:
-        parts.append((around, _members(around, place)))
-    passed = all(bool(one.judgement.passed[rows].all()) for one, rows in parts)
+def _row(parts: Sequence[_Runs]) -> dict[str, Any]:
+    """Return what a safe rate tells of one rate, by the names of its fields."""
 
-    def ends(name: str) -> tuple[float, float]:
-        values = np.concatenate([getattr(one.judgement, name)[rows].ravel() for one, rows in parts])
+    def joined(name: str) -> npt.NDArray[Any]:
+        return np.concatenate([getattr(part.trial.judgement, name)[part.rows].ravel() for part in parts])
+
+    row: dict[str, Any] = {
+        "passed": bool(joined("passed").all()),
+        "lost": int(joined("lost").sum()),
+        "extra_contacts": int(joined("extra_contacts").sum()),
+        "cycle_run": len(parts) > 1,
+    }
+    for name in ("force", "arrival"):
+        values = joined(f"{name}_deviation")
         known = values[~np.isnan(values)]
-        return (float(known.min()), float(known.max())) if known.size else (math.nan, math.nan)
-
-    def total(name: str) -> int:
-        return sum(int(getattr(one.judgement, name)[rows].sum()) for one, rows in parts)
-
-    force, arrival = ends("force_deviation"), ends("arrival_deviation")
-    return _Row(passed, force, arrival, total("lost"), total("extra_contacts"), around is not None)
+        row[f"{name}_low"], row[f"{name}_high"] = (
+            (float(known.min()), float(known.max())) if known.size else (math.nan, math.nan)
+        )
+    return row
 
 
-def _peak(trial: Trial, case: int, around: Trial | None, place: int) -> float:
-    drives = list(trial.drives[_members(trial, case)])
-    if around is not None:
-        drives += around.drives[_members(around, place)]
-    return max(drive.peak for drive in drives)
-
-
-def _failure(trial: Trial, case: int, *, in_cycle: bool = False) -> Failure:
+def _failure(trial: Trial, case: int, *, in_cycle: bool) -> Failure:
     """Return the failure that comes in the earliest slot, of several that of the first pattern."""
-    rows = _members(trial, case)
-    faults, slots = trial.judgement.faults[rows], trial.slots[rows]
+    rows, judgement = _Runs(trial, case).rows, trial.judgement
+    faults, slots = judgement.faults[rows], trial.slots[rows]
     wrong = faults >= 0
     row, dot = np.unravel_index(int(np.argmin(np.where(wrong, slots, np.iinfo(np.int64).max))), slots.shape)
-    slot, judgement = int(slots[row, dot]), trial.judgement
-    member = rows.start + int(row)
+    slot, fault, member = int(slots[row, dot]), FAULTS[faults[row, dot]], rows.start + int(row)
     deviation = {
         "force": judgement.force_deviation,
         "arrival": judgement.arrival_deviation,
         "extra contacts": judgement.extra_contacts,
-    }.get(FAULTS[faults[row, dot]])
+    }.get(fault)
     since = slot - SLOTS + 1 if in_cycle else 0
     wanted = set(trial.patterns[int(row)])
     return Failure(
@@ -377,7 +360,7 @@ def _failure(trial: Trial, case: int, *, in_cycle: bool = False) -> Failure:
         pattern="".join("1" if number in wanted else "0" for number in range(since, slot + 1)),
         in_cycle=in_cycle,
         slot=slot - LEAD_IN if in_cycle else slot,
-        fault=FAULTS[faults[row, dot]],
+        fault=fault,
         deviation=math.nan if deviation is None else float(deviation[member, dot]),
         share=float(wrong.sum() / judgement.wanted[rows].sum() if in_cycle else wrong.any(axis=1).mean()),
     )

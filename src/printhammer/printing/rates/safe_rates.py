@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
-_TOGETHER: Final = 32
+_AT_ONCE: Final = 32
 
 
 def all_pass(
@@ -34,23 +34,16 @@ def all_pass(
     tolerance: float,
     threads: int | None = None,
 ) -> npt.NDArray[np.bool_]:
-    """Return whether all patterns from rest, and the cycle, are within limits, for each case.
+    """Return whether all patterns from rest, and the cycle, are within limits, for each hammer at a rate.
 
-    Parameters
-    ----------
-    cases : sequence of Case
-        Hammers and rates.
-    strategy : Strategy, optional
-        How the hammers are driven.
-    limits, tolerance, threads
-        As for `printhammer.printing.dots.trial.attempt`.
+    Arguments as for `printhammer.printing.dots.trial.attempt`.
     """
     options: dict[str, Any] = {"limits": limits, "tolerance": tolerance, "threads": threads}
     patterns = from_rest(every=strategy is not open_loop)
     cycle = [slots_of(cycle_with_lead_in())]
     found = np.zeros(len(cases), dtype=np.bool_)
-    for begin in range(0, len(cases), _TOGETHER):
-        some = cases[begin : begin + _TOGETHER]
+    for begin in range(0, len(cases), _AT_ONCE):
+        some = cases[begin : begin + _AT_ONCE]
         found[begin : begin + len(some)] = attempt(some, patterns, strategy, **options).passed
     left = np.flatnonzero(found)
     if left.size:
@@ -70,22 +63,10 @@ def safe_rates(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> FloatArray:
-    """Return the safe rates of some hammers, Hz.
+    """Return the safe rates of some hammers on a grid of ascending rates, Hz; arguments as for `all_pass`.
 
-    Parameters
-    ----------
-    hammers : sequence of Hammer
-        What is driven.
-    singles : sequence of SinglePulse
-        The single-pulse dots by which they are judged.
-    grid : array
-        Rates, Hz, ascending.
-    strategy : Strategy, optional
-        How they are driven.
-    limits, tolerance, threads
-        As for `printhammer.printing.dots.trial.attempt`.
-    progress : callable, optional
-        Called with the number of hammers whose rate is found and of all.
+    Each hammer is judged by its own one of `singles`; `progress` is told the number of hammers whose rate is
+    found, and of all.
 
     Returns
     -------

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
@@ -18,20 +16,22 @@ from printhammer.printing.dots.nominal import nominal, rate_of, single_pulses
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case
 from printhammer.printing.rates.perturbation import changed
-from printhammer.printing.rates.safe_rate import FIRST, LAST, rate_grid
+from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_grid
 from printhammer.printing.rates.safe_rates import all_pass, safe_rates
+from printhammer.results import Result, column, derived, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
+
+    BoolArray = npt.NDArray[np.bool_]
 
 SPREAD: Final = 0.01
 """Relative spread of a constant, to either side, unless told otherwise."""
@@ -50,60 +50,74 @@ FIXED: Final = ("backstop.position", "platen")
 """Constants that have no spread unless it is stated: the origin, and one that enters no force."""
 
 
-@dataclass(frozen=True)
-class ToleranceYield:
-    """Random hammers, and which of them print well: arrays of shape (N,), one entry for each hammer.
+class ToleranceYield(Result):
+    """Random hammers, and which of them print well."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The design.
-    strategy : str
-        How they are driven, in words.
-    limits : Limits
-        How far a dot may be off.
-    rate : float
-        Rate at which they are tried, Hz; NaN where their safe rates were looked for.
-    spreads : mapping
-        Relative spread of each constant that varies, to either side.
-    factors : array, shape (N, constants)
-        Constants of the hammers over those of the design, by the order of `spreads`; for the front of the
-        pack, of the distance from the backstop.
-    judged_by : str
-        "own": by the single-pulse dot of each hammer; "design": by that of the design.
-    status : str array
-        "ok", "no hammer" where the constants make none, "does not rest", "makes no dot".
-    single_force, single_flight_time : array
-        Of the single-pulse dots, N and s; NaN where there is none.
-    passed : bool array
-        Which print every pattern within limits at `rate`; where there is none, at the first rate of the grid.
-    safe_rates : array
-        Their safe rates, Hz; NaN where not even the first rate passes, or where they were not looked for.
-    grid : array
-        Rates that were tried, Hz.
-    seed : int
-        Of the draw.
-    tolerance : float
-        Of the integration.
-    """
-
-    hammer: Hammer
-    strategy: str
-    limits: Limits
-    rate: float
-    spreads: Mapping[str, float]
-    factors: FloatArray = field(repr=False)
-    judged_by: Judged
-    status: npt.NDArray[np.str_] = field(repr=False)
-    single_force: FloatArray = field(repr=False)
-    single_flight_time: FloatArray = field(repr=False)
-    passed: npt.NDArray[np.bool_] = field(repr=False)
-    safe_rates: FloatArray = field(repr=False)
-    grid: FloatArray = field(repr=False)
-    seed: int
-    tolerance: float
+    hammer: Hammer = part("the design")
+    strategy: str = scalar("", "how the hammers are driven, in words")
+    limits: Limits = part("how far a dot may be off")
+    rate: float = part("rate at which they are tried, Hz", more="NaN where their safe rates were looked for")
+    spreads: Mapping[str, float] = part("relative spread of each constant that varies, to either side")
+    factors: FloatArray = column(
+        "1",
+        "constant over that of the design; of the front, its distance",
+        "member constant",
+        more="in the order of `spreads`; the distance of the front is that from the backstop",
+        name="factor",
+    )
+    judged_by: Judged = scalar("", '"own" or "design"', more="whose single-pulse dot is the measure")
+    status: npt.NDArray[np.str_] = column(
+        "1",
+        "what became of the hammer",
+        "member",
+        more='"ok", "no hammer" where the constants make none, "does not rest", "makes no dot"',
+    )
+    single_force: FloatArray = column(
+        "N", "force of the single-pulse dot", "member", more="NaN where there is none"
+    )
+    single_flight_time: FloatArray = column(
+        "s", "flight time of the single-pulse dot", "member", more="NaN where there is none"
+    )
+    passed: BoolArray = column(
+        "1",
+        "whether every pattern is within limits",
+        "member",
+        more="at `rate`, or where there is none at the first rate of the grid",
+        dtype=np.int8,
+    )
+    safe_rates: FloatArray = column(
+        "Hz",
+        "safe rate",
+        "member",
+        more="NaN where not even the first rate passes, or where it was not looked for",
+        name="safe_rate",
+    )
+    grid: FloatArray = part("rates that were tried, Hz", repr=False)
+    seed: int = scalar("1", "seed of the draw")
+    tolerance: float = part("error allowed in one step of the integration")
 
     @property
+    def title(self) -> str:
+        """What it is, in a line."""
+        return f"tolerance yield of {self.hammer.name}"
+
+    def notes(self) -> dict[str, Any]:
+        """Return limits, spreads and the grid of rates, and the rate where there is one."""
+        return {
+            "limits": self.limits.text,
+            "spreads": dict(self.spreads),
+            "rate": None if math.isnan(self.rate) else self.rate,
+            **grid_notes(self.grid),
+        }
+
+    @property
+    @derived("", "what varies", "constant", kind="coordinate")
+    def constant(self) -> list[str]:
+        """Names of the constants that vary."""
+        return list(self.spreads)
+
+    @property
+    @derived("1", "part of the hammers that pass")
     def share(self) -> float:
         """Part of the hammers that pass; those that are none or make no dot do not."""
         return float(self.passed.mean())
@@ -119,17 +133,6 @@ class ToleranceYield:
     def share_at(self, rate: float) -> float:
         """Return the part of the hammers whose safe rate is a rate, Hz, or more."""
         return float((self.safe_rates >= rate).mean())
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the hammers as a Dataset over `member`, with units and provenance in the attributes."""
-        from printhammer.printing.rates.study_tables import yield_dataset
-
-        return yield_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the distribution of safe rates, or which hammers pass; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.printing.tolerance").plot(self, **options)
 
 
 def tolerance_yield(
@@ -201,6 +204,7 @@ def tolerance_yield(
         raise InputError(f"judged_by = {judged_by!r}, expected one of {', '.join(get_args(Judged))}")
     grid = rate_grid(first, last, step) if rate is None else np.array([rate_of(rate)])
     bounds = Limits() if limits is None else limits
+    options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     spread = spreads_of(hammer, spreads)
     design = nominal(hammer, tolerance=tolerance)
     factors = draw(spread, count, int(seed))
@@ -222,20 +226,11 @@ def tolerance_yield(
     judges = [design] * len(left) if judged_by == "design" else singles
     passed, rates = np.zeros(count, dtype=np.bool_), np.full(count, np.nan)
     if rate is None:
-        rates[left] = safe_rates(
-            hammers,
-            judges,
-            grid,
-            strategy,
-            limits=bounds,
-            tolerance=tolerance,
-            threads=threads,
-            progress=progress,
-        )
+        rates[left] = safe_rates(hammers, judges, grid, strategy, progress=progress, **options)
         passed = ~np.isnan(rates)
     elif left.size:
         cases = [Case(one, judge, float(grid[0])) for one, judge in zip(hammers, judges, strict=True)]
-        passed[left] = all_pass(cases, strategy, limits=bounds, tolerance=tolerance, threads=threads)
+        passed[left] = all_pass(cases, strategy, **options)
         if progress is not None:
             progress(count, count)
     return ToleranceYield(
@@ -285,16 +280,7 @@ def spreads_of(hammer: Hammer, given: float | Mapping[str, float]) -> dict[str, 
 
 
 def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
-    """Draw factors on constants, evenly within their spreads.
-
-    Parameters
-    ----------
-    spreads : mapping
-        Relative spread to either side, by constant.
-    number : int
-        Number of draws.
-    seed : int
-        Of the scrambling.
+    """Draw factors on constants, evenly within their spreads to either side.
 
     Returns
     -------

@@ -1,0 +1,184 @@
+"""Columns of variational equations carried along a run: the one way from a problem to their kernel.
+
+In a second pass over the record of a run, so that runs which do not ask for derivatives pay nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.kernel.compile.variational import variational
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, SPRING
+from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
+from printhammer.kernel.variational.layout import (
+    BACKSTOP_MOVES,
+    ENERGY,
+    FIELD_MOVES,
+    GROWN,
+    MIDDLE,
+    PACK_MOVES,
+    ROWS,
+    SMOOTH,
+    SPACING,
+    VARIED,
+    WORK_ROWS,
+    Forcing,
+    work_width,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from printhammer.run.problem import Problem, Record, Stretch
+    from printhammer.support.arrays import FloatArray
+
+_VALUE_SPACING: Final = 1e-3
+"""Share of the largest pulse by which a drive is moved to see what it does to the force."""
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Columns along a run, at times that are called marks.
+
+    Attributes
+    ----------
+    states : array, shape (m, 4)
+        Displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks.
+    changes : array, shape (m, 3 or 7, n)
+        Changes at the marks: displacement, m; velocity, m/s; latest local maximum, m; with constants also
+        work of coil and of a drive force, loss in pack and backstop, J, since the first mark.
+    growth : array, shape (m, n)
+        Logarithms of the growth of columns that were kept orthonormal, each since the mark before.
+    passed : array, shape (q, 2, 3 or 7, n)
+        The changes at chosen nodes of the record, before and after the switch there.
+    columns : array, shape (3 or 7, n)
+        The changes at the last mark.
+    smooth : bool
+        Whether the motion is differentiable from the first mark to the last.
+    status : int
+        Code of how the run ended.
+    """
+
+    states: FloatArray
+    changes: FloatArray
+    growth: FloatArray
+    passed: FloatArray
+    columns: FloatArray
+    smooth: bool
+    status: int
+
+    @property
+    def status_name(self) -> str:
+        """Name of the status."""
+        return STATUS_NAMES[self.status]
+
+
+def carry_columns(
+    problem: Problem,
+    stretches: Iterable[Stretch | Record],
+    marks: FloatArray,
+    initial: FloatArray,
+    forcing: tuple[Any, ...] | None = None,
+    *,
+    nodes: Sequence[int] = (),
+    renormalise: bool = False,
+) -> Flow:
+    """Carry columns along a run, from the first mark to the last.
+
+    Parameters
+    ----------
+    problem : Problem
+        The run.
+    stretches : iterable of Stretch or Record
+        Its record.
+    marks : array, shape (m,)
+        Ascending times, s.
+    initial : array, shape (3, n)
+        Changes of displacement, m, velocity, m/s, and latest local maximum, m, at the first mark.
+    forcing : tuple, optional
+        Of constants, see `forcing_of`; without it what changes is the state at the first mark alone.
+    nodes : sequence of int, optional
+        Ascending numbers of nodes at which to look as well, of a record in one piece.
+    renormalise : bool, optional
+        Whether to keep the columns orthonormal and to note their growth.
+
+    Returns
+    -------
+    Flow
+        NaN where the run did not get.
+    """
+    forced, count = forcing is not None, initial.shape[1]
+    rows = ROWS if forced else ENERGY
+    kernel = variational(problem.kernel, forced=forced)
+    drive = problem.drive_arrays()
+    states = np.full((len(marks), 4), np.nan)
+    changes = np.full((len(marks), rows, count), np.nan)
+    growth = np.full((len(marks), count), np.nan)
+    passed = np.full((len(nodes), 2, rows, count), np.nan)
+    columns, work = np.zeros((rows, count)), np.zeros((WORK_ROWS, work_width(count, forced)))
+    track = np.zeros(GROWN + count)
+    track[SMOOTH] = 1.0
+    status = PAUSED
+    for stretch in stretches:
+        status = stretch.status
+        kernel.flow(
+            stretch.nodes,
+            drive,
+            problem.constants,
+            problem.scales,
+            problem.bounds,
+            forcing or _NOTHING,
+            np.ascontiguousarray(marks, np.float64),
+            np.asarray(nodes, dtype=np.int64),
+            renormalise,
+            status != PAUSED,
+            np.ascontiguousarray(initial, np.float64),
+            columns,
+            work,
+            track,
+            states,
+            changes,
+            growth,
+            passed,
+        )
+    return Flow(states, changes, growth, passed, columns, bool(track[SMOOTH]), status)
+
+
+_NOTHING: Final = tuple(
+    Forcing(
+        varied=np.zeros((0, VARIED, 0)),
+        moves=np.zeros((0, 0)),
+        of_hammer=np.zeros(0, np.int64),
+        fire_moves=np.zeros((0, 0)),
+        piece_moves=np.zeros((0, 0, 0)),
+        live_moves=np.zeros((0, 0)),
+        memories=np.zeros((0, VARIED)),
+        value_spacing=0.0,
+    )
+)
+
+
+def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, ...]:
+    """Return what the kernel needs of the changes of "hammer", "firings" and "pieces" with n constants."""
+    moves = changes["hammer"]
+    count = len(moves)
+    away = SPACING * (np.arange(VARIED) - MIDDLE)
+    field = moves[:, SPRING:PACK].any(axis=1) | moves[:, MAGNET:].any(axis=1)
+    pack = moves[:, PACK:BACKSTOP_PART].any(axis=1) | (moves[:, FRONT] != 0.0)
+    backstop = moves[:, BACKSTOP_PART:MAGNET].any(axis=1)
+    laws = FIELD_MOVES * field + PACK_MOVES * pack + BACKSTOP_MOVES * backstop
+    return tuple(
+        Forcing(
+            varied=problem.constants + away[:, np.newaxis] * moves[:, np.newaxis, :],
+            moves=moves,
+            of_hammer=np.asarray(laws, dtype=np.int64),
+            fire_moves=changes["firings"],
+            piece_moves=changes["pieces"],
+            live_moves=np.zeros((count, 5 * problem.firings.size)),
+            memories=np.zeros((count, VARIED)),
+            value_spacing=_VALUE_SPACING * (problem.drive.largest_pulse or 1.0),
+        )
+    )

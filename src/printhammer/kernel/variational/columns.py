@@ -1,0 +1,164 @@
+"""The variational equations between two switches, integrated together with the motion by DOP853.
+
+A column (dx, dv, dp, ...), see `printhammer.kernel.variational.layout`, is a change of the motion, all at one
+time. Off the backstop
+
+    d(dx)/dt = dv,    d(dv)/dt = a_x dx + a_v dv + a_p dp + a_c,    dp constant,
+
+and in the backstop, with w = sqrt(b - x) and dt = 2 w ds,
+
+    d(dx)/ds = 2 w dv,    d(dv)/ds = -a_w dx + 2 w a_v dv + 2 w a_c,
+
+which is smooth where a_x = -a_w / (2 w) is not. The forcing a_c is there for changes with constants only; of
+changes with the initial state, all that has to do with it is left out when the kernel is compiled. The
+derivation is in docs/tangent.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.methods.dop853_tableau import FULL_A as A
+from printhammer.kernel.methods.dop853_tableau import FULL_B as B
+from printhammer.kernel.methods.dop853_tableau import STAGES
+from printhammer.kernel.model.layout import INVERSE_MASS, POSITION
+from printhammer.kernel.model.modes import BACKSTOP, LOADING, RELOADING, UNLOADING
+from printhammer.kernel.variational.layout import (
+    ENERGY,
+    FIRST_COLUMN,
+    MEMORIES,
+    PEAK,
+    STAGE,
+    START,
+    STATE,
+    TIME,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.forces import acceleration, backstop_acceleration
+    from printhammer.kernel.model.laws import CHANGING, FORCED, HAS_BACKSTOP, HAS_PACK, MEMORY
+    from printhammer.kernel.model.pulses import drive_value
+    from printhammer.kernel.variational.forcing import add_forcing
+    from printhammer.kernel.variational.layout import Setting
+    from printhammer.kernel.variational.slopes import contact_slopes, field_slope, memory_slope, pack_slopes
+
+LONGEST_PHASE = 0.75
+"""Largest phase in one step of the oscillation that a change of the state makes."""
+
+
+@compiled
+def force_slopes(
+    y: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
+) -> tuple[float, float, float, float, float, float]:
+    """Return the slopes of the forces at `y`: displacement or w, velocity, time.
+
+    `peaks` is what the unloading branch needs of local maxima about `peak`, as `note_memories` has it.
+
+    Returns
+    -------
+    tuple of float
+        Of magnet and spring force with displacement; of the push of the contact that is closed with
+        displacement, velocity and latest local maximum; of what of it is lost for good, with displacement and
+        velocity. In the backstop those with displacement are times 2 w, but for the first.
+    """
+    scales, bounds, hammer, drive, _forcing = setting
+    value = drive_value(y[TIME], drive)
+    if HAS_BACKSTOP and mode == BACKSTOP:
+        w = y[0]
+        with_w, with_v, lost_w, lost_v = contact_slopes(w, y[1], scales, hammer)
+        field = field_slope(hammer[POSITION] - w * w, value, scales, bounds, hammer)
+        return field, -with_w, with_v, 0.0, -lost_w, lost_v
+    field = field_slope(y[0], value, scales, bounds, hammer)
+    push_x, push_v, push_peak = 0.0, 0.0, 0.0
+    if HAS_PACK and mode in (LOADING, UNLOADING, RELOADING):
+        push_x, push_v = pack_slopes(y[0], y[1], mode, memory, peak, scales, hammer)
+        if MEMORY and mode != LOADING:
+            push_peak = memory_slope(y[0], y[1], peak, peaks, hammer)
+    return field, push_x, push_v, push_peak, push_x, push_v
+
+
+@compiled
+def column_rates(
+    rates: Any, y: Any, columns: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
+) -> None:
+    """Fill `rates` with those of displacement or w, velocity, time and columns at `y`."""
+    hammer, drive = setting.hammer, setting.drive
+    v = y[1]
+    if HAS_BACKSTOP and mode == BACKSTOP:
+        pace = 2.0 * y[0]
+        rates[0] = -v
+        rates[1] = pace * backstop_acceleration(y[TIME], y[0], v, hammer, drive)
+    else:
+        pace = 1.0
+        rates[0] = v
+        rates[1] = acceleration(y[TIME], y[0], v, mode, memory, hammer, drive)
+    rates[TIME] = pace
+    slopes = force_slopes(y, mode, memory, peak, peaks, setting)
+    by_x = (pace * slopes[0] + slopes[1]) * hammer[INVERSE_MASS]
+    by_v = pace * slopes[2] * hammer[INVERSE_MASS]
+    by_peak = slopes[3] * hammer[INVERSE_MASS]
+    for k in range(columns.shape[1]):
+        j = FIRST_COLUMN + CHANGING * k
+        rates[j] = pace * y[j + 1]
+        rates[j + 1] = by_x * y[j] + by_v * y[j + 1] + by_peak * columns[PEAK, k]
+    if FORCED:
+        add_forcing(rates, y, columns, mode, memory, slopes, setting)
+
+
+@compiled
+def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Setting) -> float:
+    """Return the longest step from row START of `work` that follows a change of the state closely.
+
+    The run's own steps follow the state: near rest, where that hardly moves, they are longer.
+    """
+    slopes = force_slopes(work[START], mode, memory, peak, work[MEMORIES], setting)
+    pace = 2.0 * work[START, 0] if mode == BACKSTOP else 1.0
+    by_x = (pace * slopes[0] + slopes[1]) * setting.hammer[INVERSE_MASS]
+    by_v = pace * slopes[2] * setting.hammer[INVERSE_MASS]
+    rate = max(math.sqrt(abs(pace * by_x)), abs(by_v))
+    return LONGEST_PHASE / rate if rate > 0.0 else math.inf
+
+
+@compiled
+def column_step(
+    length: float, columns: Any, work: Any, mode: int, memory: float, peak: float, setting: Setting
+) -> None:
+    """Take one step of `length` (s, or of the variable s in the backstop) from row START of `work`."""
+    count = FIRST_COLUMN + CHANGING * columns.shape[1]
+    start, y, peaks = work[START], work[STAGE], work[MEMORIES]
+    for stage in range(STAGES):
+        for i in range(count):
+            y[i] = start[i]
+        for j in range(stage):
+            share = length * A[stage, j]
+            for i in range(count):
+                y[i] += share * work[j, i]
+        column_rates(work[stage], y, columns, mode, memory, peak, peaks, setting)
+    for j in range(STAGES):
+        share = length * B[j]
+        for i in range(count):
+            start[i] += share * work[j, i]
+
+
+@compiled
+def take_in(work: Any, columns: Any) -> None:
+    """Put what of the columns changes between switches in row START of `work`."""
+    for k in range(columns.shape[1]):
+        j = FIRST_COLUMN + CHANGING * k
+        for i in range(STATE):
+            work[START, j + i] = columns[i, k]
+        for i in range(CHANGING - STATE):
+            work[START, j + STATE + i] = columns[ENERGY + i, k]
+
+
+@compiled
+def bring_back(work: Any, columns: Any) -> None:
+    """Take it out of there."""
+    for k in range(columns.shape[1]):
+        j = FIRST_COLUMN + CHANGING * k
+        for i in range(STATE):
+            columns[i, k] = work[START, j + i]
+        for i in range(CHANGING - STATE):
+            columns[ENERGY + i, k] = work[START, j + STATE + i]

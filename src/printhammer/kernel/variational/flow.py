@@ -1,0 +1,210 @@
+"""Columns of a variational equation carried along a recorded run, in a second pass over its nodes.
+
+A run that does not ask for them pays nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, entry
+from printhammer.kernel.model.layout import POSITION, Train
+from printhammer.kernel.model.modes import BACKSTOP, RELOADING, UNLOADING
+from printhammer.kernel.variational.layout import DUE, GROWN, PEAK, SMOOTH, START, STATE, Forcing, Setting
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.forces import Hammer
+    from printhammer.kernel.model.laws import FORCED, HAS_PACK, MEMORY
+    from printhammer.kernel.model.pulses import edges_at, pass_edges
+    from printhammer.kernel.single.resample import branch_of
+    from printhammer.kernel.variational.forcing import set_live_moves
+    from printhammer.kernel.variational.steps import begin_step, carry
+    from printhammer.kernel.variational.switches import pass_moving_edges, pass_node
+
+
+@compiled
+def copy_columns(columns: Any, out: Any) -> None:
+    """Put columns elsewhere."""
+    for i in range(columns.shape[0]):
+        for k in range(columns.shape[1]):
+            out[i, k] = columns[i, k]
+
+
+@compiled
+def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
+    """Make the columns orthogonal and of length one, in units of `scales`; add what was taken to `grown`.
+
+    Gram-Schmidt; a column of which nothing is left is replaced and counts as shrunk without bound.
+    """
+    for k in range(columns.shape[1]):
+        columns[0, k] /= scales[0]
+        columns[1, k] /= scales[1]
+        columns[2, k] /= scales[0]
+        for j in range(k):
+            shared = 0.0
+            for i in range(3):
+                shared += columns[i, j] * columns[i, k]
+            for i in range(3):
+                columns[i, k] -= shared * columns[i, j]
+        length = math.sqrt(columns[0, k] ** 2 + columns[1, k] ** 2 + columns[2, k] ** 2)
+        if length > 0.0:
+            grown[k] += math.log(length)
+            for i in range(3):
+                columns[i, k] /= length
+        else:
+            grown[k] = -math.inf
+            # Across the column before it, or along x.
+            columns[0, k] = -columns[1, k - 1] if k > 0 else 1.0
+            columns[1, k] = columns[0, k - 1] if k > 0 else 0.0
+            columns[2, k] = 0.0
+    for k in range(columns.shape[1]):
+        columns[0, k] *= scales[0]
+        columns[1, k] *= scales[1]
+        columns[2, k] *= scales[0]
+
+
+@compiled
+def note_mark(
+    states: Any,
+    seen: Any,
+    growth: Any,
+    track: Any,
+    node: Any,
+    initial: Any,
+    columns: Any,
+    work: Any,
+    hammer: Hammer,
+) -> None:
+    """Enter state, columns and their growth at a mark; at the first mark the columns begin."""
+    mode = int(node[3])
+    row = int(track[DUE])
+    remembers = HAS_PACK and MEMORY and branch_of(mode) in (UNLOADING, RELOADING)
+    place = work[START, 0]
+    states[row, 0] = hammer[POSITION] - place * place if mode == BACKSTOP else place
+    states[row, 1], states[row, 2] = work[START, 1], mode
+    states[row, 3] = node[4] if remembers else 0.0
+    for k in range(columns.shape[1]):
+        if row == 0:
+            for i in range(columns.shape[0]):
+                columns[i, k] = initial[i, k] if i < STATE or (i == PEAK and remembers) else 0.0
+            track[GROWN + k] = 0.0
+        growth[row, k] = track[GROWN + k]
+        track[GROWN + k] = 0.0
+    copy_columns(columns, seen[row])
+    track[DUE] += 1.0
+
+
+@compiled
+def scale_or_note(factor: float, renormalise: bool, columns: Any, scales: Any, grown: Any) -> None:
+    """Put a factor, given by its logarithm, back into the columns, or note it with their growth."""
+    if renormalise:
+        for k in range(columns.shape[1]):
+            grown[k] += factor
+        orthonormalise(columns, scales, grown)
+    elif factor != 0.0:
+        for k in range(columns.shape[1]):
+            for i in range(3):
+                columns[i, k] *= math.exp(factor)
+
+
+@entry
+def flow(
+    nodes: Any,
+    train: Any,
+    hammer: Hammer,
+    scales: Any,
+    bounds: Any,
+    forced_by: Any,
+    marks: Any,
+    wanted: Any,
+    renormalise: bool,
+    ended: bool,
+    initial: Any,
+    columns: Any,
+    work: Any,
+    track: Any,
+    states: Any,
+    seen: Any,
+    growth: Any,
+    passed: Any,
+) -> None:
+    """Carry columns along a stretch of a run, from the first mark to the last.
+
+    Without forcing a column has r = 3 rows, with it 7; see :mod:`printhammer.kernel.variational.layout`.
+
+    Parameters
+    ----------
+    nodes, train, hammer
+        As recorded and given in :func:`printhammer.kernel.single.run.run`.
+    scales : tuple of float
+        Scales of displacement and velocity.
+    bounds : tuple of float
+        As in :func:`printhammer.kernel.single.run.run`.
+    forced_by : tuple
+        A plain tuple of the fields of :class:`printhammer.kernel.variational.layout.Forcing`.
+    marks : float64 array, shape (m,)
+        Ascending times [s]; at an instant of a switch: after it.
+    wanted : int64 array, shape (q,)
+        Ascending numbers of nodes of the stretch.
+    renormalise : bool
+        Whether to make the columns orthonormal at every node and to note their growth instead.
+    ended : bool
+        Whether the run ends with the stretch; otherwise a mark at its end belongs to the next one.
+    initial : float64 array, shape (3, n)
+        Changes of displacement, velocity and latest local maximum at the first mark.
+    columns : float64 array, shape (r, n)
+        Those at the end of the stretch or at the last mark.
+    work : float64 array, shape (15, `work_width`)
+        Working space.
+    track : float64 array, shape (2 + n,)
+        Zeros, but one at place 1, before the first stretch; what is needed to go on afterwards, at place 1
+        whether the motion is differentiable so far.
+    states : float64 array, shape (m, 4)
+        Displacement, velocity, mode and latest local maximum at the marks.
+    seen, growth : float64 array, shapes (m, r, n) and (m, n)
+        The columns at the marks, and the logarithms of their growth since the mark before.
+    passed : float64 array, shape (q, 2, r, n)
+        The columns at the wanted nodes before the switch there and after it.
+    """
+    train = Train(*train)
+    forcing = Forcing(*forced_by)
+    setting = Setting(scales, bounds, hammer, train.live, forcing)
+    count = nodes.shape[0]
+    asked = 0
+    first, last, _edge = edges_at(nodes[0, 0], train)
+    if FORCED:
+        set_live_moves(first, last, train, forcing)
+    grown = track[GROWN:]
+    for i in range(count):
+        due = int(track[DUE])
+        if due == marks.size:
+            return
+        node = nodes[i]
+        after = nodes[min(i + 1, count - 1)]
+        final = i + 1 == count
+        t_end = after[0]
+        if FORCED and due > 0:
+            pass_moving_edges(node, train, first, last, columns, setting)
+        first, last, _edge = pass_edges(node[0], train, first, last)
+        if FORCED:
+            set_live_moves(first, last, train, forcing)
+        begin_step(node, work)
+        # A mark at the time of several nodes belongs to the last of them.
+        while due < marks.size and (marks[due] < t_end or (final and ended and marks[due] == t_end)):
+            factor = carry(marks[due], node, after, columns, work, setting)
+            scale_or_note(factor, renormalise, columns, scales, grown)
+            note_mark(states, seen, growth, track, node, initial, columns, work, hammer)
+            due += 1
+        if due in (0, marks.size) or final:
+            continue
+        factor = carry(t_end, node, after, columns, work, setting)
+        asked_now = asked < wanted.size and wanted[asked] == i + 1
+        if asked_now:
+            copy_columns(columns, passed[asked, 0])
+        if not pass_node(node, after, columns, setting):
+            track[SMOOTH] = 0.0
+        if asked_now:
+            copy_columns(columns, passed[asked, 1])
+            asked += 1
+        scale_or_note(factor, renormalise, columns, scales, grown)

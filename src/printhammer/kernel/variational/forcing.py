@@ -1,0 +1,274 @@
+"""What constants do to the forces, at a fixed state and time: the forcing term of the variational equations.
+
+The slope a_c of the acceleration with a constant is added to the rate of dv, and each energy grows by the
+change of its power. In the backstop the force is a function of w = sqrt(b - x), whose change is that of place
+and position, 2 w dw = db - dx; in the pack one of the depth. The derivation is in docs/tangent.md. Constants
+are changed where the laws read them, in the array of the hammer's constants, so that a part need not state
+what its constants do.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    END,
+    FRONT,
+    INVERSE_MASS,
+    MAGNET,
+    PACK,
+    POSITION,
+    SPRING,
+    Train,
+)
+from printhammer.kernel.model.modes import BACKSTOP, LOADING, RELOADING, UNLOADING
+from printhammer.kernel.model.pulses import LIVE_WIDTH
+from printhammer.kernel.variational.layout import (
+    BACKSTOP_LOSS,
+    BACKSTOP_MOVES,
+    COIL,
+    DELAYED,
+    DRIVE,
+    ENERGY,
+    FIELD_MOVES,
+    FIRST_COLUMN,
+    MIDDLE,
+    PACK_LOSS,
+    PACK_MOVES,
+    PEAK,
+    SPACING,
+    STATE,
+    TIME,
+    VARIED,
+)
+from printhammer.kernel.variational.slopes import BACKWARD, CENTRAL, FORWARD, OFFSETS, POINTS, WEIGHTS
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.forces import Hammer, pack_force
+    from printhammer.kernel.model.laws import (
+        BACKSTOP_PULLS,
+        CHANGING,
+        FORCE_DRIVE,
+        HAS_BACKSTOP,
+        HAS_PACK,
+        PACK_PULLS,
+        backstop_elastic,
+        backstop_energy,
+        backstop_rebound,
+        backstop_switch,
+        backstop_viscous,
+        magnet_force,
+        pack_memory,
+        pack_switch,
+        spring_force,
+    )
+    from printhammer.kernel.model.pulses import Drive, drive_value, piece_change, piece_rate
+    from printhammer.kernel.variational.layout import Forcing, Setting
+    from printhammer.kernel.variational.slopes import field_slope
+
+
+@compiled
+def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> None:
+    """Rewrite the changes of the pieces under way, in the order in which `pass_edges` has them."""
+    fire_moves, piece_moves, live_moves = forcing.fire_moves, forcing.piece_moves, forcing.live_moves
+    for k in range(fire_moves.shape[0]):
+        j = 0
+        for p in range(first, last):
+            piece = train.under_way[p]
+            if train.pieces[piece, 1] == END:
+                continue
+            live_moves[k, j] = fire_moves[k, p] + piece_moves[k, piece, 0]
+            for i in range(4):
+                live_moves[k, j + 1 + i] = piece_moves[k, piece, 2 + i]
+            j += DELAYED
+
+
+@compiled
+def drive_change(t: float, drive: Drive, delayed: Any) -> float:
+    """Return the change of the drive [A or N] at a fixed time; `delayed` is a row of `live_moves`."""
+    total = 0.0
+    i, j = 1, 0
+    for _ in range(int(drive[0])):
+        s = (t - drive[i]) - drive[i + 1]
+        total += piece_change(drive, i + 2, s, delayed, j + 1)
+        total -= piece_rate(drive, i + 2, s) * delayed[j]
+        i += LIVE_WIDTH
+        j += DELAYED
+    return total
+
+
+@compiled
+def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forcing: Forcing) -> float:
+    """Return the slope of magnet and drive force with the drive: N/A, or 1 for a drive that is a force."""
+    if drive[0] == 0.0:
+        return 0.0
+    if FORCE_DRIVE:
+        return 1.0
+    # One-sided where a measured table ends.
+    spacing = forcing.value_spacing
+    for turn in range(3):
+        side = (CENTRAL + turn) % 3
+        total = 0.0
+        for i in range(POINTS[side]):
+            total += WEIGHTS[side, i] * magnet_force(hammer[MAGNET:], x, value + OFFSETS[side, i] * spacing)
+        if not math.isnan(total):
+            return float(total / spacing)
+    return math.nan
+
+
+@compiled
+def field_changes(
+    t: float, x: float, value: float, with_value: float, k: int, drive: Drive, forcing: Forcing
+) -> tuple[float, float, float]:
+    """Return the changes [N] of magnet, spring and drive force, and of their parts from coil and drive force.
+
+    `with_value` is the slope of the force with the `value` of the drive.
+    """
+    varied, of_hammer, live_moves = forcing.varied, forcing.of_hammer, forcing.live_moves
+    pulse = with_value * drive_change(t, drive, live_moves[k]) if drive[0] > 0.0 else 0.0
+    total, coil = 0.0, 0.0
+    current = 0.0 if FORCE_DRIVE else value
+    if of_hammer[k] & FIELD_MOVES:
+        for i in range(POINTS[CENTRAL]):
+            other = varied[k, MIDDLE + int(OFFSETS[CENTRAL, i])]
+            magnet = magnet_force(other[MAGNET:], x, current)
+            total += WEIGHTS[CENTRAL, i] * (magnet + spring_force(other[SPRING:PACK], x))
+            if current != 0.0:
+                coil += WEIGHTS[CENTRAL, i] * (magnet - magnet_force(other[MAGNET:], x, 0.0))
+    total, coil = total / SPACING + pulse, coil / SPACING
+    return (total, coil, pulse) if FORCE_DRIVE else (total, coil + pulse, 0.0)
+
+
+@compiled
+def note_changed_memories(peak: float, forcing: Forcing) -> None:
+    """Keep what the unloading branch needs of `peak` [m], at a fixed depth."""
+    varied, moves, of_hammer, memories = forcing.varied, forcing.moves, forcing.of_hammer, forcing.memories
+    for k in range(of_hammer.size):
+        if of_hammer[k] & PACK_MOVES:
+            for j in range(VARIED):
+                at = peak + (j - MIDDLE) * SPACING * moves[k, FRONT]
+                memories[k, j] = pack_memory(varied[k, j][PACK:BACKSTOP_PART], at)
+
+
+@compiled
+def pack_change(x: float, v: float, mode: int, k: int, forcing: Forcing) -> float:
+    """Return the change [N] of the force of the pack at a fixed depth."""
+    varied, moves, of_hammer, memories = forcing.varied, forcing.moves, forcing.of_hammer, forcing.memories
+    if not of_hammer[k] & PACK_MOVES:
+        return 0.0
+    front = moves[k, FRONT]
+    side = CENTRAL
+    if not PACK_PULLS and mode == LOADING:
+        ahead, behind = varied[k, MIDDLE + 2], varied[k, MIDDLE - 2]
+        if pack_switch(ahead[PACK:BACKSTOP_PART], x + 2.0 * SPACING * front, v) <= 0.0:
+            side = BACKWARD
+        elif pack_switch(behind[PACK:BACKSTOP_PART], x - 2.0 * SPACING * front, v) <= 0.0:
+            side = FORWARD
+    total = 0.0
+    for i in range(POINTS[side]):
+        away = OFFSETS[side, i]
+        j = MIDDLE + int(away)
+        at = x + away * SPACING * front
+        total += WEIGHTS[side, i] * pack_force(at, v, mode, memories[k, j], varied[k, j])
+    return float(total / SPACING)
+
+
+@compiled
+def contact_changes(w: float, v: float, k: int, forcing: Forcing) -> tuple[float, float]:
+    """Return the changes [N] of the force of the backstop and of its viscous part, at a fixed compression."""
+    varied, of_hammer = forcing.varied, forcing.of_hammer
+    if not of_hammer[k] & BACKSTOP_MOVES:
+        return 0.0, 0.0
+    side = CENTRAL
+    if not BACKSTOP_PULLS:
+        if backstop_switch(varied[k, MIDDLE + 2][BACKSTOP_PART:MAGNET], w, v) <= 0.0:
+            side = BACKWARD
+        elif backstop_switch(varied[k, MIDDLE - 2][BACKSTOP_PART:MAGNET], w, v) <= 0.0:
+            side = FORWARD
+    elastic, viscous = 0.0, 0.0
+    for i in range(POINTS[side]):
+        c = varied[k, MIDDLE + int(OFFSETS[side, i])][BACKSTOP_PART:MAGNET]
+        elastic += WEIGHTS[side, i] * backstop_elastic(c, w)
+        viscous += WEIGHTS[side, i] * backstop_viscous(c, w, v)
+    return (elastic + viscous) / SPACING, viscous / SPACING
+
+
+@compiled
+def rebound_change(v_in: float, k: int, forcing: Forcing) -> float:
+    """Return the change [m/s] of the velocity after an impact on a rigid backstop."""
+    varied, of_hammer = forcing.varied, forcing.of_hammer
+    change = 0.0
+    if of_hammer[k] & BACKSTOP_MOVES:
+        for i in range(POINTS[CENTRAL]):
+            c = varied[k, MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
+            change += WEIGHTS[CENTRAL, i] * backstop_rebound(c, v_in)
+    return float(change / SPACING)
+
+
+@compiled
+def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing) -> float:
+    """Return the change of the energy [J] stored in the backstop at place `x`, which changes by `dx`."""
+    varied, moves, of_hammer = forcing.varied, forcing.moves, forcing.of_hammer
+    w = math.sqrt(max(hammer[POSITION] - x, 0.0))
+    change = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) * (moves[k, POSITION] - dx)
+    if of_hammer[k] & BACKSTOP_MOVES:
+        for i in range(POINTS[CENTRAL]):
+            c = varied[k, MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
+            change += WEIGHTS[CENTRAL, i] * backstop_energy(c, w) / SPACING
+    return float(change)
+
+
+@compiled
+def add_forcing(
+    rates: Any, y: Any, columns: Any, mode: int, memory: float, slopes: Any, setting: Setting
+) -> None:
+    """Add what constants do to the `rates` of the columns at `y`, and fill in those of the energies.
+
+    `slopes` are those of `printhammer.kernel.variational.columns.force_slopes` there.
+    """
+    scales, bounds, hammer, drive, forcing = setting
+    moves = forcing.moves
+    field_x, push_x, _push_v, push_peak, loss_x, loss_v = slopes
+    v, t, pace = y[1], y[TIME], rates[TIME]
+    compressed = HAS_BACKSTOP and mode == BACKSTOP
+    indented = HAS_PACK and mode in (LOADING, UNLOADING, RELOADING)
+    w = y[0] if compressed else 0.0
+    x = hammer[POSITION] - w * w if compressed else y[0]
+    value = drive_value(t, drive)
+    with_value = force_with_value(x, value, hammer, drive, forcing)
+    coil, coil_x = 0.0, 0.0
+    if not FORCE_DRIVE and value != 0.0:
+        coil = magnet_force(hammer[MAGNET:], x, value) - magnet_force(hammer[MAGNET:], x, 0.0)
+        coil_x = field_x - field_slope(x, 0.0, scales, bounds, hammer)
+    loss = 0.0
+    if compressed:
+        loss = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v)
+    elif indented:
+        loss = pack_force(x, v, mode, memory, hammer)
+    for k in range(columns.shape[1]):
+        j = FIRST_COLUMN + CHANGING * k
+        dx, dv = y[j], y[j + 1]
+        change, coil_change, drive_part = field_changes(t, x, value, with_value, k, drive, forcing)
+        surface, push, lost = 0.0, 0.0, 0.0
+        if compressed:
+            surface = moves[k, POSITION]
+            push, lost = contact_changes(w, v, k, forcing)
+        elif indented:
+            surface = moves[k, FRONT]
+            # A pack gives nothing back: its whole push is loss.
+            push = pack_change(x, v, mode, k, forcing)
+            lost = push
+        change = pace * (change + push) - (push_x + push_peak) * surface
+        rates[j + 1] += change * hammer[INVERSE_MASS]
+        rates[j + 1] += rates[1] * moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
+        lost = pace * (lost + loss_v * dv) + loss_x * (dx - surface)
+        lost += push_peak * (columns[PEAK, k] - surface)
+        e = j + STATE - ENERGY
+        rates[e + COIL] = pace * ((coil_change + coil_x * dx) * v + coil * dv)
+        rates[e + DRIVE] = pace * (drive_part * v + value * dv) if FORCE_DRIVE else 0.0
+        power = -lost * v - pace * loss * dv
+        rates[e + PACK_LOSS] = power if indented else 0.0
+        rates[e + BACKSTOP_LOSS] = power if compressed else 0.0

@@ -1,0 +1,95 @@
+"""Where things lie in a column of a variational equation and in the working space that carries columns.
+
+A column is the change of the motion, all at one time, per unit of an initial change or of a constant: of the
+`STATE` components of the state, displacement [m] and velocity [m/s]; of the latest local maximum in the pack
+[m], which changes at switches only; and, where constants force the equation, of the energies [J] that coil
+and drive force have given and pack and backstop have taken.
+"""
+
+from typing import Any, NamedTuple
+
+from printhammer.kernel.methods.dop853_tableau import STAGES
+
+STATE = 2
+"""Components of the state: displacement and velocity."""
+PEAK = STATE
+ENERGY = STATE + 1
+COIL, DRIVE, PACK_LOSS, BACKSTOP_LOSS = range(ENERGY, ENERGY + 4)
+ENERGIES = 4
+ROWS = ENERGY + ENERGIES
+"""Rows of a column; without forcing the first three."""
+
+START, STAGE, MEMORIES = STAGES, STAGES + 1, STAGES + 2
+WORK_ROWS = STAGES + 3
+"""Rows of the working space: slopes of the stages, state at the start, state at a stage, memories."""
+TIME = STATE
+"""Place of the time in a row of the working space, after displacement or w and velocity."""
+FIRST_COLUMN = TIME + 1
+"""Place there of the first column."""
+
+# Places in `track`.
+DUE = 0
+"""Number of the next mark."""
+SMOOTH = 1
+"""Whether the map is differentiable so far, 1 or 0."""
+GROWN = 2
+"""From here on: logarithms of growth since the latest mark."""
+
+# Forcing: each constant changes the array of the hammer's constants, the firing times and the waveforms.
+SPACING = 1e-3
+"""Share of a constant, or of its scale, by which it is changed to see what it does."""
+MIDDLE = 4
+"""Row of `varied` with the constants as they are."""
+VARIED = 9
+"""Rows of `varied`: row 4 + j holds the constants with j times `SPACING` of the change."""
+FIELD_MOVES, PACK_MOVES, BACKSTOP_MOVES = 1, 2, 4
+"""Bits of `of_hammer`: which laws a column changes; mass and position of the backstop are no law's."""
+DELAYED = 5
+"""Numbers kept for each pulse under way: delay of its piece, changes of p0 to p3."""
+
+
+class Forcing(NamedTuple):
+    """What n constants change, and working space for it; no columns where nothing forces the equations.
+
+    Attributes
+    ----------
+    varied, moves : float64 arrays, shapes (n, 9, h) and (n, h)
+        The hammer's constants moved by -4 to 4 times `SPACING` of their changes, and the changes.
+    of_hammer : int64 array, shape (n,)
+        Which laws a column changes, a sum of bits.
+    fire_moves, piece_moves : float64 arrays, shapes (n, f) and (n, m, 6)
+        Changes of the firing times [s] and of the waveforms' tables.
+    live_moves, memories : float64 arrays, shapes (n, 5 f) and (n, 9)
+        Working space.
+    value_spacing : float
+        By how much the drive is moved to see what it does to the force [A or N].
+    """
+
+    varied: Any
+    moves: Any
+    of_hammer: Any
+    fire_moves: Any
+    piece_moves: Any
+    live_moves: Any
+    memories: Any
+    value_spacing: float
+
+
+class Setting(NamedTuple):
+    """What stays the same along a run."""
+
+    scales: Any
+    bounds: Any
+    hammer: Any
+    drive: Any
+    forcing: Forcing
+
+
+def changing(forced: bool) -> int:
+    """Return the number of rows of a column that change between switches."""
+    return STATE + (ENERGIES if forced else 0)
+
+
+def work_width(columns: int, forced: bool) -> int:
+    """Return the length of the rows of the working space; `MEMORIES` needs five places."""
+    return max(FIRST_COLUMN + changing(forced) * columns, 5)

@@ -1,0 +1,201 @@
+"""Slopes of the force laws, by differences of fourth order that stay on one side of every kink.
+
+A part need not state its derivatives. In the middle of a law's range the five-point formula is central, at
+an end of the range, at a surface and beside a kink it is one-sided. The spacings below make the truncation
+and the rounding about equally small, some 1e-12 of the slope. M. Abramowitz and I. A. Stegun, *Handbook of
+Mathematical Functions* (1964), table 25.2.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, SPRING
+from printhammer.kernel.model.modes import LOADING
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.forces import Hammer, pack_force
+    from printhammer.kernel.model.laws import (
+        BACKSTOP_PULLS,
+        FORCE_DRIVE,
+        FORCED,
+        MEMORY,
+        PACK_PULLS,
+        backstop_elastic,
+        backstop_switch,
+        backstop_viscous,
+        magnet_force,
+        pack_memory,
+        pack_switch,
+        pack_unloading,
+        spring_force,
+    )
+
+FIELD_SPACING = 2e-4
+"""Of the scale of displacement."""
+NEAR_END = 1e-3
+"""Of the distance from an end of the range, which may be a pole of the law."""
+DEPTH_SPACING = 3e-4
+"""Of the depth in the pack, of whose high powers the law may consist."""
+LEAST_DEPTH_SPACING = 1e-7
+"""Of the scale of displacement."""
+ROOT_SPACING = 1e-3
+"""Of w in the backstop, or of a hundredth of the root of the scale of displacement."""
+SPEED_SPACING = 1e-3
+"""Of the scale of velocity."""
+
+BACKWARD, CENTRAL, FORWARD = 0, 1, 2
+OFFSETS = np.array([[0.0, -1.0, -2.0, -3.0, -4.0], [-2.0, -1.0, 1.0, 2.0, 0.0], [0.0, 1.0, 2.0, 3.0, 4.0]])
+WEIGHTS = (
+    np.array([[25.0, -48.0, 36.0, -16.0, 3.0], [1.0, -8.0, 8.0, -1.0, 0.0], [-25.0, 48.0, -36.0, 16.0, -3.0]])
+    / 12.0
+)
+POINTS = np.array([5, 4, 5])
+
+
+@inlined
+def field_at(x: float, value: float, hammer: Hammer) -> float:
+    """Return the sum of magnet and spring force [N] while the drive has the value `value`."""
+    current = 0.0 if FORCE_DRIVE else value
+    return magnet_force(hammer[MAGNET:], x, current) + spring_force(hammer[SPRING:PACK], x)
+
+
+@compiled
+def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer) -> float:
+    """Return the slope [N/m] of the sum of magnet and spring force.
+
+    `scales` are those of displacement and velocity; `bounds` begins with the ends of the range of the laws.
+    """
+    to_end = min(x - bounds[0], bounds[1] - x)
+    spacing = min(FIELD_SPACING * scales[0], NEAR_END * max(to_end, NEAR_END * scales[0]))
+    # As the arithmetic has it, so that the points lie where the formula takes them to be.
+    spacing = (x + spacing) - x
+    side = CENTRAL
+    if x - 2.0 * spacing < bounds[0]:
+        side = FORWARD
+    elif x + 2.0 * spacing > bounds[1]:
+        side = BACKWARD
+    total = 0.0
+    for k in range(POINTS[side]):
+        total += WEIGHTS[side, k] * field_at(x + OFFSETS[side, k] * spacing, value, hammer)
+    return float(total / spacing)
+
+
+@compiled
+def pack_slopes(
+    x: float, v: float, mode: int, memory: float, peak: float, scales: Any, hammer: Hammer
+) -> tuple[float, float]:
+    """Return the slopes of the pack force with displacement [N/m] and velocity [N s/m].
+
+    On an unloading branch, with its local maximum `peak`, nothing beyond that is looked at: the branch goes
+    with so high a power of the depth that in a shallow contact it would hide what is within.
+    """
+    front = hammer[FRONT]
+    x = max(x, front)
+    least = LEAST_DEPTH_SPACING * scales[0]
+    if MEMORY and mode != LOADING:
+        least = min(least, DEPTH_SPACING * (peak - front))
+    spacing = max(DEPTH_SPACING * (x - front), least)
+    spacing = (x + spacing) - x
+    if spacing == 0.0:
+        return 0.0, 0.0
+    side = CENTRAL if x - front >= 2.0 * spacing else FORWARD
+    if not PACK_PULLS and mode == LOADING and side == CENTRAL:
+        c = hammer[PACK:BACKSTOP_PART]
+        if pack_switch(c, x - 2.0 * spacing, v) <= 0.0:
+            side = FORWARD
+        elif pack_switch(c, x + 2.0 * spacing, v) <= 0.0:
+            side = BACKWARD
+    with_x = 0.0
+    for k in range(POINTS[side]):
+        with_x += WEIGHTS[side, k] * pack_force(x + OFFSETS[side, k] * spacing, v, mode, memory, hammer)
+    with_x /= spacing
+    if MEMORY:
+        return with_x, 0.0
+    spacing = SPEED_SPACING * scales[1]
+    side = CENTRAL
+    if not PACK_PULLS and mode == LOADING:
+        c = hammer[PACK:BACKSTOP_PART]
+        if pack_switch(c, x, v - 2.0 * spacing) <= 0.0:
+            side = FORWARD
+        elif pack_switch(c, x, v + 2.0 * spacing) <= 0.0:
+            side = BACKWARD
+    with_v = 0.0
+    for k in range(POINTS[side]):
+        with_v += WEIGHTS[side, k] * pack_force(x, v + OFFSETS[side, k] * spacing, mode, memory, hammer)
+    return with_x, with_v / spacing
+
+
+@inlined
+def peak_spacing(peak: float, hammer: Hammer) -> float:
+    """Return by how much a local maximum is moved to see what the unloading branch makes of it [m]."""
+    return float((peak + DEPTH_SPACING * (peak - hammer[FRONT])) - peak)
+
+
+@compiled
+def note_memories(memories: Any, peak: float, hammer: Hammer) -> None:
+    """Fill `memories`, five places, with what the unloading branch needs of local maxima about `peak` [m]."""
+    spacing = peak_spacing(peak, hammer)
+    for k in range(5):
+        memories[k] = pack_memory(hammer[PACK:BACKSTOP_PART], peak + OFFSETS[CENTRAL, k] * spacing)
+
+
+@compiled
+def memory_slope(x: float, v: float, peak: float, memories: Any, hammer: Hammer) -> float:
+    """Return the slope [N/m] of the unloading branch at (`x`, `v`) with its local maximum `peak`."""
+    spacing = peak_spacing(peak, hammer)
+    if spacing == 0.0:
+        return 0.0
+    total = 0.0
+    for k in range(POINTS[CENTRAL]):
+        total += WEIGHTS[CENTRAL, k] * pack_unloading(hammer[PACK:BACKSTOP_PART], x, v, memories[k])
+    return total / spacing
+
+
+@inlined
+def contact_force(w: float, v: float, hammer: Hammer) -> float:
+    """Return the force of the backstop [N] at compression ``w**2`` [m]."""
+    c = hammer[BACKSTOP_PART:MAGNET]
+    return backstop_elastic(c, w) + backstop_viscous(c, w, v)
+
+
+@compiled
+def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[float, float, float, float]:
+    """Return the slopes of the backstop's force with w [N/m^0.5] and with velocity [N s/m].
+
+    Then, where constants force the columns, those of its viscous part.
+    """
+    c = hammer[BACKSTOP_PART:MAGNET]
+    w = max(w, 0.0)
+    spacing = ROOT_SPACING * max(w, 1e-2 * np.sqrt(scales[0]))
+    side = CENTRAL if w >= 2.0 * spacing else FORWARD
+    if not BACKSTOP_PULLS and side == CENTRAL:
+        if backstop_switch(c, w - 2.0 * spacing, v) <= 0.0:
+            side = FORWARD
+        elif backstop_switch(c, w + 2.0 * spacing, v) <= 0.0:
+            side = BACKWARD
+    with_w, viscous_w = 0.0, 0.0
+    for k in range(POINTS[side]):
+        at = w + OFFSETS[side, k] * spacing
+        with_w += WEIGHTS[side, k] * contact_force(at, v, hammer)
+        if FORCED:
+            viscous_w += WEIGHTS[side, k] * backstop_viscous(c, at, v)
+    with_w /= spacing
+    viscous_w /= spacing
+    spacing = SPEED_SPACING * scales[1]
+    side = CENTRAL
+    if not BACKSTOP_PULLS:
+        if backstop_switch(c, w, v + 2.0 * spacing) <= 0.0:
+            side = BACKWARD
+        elif backstop_switch(c, w, v - 2.0 * spacing) <= 0.0:
+            side = FORWARD
+    with_v, viscous_v = 0.0, 0.0
+    for k in range(POINTS[side]):
+        at = v + OFFSETS[side, k] * spacing
+        with_v += WEIGHTS[side, k] * contact_force(w, at, hammer)
+        if FORCED:
+            viscous_v += WEIGHTS[side, k] * backstop_viscous(c, w, at)
+    return with_w, with_v / spacing, viscous_w, viscous_v / spacing

@@ -1,0 +1,226 @@
+"""Columns carried from one node of a recorded run to the next, in motion and at rest."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model.layout import FRONT, INVERSE_MASS, POSITION
+from printhammer.kernel.model.modes import (
+    ANY_SCALES,
+    BACKSTOP,
+    BACKSTOP_RELEASED,
+    FREE,
+    HELD,
+    HELD_LOADING,
+    HELD_UNLOADING,
+    LOADING,
+    RELOADING,
+    RESTING,
+    UNLOADING,
+)
+from printhammer.kernel.variational.layout import BACKSTOP_LOSS, MEMORIES, PEAK, START, TIME
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.contact import contact_rate
+    from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.laws import FORCED, HAS_BACKSTOP, HAS_PACK, MEMORY
+    from printhammer.kernel.model.pulses import Drive, drive_value
+    from printhammer.kernel.single.resample import length_of, memory_of
+    from printhammer.kernel.variational.columns import bring_back, column_step, longest_step, take_in
+    from printhammer.kernel.variational.forcing import (
+        contact_changes,
+        field_changes,
+        force_with_value,
+        note_changed_memories,
+        pack_change,
+        stored_change,
+    )
+    from printhammer.kernel.variational.layout import Forcing, Setting
+    from printhammer.kernel.variational.slopes import contact_slopes, field_slope, note_memories, pack_slopes
+
+GRADING = 1.0 / 64.0
+"""Shortest share of a step after a touch of the pack, whose slope is not smooth there."""
+
+
+@compiled
+def begin_step(node: Any, work: Any) -> None:
+    """Put the state at a node in row START of `work`."""
+    work[START, 0] = node[4] if int(node[3]) == BACKSTOP else node[1]
+    work[START, 1] = node[2]
+    work[START, TIME] = node[0]
+
+
+@compiled
+def length_in_contact(
+    t: float, leaves: bool, t0: float, w0: float, v0: float, hammer: Hammer, drive: Drive
+) -> float:
+    """Return the s, from a state in the backstop at time `t0`, of the time `t` [s].
+
+    As `printhammer.kernel.single.resample.s_at`, but content with what the variation needs. Where it
+    `leaves` at `t`, w = 0 is solved for in the end: the time stands still there.
+    """
+    kv0 = contact_rate(w0, v0, t0, hammer, drive)
+    s, change = 0.0, math.inf
+    t1, w1, v1, kv1 = t0, w0, v0, kv0
+    for number in range(12):
+        if abs(change) <= 1e-8 * s:
+            break
+        at_the_end = leaves and number > 0 and v1 > 0.0
+        change = w1 / v1 if at_the_end else length_of(t - t1, w1, v1, kv1)
+        s += change
+        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
+    return s
+
+
+@compiled
+def place_of_rest(t: float, node: Any, k: int, setting: Setting) -> float:
+    """Return by how much a constant moves the place where the armature rests [m]."""
+    scales, bounds, hammer, drive, forcing = setting
+    x, mode, moves = node[1], int(node[3]), forcing.moves
+    if mode == RESTING:
+        return float(moves[k, POSITION])
+    value = drive_value(t, drive)
+    with_value = force_with_value(x, value, hammer, drive, forcing)
+    change, _coil, _drive = field_changes(t, x, value, with_value, k, drive, forcing)
+    if mode == HELD:
+        w = node[4]
+        with_x = -contact_slopes(w, 0.0, scales, hammer)[0] / (2.0 * w)
+        change += contact_changes(w, 0.0, k, forcing)[0] - with_x * moves[k, POSITION]
+    else:
+        with_x = pack_slopes(x, 0.0, LOADING, 0.0, x, scales, hammer)[0]
+        change += pack_change(x, 0.0, LOADING, k, forcing) - with_x * moves[k, FRONT]
+    return float(-change / (with_x + field_slope(x, value, scales, bounds, hammer)))
+
+
+@compiled
+def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
+    """Let the columns die out for `pause` [s] about a place of rest in the backstop.
+
+    The linear oscillator with the slopes of that place, in closed form. Returns the logarithm of a factor
+    taken out of the columns.
+    """
+    scales, bounds, hammer = setting.scales, setting.bounds, setting.hammer
+    x, w = node[1], node[4]
+    slopes = contact_slopes(w, 0.0, scales, hammer)
+    by_x = (field_slope(x, 0.0, scales, bounds, hammer) - slopes[0] / (2.0 * w)) * hammer[INVERSE_MASS]
+    by_v = slopes[1] * hammer[INVERSE_MASS]
+    half = 0.5 * by_v
+    under_root = half * half + by_x
+    if under_root < 0.0:
+        rate = math.sqrt(-under_root)
+        grown, even, odd = half * pause, math.cos(rate * pause), math.sin(rate * pause) / rate
+    else:
+        rate = math.sqrt(under_root)
+        grown = (half + rate) * pause
+        once = math.exp(-2.0 * rate * pause)
+        even = 0.5 * (1.0 + once)
+        odd = 0.5 * (1.0 - once) / rate if rate * pause > 1e-8 else pause
+    for k in range(columns.shape[1]):
+        dx, dv = columns[0, k], columns[1, k]
+        columns[0, k] = (even - half * odd) * dx + odd * dv
+        columns[1, k] = by_x * odd * dx + (even + half * odd) * dv
+    return float(grown)
+
+
+@compiled
+def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> float:
+    """Carry the columns through a rest from `t` to `t_to` [s]; what was before it is forgotten, or dies out.
+
+    Returns the logarithm of a factor taken out of the columns.
+    """
+    grown = 0.0
+    if int(node[3]) != HELD:
+        for k in range(columns.shape[1]):
+            place = 0.0
+            if FORCED:
+                place = place_of_rest(t_to, node, k, setting)
+            columns[0, k], columns[1, k] = place, 0.0
+            columns[PEAK, k] = 0.0 if int(node[3]) == RESTING else place
+        return grown
+    if FORCED:
+        for k in range(columns.shape[1]):
+            columns[0, k] -= place_of_rest(t, node, k, setting)
+    grown = settle(t_to - t, node, columns, setting)
+    if FORCED:
+        for k in range(columns.shape[1]):
+            place = place_of_rest(t, node, k, setting)
+            columns[0, k] = columns[0, k] * math.exp(grown) + place
+            columns[1, k] *= math.exp(grown)
+        return 0.0
+    return grown
+
+
+@compiled
+def set_in(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> None:
+    """Carry the columns through the step that only gets the regularised equations going."""
+    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
+    x, pause = node[1], t_to - t
+    for k in range(columns.shape[1]):
+        columns[0, k] += pause * columns[1, k]
+        if FORCED:
+            value = drive_value(t, drive)
+            with_value = force_with_value(x, value, hammer, drive, forcing)
+            change = field_changes(t, x, value, with_value, k, drive, forcing)[0] * hammer[INVERSE_MASS]
+            a = acceleration(t, x, 0.0, FREE, 0.0, hammer, drive)
+            change += a * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
+            columns[1, k] += pause * change
+
+
+@compiled
+def add_stored(sign: float, columns: Any, work: Any, hammer: Hammer, forcing: Forcing) -> None:
+    """Add to the loss in a backstop that has let go what it still stores: in closed form."""
+    for k in range(columns.shape[1]):
+        columns[BACKSTOP_LOSS, k] += sign * stored_change(work[START, 0], columns[0, k], k, hammer, forcing)
+
+
+@compiled
+def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
+    """Carry state and columns from the time in row START of `work` to `t_to` [s], in the step from `node`.
+
+    Returns the logarithm of a factor taken out of the columns.
+    """
+    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
+    t = work[START, TIME]
+    if t_to <= t:
+        return 0.0
+    mode, kept = int(node[3]), node[4]
+    if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING):
+        work[START, TIME] = t_to
+        return rest(t, t_to, node, columns, setting)
+    if HAS_BACKSTOP and mode == BACKSTOP and work[START, 0] == 0.0 and work[START, 1] == 0.0:
+        work[START, TIME] = t_to
+        set_in(t, t_to, node, columns, setting)
+        return 0.0
+    # What a backstop that has let go still stores is lost as it creeps back.
+    if FORCED and HAS_BACKSTOP and mode == BACKSTOP_RELEASED:
+        add_stored(1.0, columns, work, hammer, forcing)
+    take_in(work, columns)
+    if HAS_BACKSTOP and mode == BACKSTOP:
+        leaves = t_to == after[0] and int(after[3]) == FREE
+        length = length_in_contact(t_to, leaves, t, work[START, 0], work[START, 1], hammer, drive)
+        count = 1 + int(length / longest_step(mode, 0.0, 0.0, work, setting))
+        for _ in range(count):
+            column_step(length / count, columns, work, mode, 0.0, 0.0, setting)
+    else:
+        memory = memory_of(mode, kept, hammer)
+        if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
+            note_memories(work[MEMORIES], kept, hammer)
+            if FORCED:
+                note_changed_memories(kept, forcing)
+        longest = longest_step(mode, memory, kept, work, setting)
+        left = t_to - t
+        while left > 0.0:
+            length = min(left, longest)
+            if HAS_PACK and mode == LOADING and work[START, 1] > 0.0:
+                since = (work[START, 0] - hammer[FRONT]) / work[START, 1]
+                length = min(length, max(since, GRADING * (t_to - t)))
+            column_step(length, columns, work, mode, memory, kept, setting)
+            left = 0.0 if length == left else t_to - work[START, TIME]
+    work[START, TIME] = t_to
+    bring_back(work, columns)
+    if FORCED and HAS_BACKSTOP and mode == BACKSTOP_RELEASED:
+        add_stored(-1.0, columns, work, hammer, forcing)
+    return 0.0

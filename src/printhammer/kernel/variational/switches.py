@@ -1,0 +1,215 @@
+"""Jumps of columns at the switches of a run and at the edges of its drive: the saltation matrices.
+
+A neighbouring motion meets a switch a little earlier or later and spends that time under the other law; where
+a constant moves a surface, an edge or the law of an impact, so does it. The derivation is in docs/tangent.md.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model.layout import BACKSTOP_PART, END, FRONT, INVERSE_MASS, MAGNET, POSITION, Train
+from printhammer.kernel.model.modes import (
+    BACKSTOP,
+    FREE,
+    HELD,
+    HELD_LOADING,
+    HELD_UNLOADING,
+    LOADING,
+    RELOADING,
+    RESTING,
+    UNLOADING,
+)
+from printhammer.kernel.model.transitions import AT_FRONT, AT_PEAK, JUMPS, NO_JUMP, TURN
+from printhammer.kernel.variational.layout import BACKSTOP_LOSS, COIL, DRIVE, ENERGIES, ENERGY, PEAK
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.quadrature import powers
+    from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
+    from printhammer.kernel.model.laws import FORCE_DRIVE, FORCED, RIGID, backstop_rebound, magnet_force
+    from printhammer.kernel.model.pulses import Drive, drive_value, piece_value
+    from printhammer.kernel.single.resample import branch_of, memory_of
+    from printhammer.kernel.variational.forcing import rebound_change
+    from printhammer.kernel.variational.layout import Setting
+    from printhammer.kernel.variational.slopes import field_at
+
+SPEED_SPACING = 1e-3
+"""Share of the speed of an impact by which it is moved to see what a rebound makes of it."""
+NEAR = 1e-9
+"""Share of an indentation by which a reversal must miss the old maximum to be told from one at it."""
+
+
+@compiled
+def acceleration_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer, drive: Drive) -> float:
+    """Return the acceleration [m/s^2] at a node under the law of `mode`."""
+    if mode == BACKSTOP:
+        return backstop_acceleration(node[0], 0.0, v, hammer, drive)
+    return acceleration(node[0], node[1], v, mode, memory_of(mode, kept, hammer), hammer, drive)
+
+
+@compiled
+def powers_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer, drive: Drive) -> Any:
+    """Return the powers [W] at a node under the law of `mode`; the backstop is not compressed there."""
+    return powers(node[0], node[1], v, 0.0, mode, memory_of(mode, kept, hammer), hammer, drive)
+
+
+@compiled
+def add_energies(columns: Any, k: int, later: float, before: Any, behind: Any) -> None:
+    """Let the powers [W] `before` a switch last longer by `later` [s], and those `behind` it less long."""
+    for i in range(ENERGIES):
+        columns[ENERGY + i, k] += (before[i] - behind[i]) * later
+
+
+@compiled
+def is_rebound(node: Any, after: Any) -> bool:
+    """Tell whether two nodes are the two sides of an impact on a rigid backstop."""
+    return RIGID and node[0] == after[0] and int(node[3]) == FREE and node[2] < 0.0 and after[2] >= 0.0
+
+
+@compiled
+def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
+    """Carry the columns through an impact on a rigid backstop."""
+    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
+    c = hammer[BACKSTOP_PART:MAGNET]
+    v_in, v_out = node[2], after[2]
+    spacing = -SPEED_SPACING * v_in
+    slope = (
+        8.0 * (backstop_rebound(c, v_in + spacing) - backstop_rebound(c, v_in - spacing))
+        - (backstop_rebound(c, v_in + 2.0 * spacing) - backstop_rebound(c, v_in - 2.0 * spacing))
+    ) / (12.0 * spacing)
+    a = acceleration(node[0], node[1], v_in, FREE, 0.0, hammer, drive)
+    for k in range(columns.shape[1]):
+        if FORCED:
+            columns[0, k] -= forcing.moves[k, POSITION]
+        earlier = columns[0, k] / v_in
+        if FORCED:
+            before = powers_at(node, FREE, 0.0, v_in, hammer, drive)
+            behind = powers_at(node, FREE, 0.0, v_out, hammer, drive)
+            add_energies(columns, k, -earlier, before, behind)
+            columns[BACKSTOP_LOSS, k] += v_in * (columns[1, k] - a * earlier) / hammer[INVERSE_MASS]
+        columns[0, k] = earlier * v_out
+        columns[1, k] = slope * columns[1, k] + (1.0 - slope) * a * earlier
+        if FORCED:
+            columns[1, k] += rebound_change(v_in, k, forcing)
+            columns[BACKSTOP_LOSS, k] -= v_out * (columns[1, k] - a * earlier) / hammer[INVERSE_MASS]
+            # The energy that is lost goes with the mass.
+            lost = 0.5 * (v_in * v_in - v_out * v_out) / hammer[INVERSE_MASS]
+            columns[BACKSTOP_LOSS, k] -= lost * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
+            columns[0, k] += forcing.moves[k, POSITION]
+
+
+@compiled
+def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any, setting: Setting) -> bool:
+    """Carry the columns through a reversal inside the pack; tell whether that is differentiable.
+
+    The velocity is zero, and so are all powers.
+    """
+    hammer, drive = setting.hammer, setting.drive
+    before = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
+    behind = acceleration_at(after, following, after[4], 0.0, hammer, drive)
+    # Along the unloading curve: the old maximum is met without velocity.
+    if before == 0.0 or (mode == RELOADING and node[4] - after[1] <= NEAR * (node[4] - hammer[FRONT])):
+        return False
+    new_peak = following == UNLOADING and (mode == LOADING or after[4] != node[4])
+    for k in range(columns.shape[1]):
+        columns[1, k] *= behind / before
+        if new_peak:
+            columns[PEAK, k] = columns[0, k]
+        elif following == LOADING:
+            columns[PEAK, k] = 0.0
+    return True
+
+
+@compiled
+def pass_level(
+    node: Any, after: Any, mode: int, following: int, jump: int, columns: Any, setting: Setting
+) -> bool:
+    """Carry the columns through a touch, a leaving or the old maximum; tell whether differentiable."""
+    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
+    v = after[2]
+    if v == 0.0:
+        return False
+    before = acceleration_at(after, mode, node[4], v, hammer, drive)
+    behind = acceleration_at(after, following, after[4], v, hammer, drive)
+    for k in range(columns.shape[1]):
+        level = columns[PEAK, k] if jump == AT_PEAK else 0.0
+        if FORCED and jump != AT_PEAK:
+            level = forcing.moves[k, FRONT if jump == AT_FRONT else POSITION]
+        ahead = columns[0, k] - level
+        if FORCED:
+            powers_before = powers_at(after, mode, node[4], v, hammer, drive)
+            powers_behind = powers_at(after, following, after[4], v, hammer, drive)
+            add_energies(columns, k, -ahead / v, powers_before, powers_behind)
+        columns[1, k] += (behind - before) * ahead / v
+        columns[PEAK, k] = 0.0
+    return True
+
+
+@compiled
+def pass_node(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
+    """Carry the columns through the switch at the node `after`, if it is one; tell whether differentiable."""
+    if is_rebound(node, after):
+        pass_rebound(node, after, columns, setting)
+        return True
+    mode, following = branch_of(int(node[3])), branch_of(int(after[3]))
+    jump = JUMPS[mode, following]
+    if jump == NO_JUMP or (mode == following and node[4] == after[4]):
+        return True
+    if jump == TURN:
+        return pass_reversal(node, after, mode, following, columns, setting)
+    return pass_level(node, after, mode, following, jump, columns, setting)
+
+
+@compiled
+def value_of_piece(t: float, fired: float, piece: int, pieces: Any) -> float:
+    """Return the value [A or N] of one piece of a pulse fired at time `fired` [s]."""
+    if pieces[piece, 1] == END:
+        return 0.0
+    return piece_value(pieces[piece], 1, (t - fired) - pieces[piece, 0])
+
+
+@compiled
+def pass_edge(
+    node: Any, value: float, change: float, pulse: int, piece: int, columns: Any, setting: Setting
+) -> float:
+    """Carry the columns through one edge at which the drive jumps by `change`; return its value after it."""
+    hammer, forcing = setting.hammer, setting.forcing
+    new = value + change
+    mode = int(node[3])
+    if change == 0.0 or mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING):
+        return new
+    x, v = node[1], node[2]
+    force = field_at(x, new, hammer) - field_at(x, value, hammer) + (change if FORCE_DRIVE else 0.0)
+    for k in range(columns.shape[1]):
+        later = forcing.fire_moves[k, pulse] + forcing.piece_moves[k, piece, 0]
+        columns[1, k] -= force * hammer[INVERSE_MASS] * later
+        if FORCE_DRIVE:
+            columns[DRIVE, k] -= change * v * later
+        else:
+            old_pull = magnet_force(hammer[MAGNET:], x, value)
+            columns[COIL, k] -= (magnet_force(hammer[MAGNET:], x, new) - old_pull) * v * later
+    return new
+
+
+@compiled
+def pass_moving_edges(node: Any, train: Train, first: int, last: int, columns: Any, setting: Setting) -> None:
+    """Carry the columns through all edges of the drive at a node, which `pass_edges` has not passed yet."""
+    firings, begins, pieces, replace, under_way, live = train
+    t = node[0]
+    value = drive_value(t, live)
+    for p in range(first, last):
+        piece = under_way[p]
+        while pieces[piece, 1] != END:
+            piece += 1
+            if firings[p] + pieces[piece, 0] > t:
+                break
+            change = value_of_piece(t, firings[p], piece, pieces)
+            change -= value_of_piece(t, firings[p], piece - 1, pieces)
+            value = pass_edge(node, value, change, p, piece, columns, setting)
+    while last < firings.size and firings[last] <= t:
+        change = value_of_piece(t, firings[last], begins[last], pieces)
+        if replace:
+            change -= value
+        value = pass_edge(node, value, change, last, begins[last], columns, setting)
+        last += 1
