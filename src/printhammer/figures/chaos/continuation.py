@@ -139,11 +139,11 @@ def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, lis
 
 
 def _mark(
-    ax: Axes, found: Sequence[Branch], show: str, factors: tuple[float, float], grazings: bool
+    ax: Axes, branches: Sequence[Branch], show: str, factors: tuple[float, float], grazings: bool
 ) -> list[str]:
     """Mark what happens on the way; return which kinds there are."""
     kinds: list[str] = []
-    for branch in found:
+    for branch in branches:
         table = getattr(branch, show)
         for event in branch.events:
             if event.kind == "grazing" and not grazings:
@@ -166,12 +166,12 @@ def colour_of(firings: int) -> str:
     return _COLOURS.get(firings, style.INK)
 
 
-def _legend(ax: Axes, found: Sequence[Branch], kinds: Sequence[str]) -> None:
+def _legend(ax: Axes, branches: Sequence[Branch], kinds: Sequence[str]) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
         Line2D([], [], color=colour_of(firings), lw=style.LINE, label=f"period {firings}, stable")
-        for firings in sorted({branch.firings for branch in found})
+        for firings in sorted({branch.firings for branch in branches})
     ]
     handles.append(Line2D([], [], color=style.MUTED, lw=style.HAIR, ls=_UNSTABLE["ls"], label="unstable"))
     for kind, look in _MARKS.items():
@@ -189,7 +189,7 @@ def _legend(ax: Axes, found: Sequence[Branch], kinds: Sequence[str]) -> None:
     )
 
 
-def _remarks(found: Sequence[Branch]) -> list[str]:
+def _remarks(branches: Sequence[Branch]) -> list[str]:
     """Return what a reader must know of ends that are none of the bounds."""
     told = {
         "length": "where the number of steps was used up",
@@ -197,7 +197,7 @@ def _remarks(found: Sequence[Branch]) -> list[str]:
         "no value": "where there is no strobe map",
         "grazing": "in a grazing of the rigid backstop",
     }
-    counts = Counter(stop.reason for branch in found for stop in branch.stops if stop.reason in told)
+    counts = Counter(stop.reason for branch in branches for stop in branch.stops if stop.reason in told)
     if not counts:
         return []
     ends = ", ".join(f"{number} {told[reason]}" for reason, number in sorted(counts.items()))

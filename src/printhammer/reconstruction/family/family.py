@@ -153,7 +153,7 @@ def write_family(
 
     def accept(number: int) -> bool:
         member = _judged(found[number], hammers[number], shelf)
-        tell(f"{found[number].source}: {_told(member)}")
+        tell(f"{found[number].source}: {_described(member)}")
         if member is not None:
             members[number] = member
         return member is not None
@@ -279,7 +279,7 @@ def _judge(hammer: Hammer) -> dict[str, Any]:
     return found
 
 
-def _told(member: Member | None) -> str:
+def _described(member: Member | None) -> str:
     if member is None:
         return "no member"
     rate, onset = member.conclusions["safe_rate_Hz"], member.conclusions["chaos_onset_s"]
