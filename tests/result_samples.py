@@ -142,7 +142,6 @@ SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     "Page": page,
     "Quality": quality,
     "SafeRate": safe_rate,
-    "Strobe": lambda hammer: ph.strobe(hammer, period=0.0013, points=5, verdict=False),
     "Strobes": lambda hammer: not_none(ensemble(hammer).strobes),
     "TableReport": table_report,
     "ToleranceYield": tolerance_yield,

@@ -74,10 +74,9 @@ class Column:
             **(self.attrs or {}),
         }
 
-    @property
-    def heading(self) -> str:
-        """Heading in the table, such as "x [m]"."""
-        return heading(self.head or self.name, self.unit)
+    def heading(self, name: str) -> str:
+        """Heading in the table of the variable of some name, such as "x [m]"."""
+        return heading(self.head or name, self.unit)
 
     @property
     def sentence(self) -> str:

@@ -15,7 +15,7 @@ and arrays that are no fields, come from a class's own `entries`; further attrib
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
@@ -145,11 +145,11 @@ class Result:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the result as a table, columns such as "x [m]", codes by name; provenance in `attrs`."""
-        entries = sorted(self._named_entries(), key=lambda entry: entry[0].kind != "coordinate")
-        dims = self.ROWS or next(note.dims for note, _values in entries if note.kind == "column")
+        entries = sorted(self.entries().items(), key=lambda entry: entry[1][0].kind != "coordinate")
+        dims = self.ROWS or next(note.dims for _name, (note, _values) in entries if note.kind == "column")
         columns = {
-            note.heading: (note.dims, named_codes(np.asarray(values), note))
-            for note, values in entries
+            note.heading(name): (note.dims, named_codes(np.asarray(values), note))
+            for name, (note, values) in entries
             if note.dims and set(note.dims) <= set(dims)
         }
         return files.frame(columns, dims, files.plain(self.attributes))
@@ -177,19 +177,11 @@ class Result:
         # By name, so that physics does not depend on pictures.
         return import_module("printhammer.figures.plots").plot(self, **options)
 
-    def _named_entries(self) -> list[tuple[Column, Any]]:
-        return [(replace(note, name=name), values) for name, (note, values) in self.entries().items()]
-
     def _repr_html_(self) -> str:
         """Return what a notebook shows: title, columns, and attributes to unfold."""
         columns = [
-            (
-                note.heading,
-                " × ".join(map(str, np.shape(values))),
-                ", ".join(note.dims),
-                note.meaning,
-            )
-            for note, values in self._named_entries()
+            (note.heading(name), " × ".join(map(str, np.shape(values))), ", ".join(note.dims), note.meaning)
+            for name, (note, values) in self.entries().items()
         ]
         attributes = [(key, str(value)) for key, value in files.plain(self.attributes).items()]
         return (

@@ -13,8 +13,6 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    import xarray as xr
-
 
 def write_file(path: str | Path, content: str | bytes) -> None:
     """Write a file; text in UTF-8.
@@ -41,18 +39,6 @@ def write_file(path: str | Path, content: str | bytes) -> None:
             with suppress(OSError):
                 Path(draft).unlink()
         raise InputError(f"{target}: the file cannot be written ({error.strerror or error})") from None
-
-
-def write_dataset(path: str | Path, dataset: xr.Dataset) -> None:
-    """Write a Dataset as NetCDF, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written; what was there stays.
-    """
-    # SciPy writes the classic format, which everything reads.
-    write_file(path, bytes(dataset.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")))
 
 
 def make_folder(path: str | Path) -> Path:

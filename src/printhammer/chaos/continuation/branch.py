@@ -247,10 +247,10 @@ def branches_table(branches: Sequence[Branch], attributes: Mapping[str, Any]) ->
         }
         for name, (note, values) in entries.items():
             if note.dims == ("orbit", "firing"):
-                columns[heading(note.head or name, note.unit)] = values.reshape(-1)
+                columns[note.heading(name)] = values.reshape(-1)
         for name, (note, values) in entries.items():
             if note.dims == ("orbit",) and name != "value":
-                columns[heading(note.head or name, note.unit)] = np.repeat(values, firings)
+                columns[note.heading(name)] = np.repeat(values, firings)
         for j in range(2):
             columns[f"multiplier_{j}_real"] = np.repeat(branch.multipliers[:, j].real, firings)
             columns[f"multiplier_{j}_imag"] = np.repeat(branch.multipliers[:, j].imag, firings)

@@ -11,7 +11,6 @@ import numpy as np
 from printhammer.chaos.strobe.map import margin_of
 from printhammer.derivatives.states import follow
 from printhammer.results import Column, Result, column, derived, part
-from printhammer.results.declare import heading
 from printhammer.results.files import plain
 from printhammer.results.result import named_codes
 from printhammer.run.ensemble import MODE_NAMES
@@ -423,14 +422,14 @@ def orbits_table(found: Sequence[Orbit], attributes: Mapping[str, Any]) -> pd.Da
         for name, (note, value) in entries.items():
             if not note.dims:
                 named = note.codes[value] if note.codes else note.dtype(value) if note.dtype else value
-                columns[heading(note.head or name, note.unit)] = np.full(orbit.firings, named)
+                columns[note.heading(name)] = np.full(orbit.firings, named)
         for k, multiplier in enumerate(orbit.multipliers.tolist()):
             columns[f"multiplier_real {k + 1}"] = np.full(orbit.firings, multiplier.real)
             columns[f"multiplier_imag {k + 1}"] = np.full(orbit.firings, multiplier.imag)
         columns["firing"] = entries["firing"][1]
         for name, (note, values) in entries.items():
             if note.dims == ("firing",) and note.kind == "column":
-                columns[heading(note.head or name, note.unit)] = named_codes(values, note)
+                columns[note.heading(name)] = named_codes(values, note)
         tables.append(pd.DataFrame(columns))
     table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["orbit", "firing"])
     table.attrs.update(plain(dict(attributes)))
