@@ -45,21 +45,10 @@ def family(
 ) -> Figure:
     """Draw the constants of a family over those of a hammer, and below them the conclusions.
 
-    A dot for each member in each row.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer whose constants are 1.
-    constants : sequence of mapping
-        Of each member, key of a hammer file to value, SI, at the common gauge; of the hammer first.
-    conclusions : sequence of mapping
-        Of each member, name to value, SI, None where it has none.
-    told : mapping
-        Name of a conclusion to `title`, `unit`, `robust`, `low` and `high`, in the order in which they are
-        drawn.
-    order : str, optional
-        Conclusion by which members are coloured, light to dark, in all panels.
+    A dot for each member in each row. `constants` are those of the hammer and then of each member, by key of
+    a hammer file, SI, at the common gauge; `conclusions` those of each member by name, SI, None where it has
+    none. `told` gives of each conclusion drawn `title`, `unit`, `robust`, `low` and `high`; members are
+    coloured by the one that is the `order`, light to dark, in all panels.
     """
     from matplotlib.colors import LinearSegmentedColormap
 

@@ -6,17 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.figures.elements.map_marks import (
-    colour_bar,
-    drawable,
-    edges,
-    failures,
-    firing_lines,
-    norm_of,
-    picture,
-    scales_of,
-    sign_map,
-)
+from printhammer.figures.elements import map_marks
 from printhammer.figures.elements.style import BLUE, SMALL, new_figure, styled
 from printhammer.maps.frequency import rms_difference
 
@@ -25,22 +15,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.figures.elements.map_marks import Scales
-
 
 @styled
 def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     """Draw a computed and a measured map side by side, with the root mean square of their difference.
 
-    In the third panel, "difference" is the gid of the root mean square over time, for every rate that both
-    have; in grey areas the displacement is not known.
-
-    Parameters
-    ----------
-    computed : xarray.Dataset
-        A map from `printhammer.frequency_map`.
-    measured : xarray.Dataset
-        A map from `printhammer.maps.measured.load_measured_map`, or another computed one.
+    Maps are those of `printhammer.frequency_map` and `printhammer.maps.measured.load_measured_map`. In the
+    third panel, "difference" is the gid of the root mean square over time, for every rate that both have; in
+    grey areas the displacement is not known.
 
     Raises
     ------
@@ -48,9 +30,9 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
         A map has fewer than two times.
     """
     for chart in (computed, measured):
-        drawable(chart)
-    scales = scales_of(computed, measured)
-    norm = norm_of(scales, computed, measured)
+        map_marks.drawable(chart)
+    scales = map_marks.scales_of(computed, measured)
+    norm = map_marks.norm_of(scales, computed, measured)
     figure = new_figure(4.4, 8.6)
     grid = figure.add_gridspec(1, 4, width_ratios=(10.0, 10.0, 3.4, 0.7))
     left = figure.add_subplot(grid[0])
@@ -58,28 +40,28 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     beside = figure.add_subplot(grid[2], sharey=left)
     bar = figure.add_subplot(grid[3])
     for ax, chart, name in ((left, computed, "computed"), (right, measured, "measured")):
-        picture(ax, chart, norm, scales)
-        firing_lines(ax, chart, scales)
+        map_marks.picture(ax, chart, norm, scales)
+        map_marks.firing_lines(ax, chart, scales)
         ax.set_title(name, loc="left", fontsize=SMALL)
     for ax in (right, beside):
         ax.set_ylabel("")
         ax.tick_params(axis="y", labelleft=False)
     _limits(left, scales, computed, measured)
     remark = _difference(beside, scales, computed, measured)
-    colour_bar(bar, computed, norm, scales)
-    sign_map(figure, computed, failures(computed), remark)
+    map_marks.colour_bar(bar, computed, norm, scales)
+    map_marks.sign_map(figure, computed, map_marks.failures(computed), remark)
     return figure
 
 
-def _limits(ax: Axes, scales: Scales, *charts: xr.Dataset) -> None:
+def _limits(ax: Axes, scales: map_marks.Scales, *charts: xr.Dataset) -> None:
     """Have both pictures, which share their axes, show all of both maps."""
-    rows = [scales.rate.shown(edges(chart["rate"].values)) for chart in charts]
+    rows = [scales.rate.shown(map_marks.edges(chart["rate"].values)) for chart in charts]
     ax.set_ylim(min(row[0] for row in rows), max(row[-1] for row in rows))
     ends = [scales.time.shown(chart["time"].values[[0, -1]]) for chart in charts]
     ax.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
 
 
-def _difference(ax: Axes, scales: Scales, computed: xr.Dataset, measured: xr.Dataset) -> str:
+def _difference(ax: Axes, scales: map_marks.Scales, computed: xr.Dataset, measured: xr.Dataset) -> str:
     """Draw the root mean square of the difference against rate; say so where there is none."""
     way = scales.way
     rates, difference = rms_difference(computed, measured)

@@ -98,23 +98,9 @@ class Solution:
 
 
 def solve(law: Law, data: FloatArray, start: FloatArray, *, robust: bool = True) -> Solution:
-    """Fit a law to data.
+    """Fit a law to data, shape (m,), more than it has parameters, from parameters near enough.
 
-    Parameters
-    ----------
-    law : Law
-        The law and its derivatives.
-    data : array, shape (m,)
-        More rows than parameters.
-    start : array, shape (n,)
-        Parameters near enough to begin with.
-    robust : bool, optional
-        Whether rows that lie too far off are left out.
-
-    Returns
-    -------
-    Solution
-        The parameters with their covariance.
+    Rows that lie too far off are left out if the fit is to be robust.
     """
     m, n = len(data), len(start)
     used = np.ones(m, dtype=bool)
@@ -190,21 +176,10 @@ def _solution(
 
 
 def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the covariance HC2 of a linear regression, and its degrees of freedom.
+    """Return the covariance HC2 of a linear regression, shape (n, n), and its degrees of freedom, shape (n,).
 
-    Parameters
-    ----------
-    rows : array, shape (m, n)
-        Weighted Jacobian.
-    errors : array, shape (m,)
-        Weighted residuals.
-
-    Returns
-    -------
-    covariance : array, shape (n, n)
-        Of the parameters.
-    freedoms : array, shape (n,)
-        For the Student's t of each parameter, those of Bell and McCaffrey.
+    Of the weighted Jacobian, shape (m, n), and the weighted residuals. The freedoms are for the Student's t
+    of each parameter, those of Bell and McCaffrey.
     """
     m, n = rows.shape
     length = _lengths(rows)

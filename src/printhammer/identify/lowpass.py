@@ -26,23 +26,10 @@ def time_constant(bandwidth: float | None) -> float:
 
 
 def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) -> FloatArray:
-    """Return what the sensor shows of a motion that was at rest until the first time.
+    """Return what the sensor shows of motions that were at rest until the first time, shape (n, columns).
 
-    Between the times the displacement is the cubic that has the given values and slopes.
-
-    Parameters
-    ----------
-    times : array, shape (n,)
-        Ascending, s.
-    x, v : array, shape (n, columns)
-        Displacements, m, and velocities, m/s, of several motions, or derivatives of them.
-    tau : float
-        Time constant, s.
-
-    Returns
-    -------
-    array, shape (n, columns)
-        Output, m.
+    Displacements, m, and velocities, m/s, of several motions, or derivatives of them, are columns at
+    ascending times, s. Between the times the displacement is the cubic that has the given values and slopes.
     """
     if tau == 0.0 or len(times) < 2:
         return x.copy()
@@ -61,21 +48,10 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
 
 
 def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> FloatArray:
-    """Return what the sensor shows at times t, s, of a waveform that is fired at time 0.
+    """Return what the sensor shows at ascending times, s, of a waveform that is fired at time 0, A or N.
 
-    Parameters
-    ----------
-    segments : array
-        Segment table, see `printhammer.drive.segments`; its support ends.
-    t : array, shape (n,)
-        Ascending, s.
-    tau : float
-        Time constant, s; more than 0.
-
-    Returns
-    -------
-    array, shape (n,)
-        Output, A or N.
+    The waveform is a segment table, see `printhammer.drive.segments`, whose support ends; the time constant
+    is more than 0 s.
     """
     times = np.asarray(t, dtype=np.float64)
     result = np.zeros(len(times))

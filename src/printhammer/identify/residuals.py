@@ -43,30 +43,14 @@ def running_median(values: FloatArray, width: int) -> FloatArray:
 
 
 def spikes_of(values: FloatArray, noise: float) -> npt.NDArray[np.bool_]:
-    """Return which samples stand out of their neighbours, by more than noise and slope explain.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-        A record.
-    noise : float
-        Its standard deviation.
-    """
+    """Return which samples of a record stand out of their neighbours, more than noise and slope explain."""
     middle = running_median(values, 5)
     padded = np.pad(middle, 2, mode="edge")
     return np.abs(values - middle) > _SPIKE * noise + np.abs(padded[4:] - padded[:-4])
 
 
 def outliers_of(residuals: FloatArray, floor: float) -> npt.NDArray[np.bool_]:
-    """Return which residuals are larger than normal noise has them.
-
-    Parameters
-    ----------
-    residuals : array
-        Of data that are mostly good.
-    floor : float
-        Scale below which nothing counts as an outlier.
-    """
+    """Return which residuals of mostly good data are larger than normal noise, or the floor, has them."""
     return np.abs(residuals) > _FAR * max(robust_scale(residuals), floor)
 
 

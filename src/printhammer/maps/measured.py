@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.maps.layout import interpolated, map_dataset
-from printhammer.maps.records import Record, checked, read_records
+from printhammer.maps.records import RateRecord, checked, read_records
 from printhammer.results.files import need_for
 from printhammer.units import to_si
 
@@ -88,7 +88,7 @@ def _given(times: npt.ArrayLike) -> FloatArray:
     return found
 
 
-def _common_times(records: list[Record]) -> FloatArray:
+def _common_times(records: list[RateRecord]) -> FloatArray:
     first = records[0].times
     if all(np.array_equal(record.times, first) for record in records[1:]):
         return first
@@ -100,7 +100,7 @@ def _common_times(records: list[Record]) -> FloatArray:
     return np.linspace(start, end, count)
 
 
-def _stored_records(path: Path) -> list[Record]:
+def _stored_records(path: Path) -> list[RateRecord]:
     what = str(path)
     with _opened(path) as found:
         values = {name: _variable(found, what, name) for name in _SI}
@@ -123,7 +123,7 @@ def _stored_records(path: Path) -> list[Record]:
             f"{what}: time lies over {', '.join(dimensions['time']) or 'nothing'}, expected {over[1]}, or"
             f" rate and {over[1]}"
         )
-    records: dict[float, Record] = {}
+    records: dict[float, RateRecord] = {}
     for row, rate in enumerate(rates):
         known = np.isfinite(times[row])
         where = f"row {row + 1}"

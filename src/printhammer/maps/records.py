@@ -37,22 +37,15 @@ _GAPS: Final = ("", "nan", "na")
 
 
 @dataclass(frozen=True)
-class Record:
-    """Samples at one rate.
-
-    Attributes
-    ----------
-    rate : float
-        Firing rate, Hz.
-    times : array, shape (n,)
-        Times from the first firing, s, ascending.
-    displacement : array, shape (n,)
-        Displacement, m; NaN for a gap.
-    """
+class RateRecord:
+    """Samples at one rate."""
 
     rate: float
+    """Firing rate, Hz."""
     times: FloatArray
+    """Times from the first firing, s, ascending, shape (n,)."""
     displacement: FloatArray
+    """Displacement, m; NaN for a gap. Shape (n,)."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +88,7 @@ class Cells:
         return values * factor
 
 
-def read_records(path: Path) -> list[Record]:
+def read_records(path: Path) -> list[RateRecord]:
     """Read the records of a CSV file, by rising rate.
 
     Raises
@@ -115,7 +108,7 @@ def read_records(path: Path) -> list[Record]:
 
 def checked(
     what: str, rate: float, times: FloatArray, displacement: FloatArray, places: Sequence[str]
-) -> Record:
+) -> RateRecord:
     """Return a record with its samples in order of time.
 
     Parameters
@@ -148,10 +141,10 @@ def checked(
     known = int(np.isfinite(x).sum())
     if known < 2:
         raise InputError(f"{what}: {known} displacements at {rate:.9g} Hz, expected at least 2")
-    return Record(rate, at, x)
+    return RateRecord(rate, at, x)
 
 
-def _one_row_a_sample(cells: Cells, units: dict[str, str]) -> list[Record]:
+def _one_row_a_sample(cells: Cells, units: dict[str, str]) -> list[RateRecord]:
     index = {_named(cells.what, cell)[0]: k for k, cell in enumerate(cells.heading)}
     rate, time, x = (
         cells.column(index[name], si, units[name], gaps=name == "displacement") for name, si in _SI.items()
@@ -164,12 +157,12 @@ def _one_row_a_sample(cells: Cells, units: dict[str, str]) -> list[Record]:
     return found
 
 
-def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[Record]:
+def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateRecord]:
     columns = [k for k, (name, _unit) in enumerate(names) if name == "time"]
     if len(columns) != 1 or len(names) < 2:
         raise InputError(f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}")
     times = cells.column(columns[0], "s", names[columns[0]][1])
-    found: dict[float, Record] = {}
+    found: dict[float, RateRecord] = {}
     for k, (name, unit) in enumerate(names):
         if k == columns[0]:
             continue

@@ -57,18 +57,9 @@ def search_json(
 ) -> dict[str, Any]:
     """Return what `search.json` holds: the search, and for each claim that fails the best hammer for it.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The one that ships.
-    rows : sequence of dict
-        Judged candidates.
-    searches : sequence of mapping
-        Of each search its `aim`, its `seed` and the number of `candidates` that it tried.
-    core_hours : float
-        Time of one core that the searches took, h.
-    progress : callable, optional
-        Called with the name of each claim before it is judged.
+    `hammer` is the one that ships, `rows` are judged candidates. Of each search its `aim`, its `seed` and the
+    number of `candidates` tried are kept. `progress` is called with the name of each claim before it is
+    judged.
     """
     results = judge_all(hammer, progress=progress)
     held = {result.claim.name for result in results if result.verdict == "holds"}

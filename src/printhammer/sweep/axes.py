@@ -79,20 +79,8 @@ def read_axis(
 ) -> Axis:
     """Read an axis.
 
-    Parameters
-    ----------
-    table : AxisTable
-        As the spec gives it.
-    where : str
-        What to name in a message.
-    hammer : Hammer
-        The hammer that is swept.
-    own_waveform : mapping or None
-        The waveform table of the drive, if it has one.
-    grid : bool
-        Whether the axes form a grid; else a range is asked for.
-    named : mapping, optional
-        The waveform tables of a sequence by their names.
+    `own_waveform` is the waveform table of the drive, if it has one, `named` those of a sequence by their
+    names; unless the axes form a grid, a range is asked for.
 
     Raises
     ------

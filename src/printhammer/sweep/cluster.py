@@ -71,18 +71,18 @@ def run_dask(
         The scheduler or the last worker is gone, a worker has other versions or cannot do the work, or from
         `write`.
     """
-    work = _Work(client, plan)
+    tasks = _Tasks(client, plan)
     try:
-        for index in work.together(todo, write, told):
-            write(index, work.alone(plan.rows(plan.blocks.members(index))))
+        for index in tasks.side_by_side(todo, write, told):
+            write(index, tasks.alone(plan.rows(plan.blocks.members(index))))
             told(0.0)
     except _GoneError:
         raise InputError("the dask scheduler is gone, what is done is kept") from None
     finally:
-        work.cancel()
+        tasks.cancel()
 
 
-class _Work:
+class _Tasks:
     """The tasks of one sweep on a cluster."""
 
     def __init__(self, client: Any, plan: Plan) -> None:
@@ -93,7 +93,7 @@ class _Work:
         self._idle = 0.0
         self._counted, self._count = -math.inf, 0
 
-    def together(
+    def side_by_side(
         self, todo: Sequence[Index], write: Callable[[Index, Results], None], told: Callable[[float], None]
     ) -> list[Index]:
         """Do blocks side by side; return those that cost several workers."""
@@ -222,12 +222,9 @@ def _unable(error: BaseException) -> str:
 
 @contextmanager
 def client_of(dask: Any) -> Iterator[Any]:
-    """Give a client of a cluster; one made here is closed at the end, and logs nothing.
+    """Give a client of a cluster, by the address of its scheduler; one made here is closed, and logs nothing.
 
-    Parameters
-    ----------
-    dask : str or distributed.Client
-        Address of the scheduler, or a client of it, which is given back as it is.
+    A `distributed.Client` is given back as it is.
 
     Raises
     ------

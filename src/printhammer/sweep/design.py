@@ -15,20 +15,10 @@ if TYPE_CHECKING:
 
 
 def latin_hypercube(members: int, seed: int, axes: int) -> FloatArray:
-    """Draw a Latin hypercube.
+    """Draw a Latin hypercube, shape (members, axes), of numbers from 0 to below 1.
 
     Each axis is divided into as many equal strata as there are members; each stratum holds one of them, at
     random within it (McKay, Beckman and Conover, Technometrics 21 (1979) 239).
-
-    Parameters
-    ----------
-    members, seed, axes : int
-        Number of members, seed of the random numbers, number of axes.
-
-    Returns
-    -------
-    array, shape (members, axes)
-        Numbers from 0 to below 1.
     """
     random = np.random.Generator(np.random.PCG64(seed))
     drawn = np.empty((members, axes))

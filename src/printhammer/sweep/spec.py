@@ -84,12 +84,7 @@ class Spec:
 
 
 def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
-    """Read a spec.
-
-    Parameters
-    ----------
-    source : path or mapping
-        A TOML file, or what one says.
+    """Read a spec: a TOML file, or what one says.
 
     Raises
     ------

@@ -47,25 +47,10 @@ def run_chunk(
     threads: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> Results:
-    """Integrate the members of a block.
+    """Integrate the members of a block, one for each row of axis values, SI; return arrays by name.
 
-    Parameters
-    ----------
-    base : Base
-        What all members have in common.
-    outputs : Outputs
-        What to keep.
-    rows : array, shape (n, axes)
-        Axis values of the members, SI.
-    threads : int, optional
-        Number of threads.
-    progress : callable, optional
-        Called now and then with the share done; what it raises ends the work.
-
-    Returns
-    -------
-    dict
-        Arrays by name; a member that cannot be made or does not get to its end is a row with a status.
+    A member that cannot be made or does not get to its end is a row with a status. `progress` is called now
+    and then with the share done; what it raises ends the work.
 
     Raises
     ------

@@ -21,7 +21,7 @@ _HEADINGS: Final = "'time [us],current [A]' or 'time [us],force [N]'"
 
 
 @dataclass(frozen=True)
-class Record:
+class Samples:
     """Samples in SI: times since the firing, values, and what they drive."""
 
     times: tuple[float, ...]
@@ -29,7 +29,7 @@ class Record:
     quantity: QuantityName
 
 
-def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName, what: str) -> Record:
+def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName, what: str) -> Samples:
     """Check samples and make a record of them.
 
     Raises
@@ -62,10 +62,10 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
         raise InputError(f"{what}: times are expected to increase strictly, but {order}")
     if quantity not in _UNITS:
         raise InputError(f"{what}: quantity = {quantity!r} is expected to be current or force")
-    return Record(tuple(t.tolist()), tuple(y.tolist()), quantity)
+    return Samples(tuple(t.tolist()), tuple(y.tolist()), quantity)
 
 
-def read_csv(path: Path) -> Record:
+def read_csv(path: Path) -> Samples:
     """Read a record from a CSV file.
 
     Its columns are ``time [unit]`` and ``current [unit]`` or ``force [unit]``. Blank lines and lines that

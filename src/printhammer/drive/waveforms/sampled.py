@@ -9,7 +9,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from printhammer.drive.segments import POLYNOMIAL, table
 from printhammer.drive.waveforms.base import QuantityName, Waveform
-from printhammer.drive.waveforms.record import Record, checked, read_csv
+from printhammer.drive.waveforms.record import Samples, checked, read_csv
 from printhammer.support.constants import folder_of
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Sampled(Waveform):
     shape: ClassVar[str] = "sampled"
     file: str = Field(description="CSV file of the record, relative to the file that names it")
     interpolation: Interpolation = "pchip"
-    _record: Record = PrivateAttr()
+    _record: Samples = PrivateAttr()
 
     @model_validator(mode="wrap")
     @classmethod

@@ -40,15 +40,7 @@ def shade(number: int) -> str:
 
 @styled
 def plot(basins: Basins, *, attractors: bool = True) -> Figure:
-    """Draw basins.
-
-    Marks are the points of the attractors at the firings.
-
-    Parameters
-    ----------
-    attractors : bool, optional
-        Whether the attractors are drawn in, where they lie in the plane.
-    """
+    """Draw basins, and in them the attractors where they lie in the plane, marked at the firings."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

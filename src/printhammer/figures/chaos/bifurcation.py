@@ -172,16 +172,16 @@ def _each(orbits: Iterable[Any]) -> Iterable[Any]:
             yield from _each(entry)
 
 
-def _orbit(ax: Axes, diagram: Bifurcation, found: Any, show: str, across: Scale, up: Scale) -> None:
+def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale, up: Scale) -> None:
     """Draw a periodic orbit as circles, or a branch of them as curves."""
-    states = up.shown(getattr(found, show))
+    states = up.shown(getattr(orbit, show))
     if states.ndim == 2:
-        if found.parameter != diagram.parameter or found.phase != diagram.phase:
+        if orbit.parameter != diagram.parameter or orbit.phase != diagram.phase:
             raise InputError(
-                f"orbits: a branch in {found.parameter} at phase {found.phase:g}, expected one in"
+                f"orbits: a branch in {orbit.parameter} at phase {orbit.phase:g}, expected one in"
                 f" {diagram.parameter} at phase {diagram.phase:g}"
             )
-        values, states, size = _crossed(across.shown(found.values), states, np.abs(found.multipliers[:, 0]))
+        values, states, size = _crossed(across.shown(orbit.values), states, np.abs(orbit.multipliers[:, 0]))
         for kind, look in (("stable", "-"), ("unstable", (0, (1.5, 1.5)))):
             shown = size <= 1.0 if kind == "stable" else size >= 1.0
             line = np.where(shown[:, np.newaxis], states, np.nan)
@@ -189,11 +189,11 @@ def _orbit(ax: Axes, diagram: Bifurcation, found: Any, show: str, across: Scale,
         return
     if diagram.phase:
         raise InputError(
-            f"orbits: their states are at the firings, expected a diagram of phase 0 for {found!r}"
+            f"orbits: their states are at the firings, expected a diagram of phase 0 for {orbit!r}"
         )
-    stable = found.kind == "stable"
+    stable = orbit.kind == "stable"
     ax.plot(
-        np.full(len(states), float(across.shown(found.regime.value(diagram.parameter)))),
+        np.full(len(states), float(across.shown(orbit.regime.value(diagram.parameter)))),
         states,
         ls="none",
         marker="o",

@@ -75,7 +75,7 @@ def plot(
         raise InputError(f"show = {show!r}, expected one of {', '.join(_SHOWN)}")
     figure = new_figure(4.4)
     ax = figure.add_subplot()
-    unit, factor = _AXIS.get(found[0].unit, (found[0].unit, 1.0))
+    heading, factor = axis_of(found[0].parameter, found[0].unit)
     name, _, shown, times = _SHOWN[show]
     for branch in found:
         draw(ax, branch, show, (factor, times))
@@ -85,13 +85,18 @@ def plot(
         ax.set_ylim(*(times * end for end in limits))
     else:
         ax.margins(y=0.04)
-    parameter = found[0].parameter
-    title = parameter[:1].upper() + parameter[1:] if "." not in parameter else parameter
-    ax.set_xlabel(f"{title}  [{unit}]" if unit else title)
+    ax.set_xlabel(heading)
     ax.set_ylabel(f"{name}  [{shown}]")
     _legend(ax, found, marked)
     sign(figure, found[0].regime.hammer, *_remarks(found))
     return figure
+
+
+def axis_of(name: str, si: str) -> tuple[str, float]:
+    """Return what is written on the axis of a constant, and the factor by which its values are multiplied."""
+    unit, factor = _AXIS.get(si, (si, 1.0))
+    title = name[:1].upper() + name[1:] if "." not in name else name
+    return f"{title}  [{unit}]" if unit else title, factor
 
 
 def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> None:
@@ -134,11 +139,11 @@ def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, lis
 
 
 def _mark(
-    ax: Axes, found: Sequence[Branch], show: str, factors: tuple[float, float], grazings: bool
+    ax: Axes, branches: Sequence[Branch], show: str, factors: tuple[float, float], grazings: bool
 ) -> list[str]:
     """Mark what happens on the way; return which kinds there are."""
     kinds: list[str] = []
-    for branch in found:
+    for branch in branches:
         table = getattr(branch, show)
         for event in branch.events:
             if event.kind == "grazing" and not grazings:
@@ -161,12 +166,12 @@ def colour_of(firings: int) -> str:
     return _COLOURS.get(firings, style.INK)
 
 
-def _legend(ax: Axes, found: Sequence[Branch], kinds: Sequence[str]) -> None:
+def _legend(ax: Axes, branches: Sequence[Branch], kinds: Sequence[str]) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
         Line2D([], [], color=colour_of(firings), lw=style.LINE, label=f"period {firings}, stable")
-        for firings in sorted({branch.firings for branch in found})
+        for firings in sorted({branch.firings for branch in branches})
     ]
     handles.append(Line2D([], [], color=style.MUTED, lw=style.HAIR, ls=_UNSTABLE["ls"], label="unstable"))
     for kind, look in _MARKS.items():
@@ -184,7 +189,7 @@ def _legend(ax: Axes, found: Sequence[Branch], kinds: Sequence[str]) -> None:
     )
 
 
-def _remarks(found: Sequence[Branch]) -> list[str]:
+def _remarks(branches: Sequence[Branch]) -> list[str]:
     """Return what a reader must know of ends that are none of the bounds."""
     told = {
         "length": "where the number of steps was used up",
@@ -192,7 +197,7 @@ def _remarks(found: Sequence[Branch]) -> list[str]:
         "no value": "where there is no strobe map",
         "grazing": "in a grazing of the rigid backstop",
     }
-    counts = Counter(stop.reason for branch in found for stop in branch.stops if stop.reason in told)
+    counts = Counter(stop.reason for branch in branches for stop in branch.stops if stop.reason in told)
     if not counts:
         return []
     ends = ", ".join(f"{number} {told[reason]}" for reason, number in sorted(counts.items()))

@@ -27,18 +27,18 @@ _SIGMAS: Final = 3.0
 
 
 @styled
-def plot(found: Lyapunov) -> Figure:
+def plot(spectrum: Lyapunov) -> Figure:
     """Draw the running estimates of both exponents against the number of firings.
 
     Bands reach three standard errors to either side.
     """
     figure = new_figure(4.6)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    counts, means, errors = found.running()
+    counts, means, errors = spectrum.running()
     for k, (ax, colour) in enumerate(zip((upper, lower), _COLOURS, strict=True)):
         _running(ax, counts, means[:, k], errors[:, k], colour)
         ax.set_ylabel(f"$\\lambda_{k + 1}$  [1/firing]")
-        value, error = float(found.exponents[k]), float(found.standard_errors[k])
+        value, error = float(spectrum.exponents[k]), float(spectrum.standard_errors[k])
         at, side = ((0.98, 0.96), "top") if value < _middle(ax) else ((0.98, 0.05), "bottom")
         note(ax, f"{value:+.4g} ± {error:.2g}", at, ha="right", va=side, color=colour, bbox=HALO)
     upper.axhline(0.0, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="zero")
@@ -46,21 +46,21 @@ def plot(found: Lyapunov) -> Figure:
     lower.set_xscale("log")
     # Also where no estimate is finite.
     lower.set_xlim(max(0.9 * float(counts[0]), 0.5), 1.1 * float(counts[-1]))
-    upper.set_title(_title(found), loc="left", fontsize=style.SMALL)
-    remarks = [] if found.ok else [f"The run ended early: {found.status}."]
-    if not found.smooth:
+    upper.set_title(_title(spectrum), loc="left", fontsize=style.SMALL)
+    remarks = [] if spectrum.ok else [f"The run ended early: {spectrum.status}."]
+    if not spectrum.smooth:
         remarks.append("The motion passes a touch without velocity, where it has no derivative.")
-    sign(figure, found.hammer, *remarks)
+    sign(figure, spectrum.hammer, *remarks)
     return figure
 
 
-def _title(found: Lyapunov) -> str:
-    told = [shown_period(found.period), found.verdict.name.replace("-", " ")]
-    if not math.isnan(found.dimension):
-        error = f" ± {found.dimension_error:.1g}" if found.dimension_error else ""
-        told.append(f"dimension {found.dimension:.4g}{error}")
-    if found.zero_one is not None:
-        told.append(f"0-1 test: {found.zero_one.verdict}")
+def _title(spectrum: Lyapunov) -> str:
+    told = [shown_period(spectrum.period), spectrum.verdict.name.replace("-", " ")]
+    if not math.isnan(spectrum.dimension):
+        error = f" ± {spectrum.dimension_error:.1g}" if spectrum.dimension_error else ""
+        told.append(f"dimension {spectrum.dimension:.4g}{error}")
+    if spectrum.zero_one is not None:
+        told.append(f"0-1 test: {spectrum.zero_one.verdict}")
     return ", ".join(told)
 
 
@@ -162,26 +162,26 @@ def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
 
 
 @styled
-def plot_zero_one(found: ZeroOne) -> Figure:
+def plot_zero_one(test: ZeroOne) -> Figure:
     """Draw what the 0-1 test looks at: the path, its mean square displacement, and the correlations.
 
     Path and displacement are those of the angle with the median correlation, ringed at the right.
     """
     figure = new_figure(2.9)
     path, growth, angles = figure.subplots(1, 3)
-    path.plot(found.p, found.q, color=style.BLUE, lw=style.HAIR, gid="path")
+    path.plot(test.p, test.q, color=style.BLUE, lw=style.HAIR, gid="path")
     path.set(xlabel="$p_c$", ylabel="$q_c$")
     path.margins(0.06)
     path.set_aspect("equal", adjustable="datalim")
-    steps = np.arange(1, len(found.displacement) + 1)
-    growth.plot(steps, found.displacement, color=style.BLUE, lw=style.THIN, gid="displacement")
+    steps = np.arange(1, len(test.displacement) + 1)
+    growth.plot(steps, test.displacement, color=style.BLUE, lw=style.THIN, gid="displacement")
     growth.set(xlabel="Steps n", ylabel="Mean square displacement")
     angles.plot(
-        found.angles, found.correlations, ls="none", marker="o", ms=2.4, mew=0.0, color=style.BLUE, gid="k"
+        test.angles, test.correlations, ls="none", marker="o", ms=2.4, mew=0.0, color=style.BLUE, gid="k"
     )
-    shown = found.shown
+    shown = test.shown
     angles.plot(
-        found.angles[shown], found.correlations[shown], marker="o", ms=7.0, mfc="none", mec=style.ORANGE
+        test.angles[shown], test.correlations[shown], marker="o", ms=7.0, mfc="none", mec=style.ORANGE
     )
     for level in (REGULAR, CHAOTIC):
         angles.axhline(level, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)))
@@ -190,7 +190,7 @@ def plot_zero_one(found: ZeroOne) -> Figure:
         ax.tick_params(axis="both", top=True, right=True)
         ax.ticklabel_format(axis="both", style="sci", scilimits=(-3, 4))
         ax.locator_params(axis="both", nbins=5)
-    figure.suptitle(f"0-1 test: {found.phrase}: {found.verdict}", x=0.01, ha="left", fontsize=style.SMALL)
-    if found.reason:
-        figure.supxlabel(found.reason, x=0.01, ha="left", fontsize=style.SMALL, color=style.ORANGE)
+    figure.suptitle(f"0-1 test: {test.phrase}: {test.verdict}", x=0.01, ha="left", fontsize=style.SMALL)
+    if test.reason:
+        figure.supxlabel(test.reason, x=0.01, ha="left", fontsize=style.SMALL, color=style.ORANGE)
     return figure

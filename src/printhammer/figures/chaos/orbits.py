@@ -40,14 +40,8 @@ _LINES: Final = ("-", "--", "-.", ":")
 def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) -> Figure:
     """Draw orbits at their firings over the strobe points of the train from rest, and some against time.
 
-    Stable orbits are filled marks, all others open ones; the first few are drawn against time below.
-
-    Parameters
-    ----------
-    points : int, optional
-        Number of strobe points; 0 for none.
-    longest : int, optional
-        Leave out orbits of more firings.
+    Stable orbits are filled marks, all others open ones; the first few are drawn against time below. Orbits
+    of more firings than `longest` are left out.
     """
     shown = [orbit for orbit in orbits if longest is None or orbit.firings <= longest]
     traced = shown[:_TRACES]

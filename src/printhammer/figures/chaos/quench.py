@@ -25,7 +25,7 @@ _FEW: Final = 0.01
 
 
 @styled
-def plot(found: QuenchMap) -> Figure:
+def plot(quenches: QuenchMap) -> Figure:
     """Draw a quench map.
 
     Crosses: the two cases of Fig. 6 of the paper, where they lie in the plane.
@@ -34,26 +34,26 @@ def plot(found: QuenchMap) -> Figure:
     ax = figure.add_subplot()
     across = Scale("Second firing after the first", "s", "ms")
     up = Scale("Width of the second pulse", "s", "ms")
-    x, y = edges(across.shown(found.gaps)), edges(up.shown(found.widths))
+    x, y = edges(across.shown(quenches.gaps)), edges(up.shown(quenches.widths))
     ax.set_facecolor(_FAILED)
-    lost = np.ma.masked_where(~found.lost, np.nan_to_num(found.peak_share)).T
-    printed = np.ma.masked_where(~found.struck, found.force_ratio).T
+    lost = np.ma.masked_where(~quenches.lost, np.nan_to_num(quenches.peak_share)).T
+    printed = np.ma.masked_where(~quenches.struck, quenches.force_ratio).T
     mesh = None
-    if found.struck.any():
-        known = found.force_ratio[found.struck]
+    if quenches.struck.any():
+        known = quenches.force_ratio[quenches.struck]
         low, high = np.quantile(known, [_FEW, 1.0 - _FEW])
         mesh = ax.pcolormesh(x, y, printed, cmap=PRINTED, vmin=low, vmax=high, rasterized=True)
         bar = figure.colorbar(mesh, ax=ax, pad=0.02, fraction=0.05, extend="both")
         bar.set_label("Printed: force over that of the first alone", fontsize=SMALL)
-    if found.lost.any():
+    if quenches.lost.any():
         mesh = ax.pcolormesh(x, y, lost, cmap=LOST, vmin=0.0, vmax=1.0, rasterized=True)
         # Beyond 1 where the second firing falls into the contact of the first dot.
         bar = figure.colorbar(mesh, ax=ax, pad=0.02, fraction=0.05, extend="max")
         bar.set_label("Lost: second peak, parts of the way to the pack", fontsize=SMALL)
-    width = getattr(found.waveform, "width", None)
+    width = getattr(quenches.waveform, "width", None)
     if width is not None and y[0] < up.shown(width) < y[-1]:
         ax.axhline(float(up.shown(width)), color="white", lw=HAIR, ls=(0, (4, 3)), gid="first width")
-        shown = [delay for delay in DELAYS if found.gaps[0] <= delay <= found.gaps[-1]]
+        shown = [delay for delay in DELAYS if quenches.gaps[0] <= delay <= quenches.gaps[-1]]
         ax.plot(
             across.shown(shown),
             np.full(len(shown), float(up.shown(width))),
@@ -70,6 +70,6 @@ def plot(found: QuenchMap) -> Figure:
     label(ax, "y", up)
     for spine in ax.spines.values():
         spine.set_color(INK if spine.get_visible() else MUTED)
-    bad = int((found.status != "ok").sum())
-    sign(figure, found.hammer, f"{bad} of {found.status.size} runs ended early." if bad else "")
+    bad = int((quenches.status != "ok").sum())
+    sign(figure, quenches.hammer, f"{bad} of {quenches.status.size} runs ended early." if bad else "")
     return figure

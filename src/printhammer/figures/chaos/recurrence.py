@@ -26,7 +26,7 @@ _NAMES: Final = {
 
 
 @styled
-def plot(found: Recurrence) -> Figure:
+def plot(recurrence: Recurrence) -> Figure:
     """Draw a recurrence plot: a point where two states lie within the threshold of each other.
 
     The quantities stand beside the plot.
@@ -35,9 +35,9 @@ def plot(found: Recurrence) -> Figure:
 
     figure = new_figure(4.6)
     ax = figure.add_subplot()
-    count = len(found.matrix)
+    count = len(recurrence.matrix)
     ax.imshow(
-        found.matrix,
+        recurrence.matrix,
         origin="lower",
         cmap=ListedColormap(["white", INK]),
         vmin=0,
@@ -49,8 +49,8 @@ def plot(found: Recurrence) -> Figure:
     )
     ax.set(xlabel="Number of the state", ylabel="Number of the state")
     ax.tick_params(axis="both", top=True, right=True)
-    told = [f"threshold  {found.threshold:.3g}"]
-    told += [f"{_NAMES[name]}  {_shown(value)}" for name, value in found.quantities.items()]
+    told = [f"threshold  {recurrence.threshold:.3g}"]
+    told += [f"{_NAMES[name]}  {_shown(value)}" for name, value in recurrence.quantities.items()]
     beside(
         ax,
         "\n".join(told),

@@ -30,7 +30,7 @@ _BAR: Final = 0.62
 
 @styled
 def plot(
-    found: Sensitivities, *, dot: int | None = None, quantities: Sequence[str] = SHOWN, bars: int = 8
+    table: Sensitivities, *, dot: int | None = None, quantities: Sequence[str] = SHOWN, bars: int = 8
 ) -> Figure:
     """Draw the largest sensitivities of one dot, or of the whole run.
 
@@ -55,50 +55,50 @@ def plot(
         raise InputError(f"bars = {bars}, expected at least 1")
     if not quantities:
         raise InputError("quantities: expected at least one to draw")
-    number = _dot(found, dot, quantities)
+    number = _dot(table, dot, quantities)
     rows = math.ceil(len(quantities) / _COLUMNS)
     figure = new_figure(0.5 + rows * (0.9 + 0.19 * bars), 7.2)
     columns = min(_COLUMNS, len(quantities))
     for place, name in enumerate(quantities):
         ax = figure.add_subplot(rows, columns, place + 1)
-        _panel(ax, found, _sensitivities(found, name, number), bars)
-        of_dot = f", dot {number + 1}" if name in found.quantities and len(found.dots) > 1 else ""
+        _panel(ax, table, _sensitivities(table, name, number), bars)
+        of_dot = f", dot {number + 1}" if name in table.quantities and len(table.dots) > 1 else ""
         ax.set_title(name.replace("_", " ") + of_dot, loc="left", fontsize=style.SMALL)
         if place >= len(quantities) - columns:
             ax.set_xlabel("change in % for 1 % of the constant", fontsize=style.SMALL)
-    remarks = [] if found.ok else [f"The run ended early: {found.status}."]
-    if not found.smooth:
+    remarks = [] if table.ok else [f"The run ended early: {table.status}."]
+    if not table.smooth:
         remarks.append("The motion passes a touch without velocity: what follows has no derivative.")
-    sign(figure, found.hammer, *remarks)
+    sign(figure, table.hammer, *remarks)
     return figure
 
 
-def _dot(found: Sensitivities, dot: int | None, quantities: Sequence[str]) -> int:
+def _dot(table: Sensitivities, dot: int | None, quantities: Sequence[str]) -> int:
     """Return the number of the dot to draw."""
-    struck = [k for k in range(len(found.dots)) if k not in found.lost]
-    if all(name in found.run_quantities for name in quantities):
+    struck = [k for k in range(len(table.dots)) if k not in table.lost]
+    if all(name in table.run_quantities for name in quantities):
         return 0
     if dot is None:
         if not struck:
             raise InputError("all dots are lost, expected one that struck")
         return struck[0]
-    if not 0 <= dot < len(found.dots):
-        raise InputError(f"dot = {dot}, expected a number from 0 to {len(found.dots) - 1}")
+    if not 0 <= dot < len(table.dots):
+        raise InputError(f"dot = {dot}, expected a number from 0 to {len(table.dots) - 1}")
     if dot not in struck:
         raise InputError(f"dot = {dot} is lost and has no sensitivities")
     return dot
 
 
-def _sensitivities(found: Sensitivities, name: str, dot: int) -> FloatArray:
-    if name in found.quantities:
-        return np.asarray(found.logarithmic[dot, found.quantities.index(name)])
-    if name in found.run_quantities:
-        return np.asarray(found.run_logarithmic[found.run_quantities.index(name)])
-    known = ", ".join((*found.quantities, *found.run_quantities))
+def _sensitivities(table: Sensitivities, name: str, dot: int) -> FloatArray:
+    if name in table.quantities:
+        return np.asarray(table.logarithmic[dot, table.quantities.index(name)])
+    if name in table.run_quantities:
+        return np.asarray(table.run_logarithmic[table.run_quantities.index(name)])
+    known = ", ".join((*table.quantities, *table.run_quantities))
     raise InputError(f"quantity = {name!r} is not known, expected one of {known}")
 
 
-def _panel(ax: Axes, found: Sensitivities, values: FloatArray, bars: int) -> None:
+def _panel(ax: Axes, table: Sensitivities, values: FloatArray, bars: int) -> None:
     """Draw one quantity; what is zero to the digits shown is left out."""
     sizes = np.where(np.isfinite(values), np.abs(values), 0.0)
     order = [int(k) for k in np.argsort(-sizes, kind="stable")[:bars] if sizes[k] >= 5e-4]
@@ -118,7 +118,7 @@ def _panel(ax: Axes, found: Sensitivities, values: FloatArray, bars: int) -> Non
     for height, k in enumerate(order):
         value = float(values[k])
         colour = style.BLUE if value > 0.0 else style.ORANGE
-        ax.barh(height, value, height=_BAR, color=colour, gid=f"bar-{found.constants[k]}")
+        ax.barh(height, value, height=_BAR, color=colour, gid=f"bar-{table.constants[k]}")
         beside(
             ax,
             f"{value:+.3g}".replace("-", "−"),
@@ -134,5 +134,5 @@ def _panel(ax: Axes, found: Sensitivities, values: FloatArray, bars: int) -> Non
     most = max(float(values[k]) for k in order)
     ax.set_xlim(min(least, 0.0) - 0.32 * longest, max(most, 0.0) + 0.32 * longest)
     ax.set_ylim(max(len(order), 3) - 0.4, -0.6)
-    ax.set_yticks(range(len(order)), [found.constants[k] for k in order], fontsize=style.TINY)
+    ax.set_yticks(range(len(order)), [table.constants[k] for k in order], fontsize=style.TINY)
     ax.tick_params(axis="y", length=0.0)

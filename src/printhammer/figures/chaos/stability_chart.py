@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.figures.chaos.continuation import axis_of
 from printhammer.figures.elements import style
 from printhammer.figures.elements.style import new_figure, sign, styled
 
@@ -19,7 +20,6 @@ _STYLES: Final = {
     "period doubling": (style.ORANGE, (0, (5, 1.5))),
     "Neimark-Sacker": (style.GREEN, (0, (1, 1))),
 }
-_AXIS: Final = {"s": ("ms", 1e3), "1": ("", 1.0)}
 _REGION: Final = "#cfe3f1"
 
 
@@ -35,13 +35,13 @@ def plot(chart: StabilityChart) -> Figure:
 
     figure = new_figure(4.4)
     ax = figure.add_subplot()
-    factors = [_AXIS.get(unit, (unit, 1.0)) for unit in chart.units]
+    headings, factors = zip(*map(axis_of, chart.names, chart.units), strict=True)
     handles: list[Line2D | Patch] = []
     if chart.settled.size:
         from matplotlib.colors import ListedColormap
 
         shown = np.where(chart.settled == chart.firings, 1, np.where(chart.settled < 0, 2, 0))
-        edges = [_edges(axis) * factors[k][1] for k, axis in enumerate(chart.grid)]
+        edges = [_edges(axis) * factors[k] for k, axis in enumerate(chart.grid)]
         colours = ListedColormap(["white", _REGION, style.FAINT])
         ax.pcolormesh(*edges, shown, cmap=colours, vmin=0, vmax=2, zorder=0.5, rasterized=True)
         told = f"from rest: period {chart.firings}"
@@ -51,7 +51,7 @@ def plot(chart: StabilityChart) -> Figure:
     kinds = []
     for curve in chart.curves:
         colour, dash = _STYLES[curve.kind]
-        x, y = factors[0][1] * curve.first, factors[1][1] * curve.second
+        x, y = factors[0] * curve.first, factors[1] * curve.second
         limits = np.where(curve.limits, y, np.nan)
         ax.plot(x, y, color=colour, lw=style.HAIR, ls=dash, alpha=0.5, zorder=2.0)
         ax.plot(x, limits, color=colour, lw=style.LINE, ls=dash, gid=curve.kind, zorder=3.0)
@@ -62,17 +62,13 @@ def plot(chart: StabilityChart) -> Figure:
         for kind in _STYLES
         if kind in kinds
     ]
-    own = chart.regime.value(chart.names[1]) * factors[1][1]
+    own = chart.regime.value(chart.names[1]) * factors[1]
     ax.axhline(own, color=style.MUTED, lw=style.HAIR, ls=(0, (1, 2)), zorder=1.0, gid="own")
     handles.append(Line2D([], [], color=style.MUTED, lw=style.HAIR, ls=(0, (1, 2)), label="the hammer's own"))
-    ax.set_xlim(*(factors[0][1] * end for end in chart.bounds[0]))
-    ax.set_ylim(*(factors[1][1] * end for end in chart.bounds[1]))
-    names = []
-    for name, (unit, _) in zip(chart.names, factors, strict=True):
-        title = name[:1].upper() + name[1:] if "." not in name else name
-        names.append(f"{title}  [{unit}]" if unit else title)
-    ax.set_xlabel(names[0])
-    ax.set_ylabel(names[1])
+    ax.set_xlim(*(factors[0] * end for end in chart.bounds[0]))
+    ax.set_ylim(*(factors[1] * end for end in chart.bounds[1]))
+    ax.set_xlabel(headings[0])
+    ax.set_ylabel(headings[1])
     ax.legend(
         handles=handles,
         loc="lower center",

@@ -39,12 +39,8 @@ RING: Final[dict[str, Any]] = {
 def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
     """Draw strobe points: velocity against displacement, the backstop, and the verdict.
 
-    Rings are the last points of a periodic train.
-
-    Parameters
-    ----------
-    fit : bool, optional
-        Whether the axes end close about the points, instead of at the window of Fig. 11.
+    Rings are the last points of a periodic train. To fit, the axes end close about the points, instead of at
+    the window of Fig. 11.
     """
     figure = new_figure(4.6)
     ax = figure.add_subplot()
@@ -91,20 +87,10 @@ def panel(
     named: bool = True,
     printed: str = "",
 ) -> None:
-    """Draw the points of one train into axes.
+    """Draw the points of one train into axes that end with a window; points outside are counted in a corner.
 
-    Parameters
-    ----------
-    window : Window
-        Limits of the axes; points outside are counted in a corner.
-    way, speed : Scale
-        How displacement and velocity are shown.
-    size : float
-        Size of a point, points.
-    named : bool, optional
-        Whether strobe time and verdict are written inside.
-    printed : str, optional
-        The verdict of the paper, written above that on the points where it is another.
+    `size` is that of a point, points; `named` has strobe time and verdict written inside, and `printed`, the
+    verdict of the paper, above that on the points where it is another.
     """
     ax.set_xlim(*(float(way.shown(end)) for end in window.x))
     ax.set_ylim(*(float(speed.shown(end)) for end in window.v))

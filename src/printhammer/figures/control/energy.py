@@ -22,7 +22,7 @@ _AFTER: Final = 0.08
 
 
 @styled
-def plot(found: LeastWork) -> Figure:
+def plot(burst: LeastWork) -> Figure:
     """Draw a burst of least work.
 
     Above: displacement, current, and the power of the coil, filled where it gives and where it takes back.
@@ -33,35 +33,35 @@ def plot(found: LeastWork) -> Figure:
     motion = figure.add_subplot(grid[0])
     current = figure.add_subplot(grid[1], sharex=motion)
     power = figure.add_subplot(grid[2], sharex=motion)
-    run = found.motion
+    run = burst.motion
     time = _ms(run.t)
-    _motion(motion, found)
+    _motion(motion, burst)
     current.plot(time, run.current, color=style.BLUE, lw=style.THIN, gid="current")
     current.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
-    for bound in (-found.largest, found.largest):
+    for bound in (-burst.largest, burst.largest):
         current.axhline(bound, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)))
-    span = 1.15 * found.largest
+    span = 1.15 * burst.largest
     current.set_ylim(min(1.15 * float(run.current.min()), -0.2 * span), span)
     current.set_ylabel("Current  [A]")
-    watts = coil_power(found.hammer, run.x, run.v, run.force["magnet"])
+    watts = coil_power(burst.hammer, run.x, run.v, run.force["magnet"])
     power.fill_between(time, np.maximum(watts, 0.0), 0.0, color=style.ORANGE, lw=0.0, gid="given")
     power.fill_between(time, np.minimum(watts, 0.0), 0.0, color=style.GREEN, lw=0.0, gid="taken back")
     power.set_ylabel("Coil power  [W]")
     power.set_xlabel("Time  [ms]")
-    last = min((1.0 + _AFTER) * found.rest_time, run.end)
+    last = min((1.0 + _AFTER) * burst.rest_time, run.end)
     motion.set_xlim(0.0, float(_ms(np.array([last]))[0]))
     for ax in (motion, current):
         ax.tick_params(axis="x", labelbottom=False)
-    _ledger(figure.add_subplot(grid[3]), found)
+    _ledger(figure.add_subplot(grid[3]), burst)
     remark = ""
-    if found.adequate < found.count:
-        remark = f"{found.adequate} of {found.count} dots are adequate."
-    sign(figure, found.hammer, remark)
+    if burst.adequate < burst.count:
+        remark = f"{burst.adequate} of {burst.count} dots are adequate."
+    sign(figure, burst.hammer, remark)
     return figure
 
 
-def _motion(ax: Axes, found: LeastWork) -> None:
-    hammer, run = found.hammer, found.motion
+def _motion(ax: Axes, burst: LeastWork) -> None:
+    hammer, run = burst.hammer, burst.motion
     assert hammer.front is not None
     low, high = float(_um(run.x.min())), float(_um(run.x.max()))
     room = 0.08 * (high - low)
@@ -69,30 +69,30 @@ def _motion(ax: Axes, found: LeastWork) -> None:
     ax.axhspan(_um(hammer.front), top, color=style.SURFACES["pack"], alpha=0.14, lw=0.0)
     ax.axhspan(low - room, _um(hammer.origin), color=style.SURFACES["backstop"], alpha=0.25, lw=0.0)
     ax.plot(_ms(run.t), _um(run.x), color=style.INK, lw=style.LINE, gid="displacement")
-    for contact, force in zip(found.contacts, found.forces.tolist(), strict=True):
+    for contact, force in zip(burst.contacts, burst.forces.tolist(), strict=True):
         place = float(_ms(np.array([contact.t_peak]))[0])
         beside(ax, f"{force:.3f}", (place, float(_um(hammer.front + contact.depth))), (0.0, 3.0), ha="center")
     ax.set_ylim(low - room, top)
     ax.set_ylabel("Displacement  [µm]")
     ax.set_title(
-        f"{len(found.contacts)} dots at {found.rate:.6g} Hz, force over that of a single pulse",
+        f"{len(burst.contacts)} dots at {burst.rate:.6g} Hz, force over that of a single pulse",
         loc="left",
         fontsize=style.SMALL,
     )
 
 
-def _ledger(ax: Axes, found: LeastWork) -> None:
-    absorbed = found.ledger.pack_loss
+def _ledger(ax: Axes, burst: LeastWork) -> None:
+    absorbed = burst.ledger.pack_loss
     if not absorbed > 0.0:
         ax.text(0.5, 0.5, "The pack absorbed nothing.", ha="center", va="center", transform=ax.transAxes)
         ax.set_axis_off()
         return
     bars = [
         ("absorbed by the pack", 1.0, style.YELLOW),
-        ("net work W", found.net_ratio, style.BLUE),
-        ("positive work W+", found.positive_ratio, style.ORANGE),
-        ("W, single pulses", found.single_ratio, style.MUTED),
-        ("lost at the backstop", found.ledger.backstop_loss / absorbed, style.SURFACES["backstop"]),
+        ("net work W", burst.net_ratio, style.BLUE),
+        ("positive work W+", burst.positive_ratio, style.ORANGE),
+        ("W, single pulses", burst.single_ratio, style.MUTED),
+        ("lost at the backstop", burst.ledger.backstop_loss / absorbed, style.SURFACES["backstop"]),
     ]
     rows = np.arange(len(bars))[::-1]
     longest = max(value for _name, value, _colour in bars)
@@ -100,7 +100,7 @@ def _ledger(ax: Axes, found: LeastWork) -> None:
     for row, (_name, value, _colour) in zip(rows.tolist(), bars, strict=True):
         ax.text(value + 0.01 * longest, row, f"{value:.3f}", va="center", fontsize=style.SMALL)
     ax.plot(
-        [found.bound_ratio] * 2,
+        [burst.bound_ratio] * 2,
         [rows[2] - 0.45, rows[2] + 0.45],
         color=style.INK,
         lw=style.LINE,

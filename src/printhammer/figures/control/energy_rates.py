@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @styled
-def plot(found: LeastWorkRates) -> Figure:
+def plot(bursts: LeastWorkRates) -> Figure:
     """Draw net and positive work, and the least positive work of any current, against the rate.
 
     Crosses at the bottom: rates at which no current was found.
@@ -23,27 +23,33 @@ def plot(found: LeastWorkRates) -> Figure:
     figure = new_figure(3.6)
     ax = figure.add_subplot()
     across = Scale("Rate", "Hz", "Hz")
-    rates = across.shown(found.rates)
+    rates = across.shown(bursts.rates)
     ax.plot(
-        rates, found.positive_ratio, "o-", color=style.ORANGE, lw=style.LINE, ms=4.0, label="positive work W+"
+        rates,
+        bursts.positive_ratio,
+        "o-",
+        color=style.ORANGE,
+        lw=style.LINE,
+        ms=4.0,
+        label="positive work W+",
     )
     ax.plot(
         rates,
-        found.bound_ratio,
+        bursts.bound_ratio,
         color=style.INK,
         lw=style.THIN,
         ls=(0, (4, 3)),
         label="least W+ of any current",
     )
-    ax.plot(rates, found.net_ratio, "s-", color=style.BLUE, lw=style.LINE, ms=4.0, label="net work W")
-    missing = found.status != "ok"
+    ax.plot(rates, bursts.net_ratio, "s-", color=style.BLUE, lw=style.LINE, ms=4.0, label="net work W")
+    missing = bursts.status != "ok"
     if missing.any():
         ax.plot(rates[missing], [0.04] * int(missing.sum()), "x", color=style.MUTED, label="no current found")
     ax.set_ylim(bottom=0.0)
     ax.set_ylabel("Work over what the pack absorbs")
     label(ax, "x", across)
     ax.legend(fontsize=style.SMALL, loc="lower right", frameon=False)
-    ax.set_title(f"Bursts of {found.count} dots", loc="left", fontsize=style.SMALL)
+    ax.set_title(f"Bursts of {bursts.count} dots", loc="left", fontsize=style.SMALL)
     ax.margins(x=0.03)
-    sign(figure, found.hammer)
+    sign(figure, bursts.hammer)
     return figure

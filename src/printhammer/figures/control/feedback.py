@@ -24,7 +24,7 @@ _REACH: Final = 4.0
 
 
 @styled
-def plot(found: Feedback) -> Figure:
+def plot(feedback: Feedback) -> Figure:
     """Draw a comparison of feedback with other ways to drive.
 
     Above: how many dots of all patterns are off by how much, lost ones not among them; what is farther off
@@ -36,57 +36,59 @@ def plot(found: Feedback) -> Figure:
     above = [figure.add_subplot(grid[0, column]) for column in range(2)]
     below = [figure.add_subplot(grid[1, column]) for column in range(2)]
     units = (("Force off  [%]", 100.0), ("Arrival off  [µs]", from_si(1.0, "s", "us")))
-    limits = (found.limits.force, found.limits.arrival)
+    limits = (feedback.limits.force, feedback.limits.arrival)
     for column, ((name, factor), limit) in enumerate(zip(units, limits, strict=True)):
-        values = (found.force, found.arrival)[column] * factor
-        pairs = (found.gap_force, found.gap_arrival)[column] * factor
-        _histogram(above[column], found, values, limit * factor)
+        values = (feedback.force, feedback.arrival)[column] * factor
+        pairs = (feedback.gap_force, feedback.gap_arrival)[column] * factor
+        _histogram(above[column], feedback, values, limit * factor)
         above[column].set_xlabel(name)
-        _by_gap(below[column], found, pairs, limit * factor)
+        _by_gap(below[column], feedback, pairs, limit * factor)
         below[column].set_ylabel(name)
         below[column].set_xlabel("Time between two slots  [ms]")
     above[0].set_ylabel("Share of the dots")
     above[0].set_title(
-        f"All dots of the patterns of eight slots at {found.rate:.6g} Hz", loc="left", fontsize=style.SMALL
+        f"All dots of the patterns of eight slots at {feedback.rate:.6g} Hz",
+        loc="left",
+        fontsize=style.SMALL,
     )
     above[1].set_title("what is farther off: at the ends", loc="right", fontsize=style.SMALL)
     below[0].set_title("The second of two dots", loc="left", fontsize=style.SMALL)
     # Room for the legend above the bars.
-    above[1].set_ylim(0.0, (1.1 + 0.14 * len(found.strategies)) * above[1].get_ylim()[1])
+    above[1].set_ylim(0.0, (1.1 + 0.14 * len(feedback.strategies)) * above[1].get_ylim()[1])
     above[1].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
     remarks = [
         f"{name}: {int(lost)} dots are lost"
-        for name, lost in zip(found.strategies, found.lost, strict=True)
+        for name, lost in zip(feedback.strategies, feedback.lost, strict=True)
         if lost
     ]
-    sign(figure, found.driven, "; ".join(remarks) + "." if remarks else "")
+    sign(figure, feedback.driven, "; ".join(remarks) + "." if remarks else "")
     return figure
 
 
-def _look(found: Feedback, number: int) -> tuple[str, str]:
+def _look(feedback: Feedback, number: int) -> tuple[str, str]:
     """Return colour and marker of a strategy: feedback is the last."""
-    if number == len(found.strategies) - 1:
+    if number == len(feedback.strategies) - 1:
         return style.BLUE, "o"
     return _COLOURS[number % len(_COLOURS)], _MARKS[number % len(_MARKS)]
 
 
-def _histogram(ax: Axes, found: Feedback, values: FloatArray, limit: float) -> None:
+def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> None:
     """Count dots by how far they are off."""
     reach = _REACH * limit
     edges = np.linspace(-reach, reach, _BINS + 1)
-    for number, name in enumerate(found.strategies):
+    for number, name in enumerate(feedback.strategies):
         known = values[number][np.isfinite(values[number])]
         if not known.size:
             continue
         counts, _ = np.histogram(np.clip(known, -reach, reach), edges)
-        passed = 100.0 * found.passed[number].mean()
-        colour, _marker = _look(found, number)
+        passed = 100.0 * feedback.passed[number].mean()
+        colour, _marker = _look(feedback, number)
         ax.stairs(
             counts / known.size,
             edges,
             color=colour,
-            fill=number == len(found.strategies) - 1,
-            alpha=0.75 if number == len(found.strategies) - 1 else 1.0,
+            fill=number == len(feedback.strategies) - 1,
+            alpha=0.75 if number == len(feedback.strategies) - 1 else 1.0,
             lw=style.THIN,
             label=f"{name}: {passed:.0f} % of the patterns",
             gid=name,
@@ -95,12 +97,12 @@ def _histogram(ax: Axes, found: Feedback, values: FloatArray, limit: float) -> N
     ax.set_xlim(-reach, reach)
 
 
-def _by_gap(ax: Axes, found: Feedback, values: FloatArray, limit: float) -> None:
+def _by_gap(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> None:
     """Draw how far the second of two dots is off."""
-    gaps = from_si(1.0, "s", "ms") * found.gaps
+    gaps = from_si(1.0, "s", "ms") * feedback.gaps
     reach = _REACH * limit
-    for number, name in enumerate(found.strategies):
-        colour, marker = _look(found, number)
+    for number, name in enumerate(feedback.strategies):
+        colour, marker = _look(feedback, number)
         ax.plot(
             gaps,
             np.clip(values[number], -reach, reach),

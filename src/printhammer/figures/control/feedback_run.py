@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @styled
-def plot(found: Feedback) -> Figure:
+def plot(feedback: Feedback) -> Figure:
     """Draw the run of a comparison.
 
     Displacement, the samples that the controller looked at, the times at which touches are wanted (short
@@ -25,7 +25,7 @@ def plot(found: Feedback) -> Figure:
     """
     figure = new_figure(4.6)
     panel, strip = with_strip(figure, 2.6)
-    run, hammer = found.run.motion, found.driven
+    run, hammer = feedback.run.motion, feedback.driven
     assert hammer.front is not None
     ms, um = from_si(1.0, "s", "ms"), from_si(1.0, "m", "um")
     front, stop = um * hammer.front, um * hammer.origin
@@ -35,8 +35,8 @@ def plot(found: Feedback) -> Figure:
     panel.axhspan(low - room, stop, color=style.SURFACES["backstop"], alpha=0.25, lw=0.0)
     panel.plot(ms * run.t, um * run.x, color=style.INK, lw=style.LINE, gid="displacement")
     panel.plot(
-        ms * found.run.times,
-        um * found.run.shown,
+        ms * feedback.run.times,
+        um * feedback.run.shown,
         color=style.ORANGE,
         ls="none",
         marker=".",
@@ -45,7 +45,7 @@ def plot(found: Feedback) -> Figure:
         gid="samples",
     )
     panel.vlines(
-        ms * found.run.due,
+        ms * feedback.run.due,
         front - 0.6 * room,
         front + 0.6 * room,
         color=style.BLUE,
@@ -56,18 +56,20 @@ def plot(found: Feedback) -> Figure:
     panel.set_ylim(low - room, high + 2.0 * room)
     panel.set_ylabel("Displacement  [µm]")
     panel.set_title(
-        f"Slots {found.run.pattern} at {found.rate:.6g} Hz with feedback", loc="left", fontsize=style.SMALL
+        f"Slots {feedback.run.pattern} at {feedback.rate:.6g} Hz with feedback",
+        loc="left",
+        fontsize=style.SMALL,
     )
     panel.legend(fontsize=style.SMALL, frameon=False, loc="upper right", ncols=2)
     strip.plot(ms * run.t, run.current, color=style.BLUE, lw=style.THIN, gid="current")
     strip.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
-    for bound in (-found.driver.current, found.driver.current):
+    for bound in (-feedback.driver.current, feedback.driver.current):
         strip.axhline(bound, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)))
-    strip.set_ylim(-1.2 * found.driver.current, 1.2 * found.driver.current)
+    strip.set_ylim(-1.2 * feedback.driver.current, 1.2 * feedback.driver.current)
     strip.set_ylabel("Current  [A]")
     strip.set_xlabel("Time  [ms]")
-    first, last = float(found.run.due[0]), float(found.run.due[-1])
-    span = found.single.flight_time
+    first, last = float(feedback.run.due[0]), float(feedback.run.due[-1])
+    span = feedback.single.flight_time
     panel.set_xlim(ms * (first - 1.3 * span), ms * min(last + 3.0 * span, float(np.max(run.t))))
     sign(figure, hammer)
     return figure

@@ -40,12 +40,7 @@ def waveform_of(hammer: Hammer) -> Waveform:
 def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str | None = None) -> Motion:
     """Return the motion of a hammer whose waveform is fired at given times, s.
 
-    Parameters
-    ----------
-    times : iterable of float, optional
-        Firing times, s; a single pulse at 0 by default.
-    duration : float or str, optional
-        End of the run, s, or text with a unit; by default that of `printhammer.simulate`.
+    The run ends at `duration`, s, or text with a unit; by default as that of `printhammer.simulate`.
 
     Raises
     ------
@@ -65,13 +60,7 @@ def places(hammer: Hammer) -> dict[str, float]:
 
 
 def times_of(motion: Motion, start: float | None = None, end: float | None = None) -> FloatArray:
-    """Return times, s, at which a curve of a motion is drawn: even ones, all steps and all extrema.
-
-    Parameters
-    ----------
-    start, end : float, optional
-        Limits, s; those of the motion by default.
-    """
+    """Return times, s, at which a curve of a motion is drawn: even ones, all steps and all extrema."""
     start = motion.start if start is None else max(start, motion.start)
     end = motion.end if end is None else min(end, motion.end)
     steps = motion.step_times

@@ -58,25 +58,10 @@ class Sheet:
 def inked(
     sheet: Sheet, across: FloatArray, down: FloatArray, density: FloatArray, diameter: float, finest: float
 ) -> FloatArray:
-    """Return the optical density on a sheet.
+    """Return the optical density on a sheet from top left, shape (rows, columns).
 
-    Parameters
-    ----------
-    sheet : Sheet
-        Where.
-    across, down : array, shape (N,)
-        Middles of the dots, m; those off the sheet are left out as far as they are off it.
-    density : array, shape (N,)
-        Their optical densities.
-    diameter : float
-        Of every dot, m.
-    finest : float
-        Size of a pixel, m.
-
-    Returns
-    -------
-    array, shape (rows, columns)
-        Optical densities from top left.
+    Dots have middles, m, densities and one diameter, m; those off the sheet are left out as far as they are
+    off it. Pixels are not smaller than the finest, m.
     """
     size, rows, columns = sheet.pixels(finest)
     radius = 0.5 * diameter / size

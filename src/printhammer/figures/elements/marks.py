@@ -51,12 +51,7 @@ _APART: Final = 1.3
 def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] = "y") -> None:
     """Draw lines at backstop, pack and platen: horizontal single ones, or vertical double ones as in Fig. 2.
 
-    Parameters
-    ----------
-    ax : Axes
-        Axes with displacement along `side`, whose limits are set.
-    side : str, optional
-        "y" for horizontal lines, "x" for vertical ones.
+    The displacement is along `side` of the axes, whose limits are set before.
     """
     low, high = ax.get_ylim() if side == "y" else ax.get_xlim()
     for name, place in places(hammer).items():
@@ -165,22 +160,10 @@ def arrows(
     size: float = 9.0,
     first: float = 0.5,
 ) -> None:
-    """Put arrow heads on a curve, evenly by its length on paper, in the direction of its points.
+    """Put so many arrow heads on a curve in data units, evenly by its length on paper, along its points.
 
-    Parameters
-    ----------
-    ax : Axes
-        Axes whose limits are set.
-    x, y : array
-        The curve in data units.
-    count : int
-        Number of heads.
-    color : str, optional
-        Colour of the heads.
-    size : float, optional
-        Their size, points.
-    first : float, optional
-        Place of the first one, in units of the distance between them.
+    The limits of the axes are set before; `size` is in points, `first` the place of the first head in units
+    of the distance between them.
     """
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     root = ax.get_figure(root=True)
@@ -237,16 +220,7 @@ def drive_strip(
 ) -> None:
     """Draw the currents, or the forces, of the drives of motions in the slim strip below a panel.
 
-    Parameters
-    ----------
-    motions : sequence of Motion
-        Motions of one hammer; if they differ in what is driven, the first decides.
-    times : sequence of array
-        Times at which to draw each, s.
-    until : float
-        End of the time axis, s.
-    colours : sequence of str
-        A colour for each.
+    Each at its times, s, in its colour; if they differ in what is driven, the first decides.
     """
     quantity = motions[0].drive.quantity
     time, value = scale("time", until), scale(quantity)

@@ -44,21 +44,8 @@ def freest(
 ) -> tuple[tuple[float, float], int]:
     """Return the first of several places for a box that no point lies in, or the one with the fewest points.
 
-    Parameters
-    ----------
-    points : array, shape (n, 2)
-        What must not be covered, fractions of the axes.
-    size : tuple of float
-        Width and height of the box.
-    corners : iterable of tuple
-        Its lower left corner at each place, best place first; at least one.
-
-    Returns
-    -------
-    corner : tuple of float
-        The lower left corner.
-    covered : int
-        Number of points covered there.
+    Points, shape (n, 2), width and height of the box, and its lower left corner at each place, best place
+    first, are fractions of the axes. With the corner comes the number of points covered there.
     """
     width, height = size
     best: tuple[float, float] = (0.0, 0.0)

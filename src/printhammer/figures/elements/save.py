@@ -28,15 +28,7 @@ _METADATA: Final[dict[str, dict[str, Any]]] = {
 
 
 def picture(figure: Figure, kind: str, *, dpi: float = DOTS_PER_INCH) -> bytes:
-    """Return the contents of a file with a figure.
-
-    Parameters
-    ----------
-    kind : str
-        One of `FORMATS`.
-    dpi : float, optional
-        Dots per inch of a PNG.
-    """
+    """Return the contents of a file with a figure, of one of `FORMATS`."""
     buffer = BytesIO()
     with in_style():
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
@@ -51,23 +43,9 @@ def save(
     formats: Sequence[str] = FORMATS,
     dpi: float = DOTS_PER_INCH,
 ) -> list[Path]:
-    """Write a figure into a folder, which is made if it is missing.
+    """Write a figure into a folder, made if it is missing; return the files in the order of the formats.
 
-    Parameters
-    ----------
-    folder : path
-        Where to.
-    name : str
-        Name of the files, without suffix.
-    formats : sequence of str, optional
-        Of "svg", "pdf" and "png".
-    dpi : float, optional
-        Dots per inch of the PNG.
-
-    Returns
-    -------
-    list of Path
-        The files, in the order of `formats`.
+    The name is without suffix; dots per inch are those of the PNG.
 
     Raises
     ------

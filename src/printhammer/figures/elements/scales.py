@@ -68,37 +68,14 @@ _SCALES: Final[dict[str, tuple[tuple[float, Scale], ...]]] = {
 
 
 def scale(name: Name, largest: float = 0.0) -> Scale:
-    """Return how a quantity is shown.
-
-    Parameters
-    ----------
-    largest : float, optional
-        Largest absolute value, SI; hammers far from the size of the paper's get larger units.
-
-    Returns
-    -------
-    Scale
-        Units and factors.
-    """
+    """Return how a quantity up to some absolute value, SI, is shown: large hammers get larger units."""
     return next(found for limit, found in _SCALES[name] if largest <= limit)
 
 
 def label(ax: Axes, side: Literal["x", "y"], shown: Scale, name: str = "") -> SecondaryAxis | None:
-    """Name an axis with its unit and put the other unit system on the opposite side.
+    """Name an axis with its unit and return the opposite axis, with the other unit system, if there is one.
 
-    Parameters
-    ----------
-    ax : Axes
-        Axes whose data are in `shown.unit`.
-    side : str
-        "x" or "y".
-    name : str, optional
-        Other name than that of the scale.
-
-    Returns
-    -------
-    SecondaryAxis or None
-        The opposite axis, if there is one.
+    The data of the axes are in `shown.unit`; another name than that of the scale may be given.
     """
     name = name or shown.label
     text = f"{name}  [{shown.sign}]".replace("\n  ", "\n")

@@ -35,21 +35,8 @@ def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     """Draw Fig. 5: the sum of all forces, equation (2), against displacement after a single pulse.
 
     A clockwise loop is energy given to the armature, a counter-clockwise one energy lost; arrow heads tell
-    which.
-
-    The insert shows what follows the second touch of the backstop, where there is one.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        Any hammer with a waveform.
-    duration : float or str, optional
-        Time of the motion drawn, s, or text with a unit; 4 ms by default.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
+    which. The insert shows what follows the second touch of the backstop, where there is one. The motion
+    lasts 4 ms unless another duration, s, or text with a unit, is given.
     """
     motion = fired(hammer, duration=duration)
     times = times_of(motion)

@@ -4,18 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from printhammer.figures.elements.map_marks import (
-    chart_of,
-    colour_bar,
-    drawable,
-    failures,
-    firing_lines,
-    key,
-    norm_of,
-    picture,
-    scales_of,
-    sign_map,
-)
+from printhammer.figures.elements import map_marks
 from printhammer.figures.elements.style import new_figure, styled
 
 if TYPE_CHECKING:
@@ -49,15 +38,15 @@ def frequency_map(
     InputError
         The hammer has no waveform or no rest state, or the map fewer than two times.
     """
-    found = drawable(chart_of(hammer, rates) if chart is None else chart)
-    scales = scales_of(found)
-    norm = norm_of(scales, found)
+    found = map_marks.drawable(map_marks.chart_of(hammer, rates) if chart is None else chart)
+    scales = map_marks.scales_of(found)
+    norm = map_marks.norm_of(scales, found)
     figure = new_figure(4.6)
     grid = figure.add_gridspec(1, 2, width_ratios=(30.0, 1.0))
     panel, bar = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
-    picture(panel, found, norm, scales)
-    firing_lines(panel, found, scales)
-    key(panel, found)
-    colour_bar(bar, found, norm, scales)
-    sign_map(figure, found, failures(found))
+    map_marks.picture(panel, found, norm, scales)
+    map_marks.firing_lines(panel, found, scales)
+    map_marks.key(panel, found)
+    map_marks.colour_bar(bar, found, norm, scales)
+    map_marks.sign_map(figure, found, map_marks.failures(found))
     return figure

@@ -19,17 +19,7 @@ if TYPE_CHECKING:
 def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 10: velocity against displacement after a single pulse; arrows tell the direction of time.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        Any hammer with a waveform.
-    duration : float or str, optional
-        Time of the motion drawn, s, or text with a unit; 4 ms by default.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
+    The motion lasts 4 ms unless another duration, s, or text with a unit, is given.
     """
     motion = fired(hammer, duration=duration)
     x, v = orbit(motion, times_of(motion))

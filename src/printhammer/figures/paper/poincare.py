@@ -61,8 +61,6 @@ def poincare(
 
     Parameters
     ----------
-    hammer : Hammer
-        Any hammer with a waveform.
     strobes : sequence of Strobe, optional
         Strobe points from `printhammer.chaos.strobes`; by default those of the hammer.
     periods : sequence, optional
@@ -72,11 +70,6 @@ def poincare(
     printed : mapping, optional
         Verdicts that the paper prints, such as "period-2", by strobe time, s; each is written in its panel
         where the verdict on the points is another.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
     """
     from printhammer.chaos import strobes as strobed
 

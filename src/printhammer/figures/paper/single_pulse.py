@@ -14,19 +14,6 @@ if TYPE_CHECKING:
 
 
 def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
-    """Draw Fig. 3: the motion that a single pulse causes.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        Any hammer with a waveform.
-    duration : float or str, optional
-        Time shown, s, or text with a unit; by default until the armature has settled, at most 4 ms.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
-    """
+    """Draw Fig. 3: the motion that a single pulse causes, by default until it has settled, or 4 ms."""
     motion = fired(hammer, duration=duration)
     return timeline([motion], motion.end if duration is not None else shown_until(motion))

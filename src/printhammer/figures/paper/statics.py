@@ -36,8 +36,6 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
 
     Parameters
     ----------
-    hammer : Hammer
-        Any hammer with a magnet.
     currents : sequence of float, optional
         Coil currents, A; those outside the range of the magnet's law are left out.
 

@@ -8,16 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from printhammer.figures.elements.map_marks import (
-    HIGHEST,
-    LOWEST,
-    chart_of,
-    drawable,
-    failures,
-    limits_of,
-    scales_of,
-    sign_map,
-)
+from printhammer.figures.elements import map_marks
 from printhammer.figures.elements.style import BLUE, HAIR, INK, MUTED, SMALL, new_figure, styled
 from printhammer.maps.layout import places_of
 
@@ -101,11 +92,12 @@ def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
         The hammer has no waveform or no rest state, or the map fewer than two times.
     """
     if chart is None:
-        chart = chart_of(hammer, np.linspace(LOWEST, HIGHEST, CURVES) if rates is None else rates, _TIMES)
-    drawable(chart)
-    scales = scales_of(chart)
+        wanted = np.linspace(map_marks.LOWEST, map_marks.HIGHEST, CURVES) if rates is None else rates
+        chart = map_marks.chart_of(hammer, wanted, _TIMES)
+    map_marks.drawable(chart)
+    scales = map_marks.scales_of(chart)
     places = places_of(chart)
-    low, high = limits_of(chart)
+    low, high = map_marks.limits_of(chart)
     every = chart["rate"].values
     time = chart["time"].values
     view = _View(
@@ -124,7 +116,7 @@ def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
     _rate_axis(ax, view, scales.rate)
     ax.set_xlim(-0.26, 1.10)
     ax.set_ylim(-0.09, _LEAN[1] + _TALL)
-    sign_map(figure, chart, failures(chart))
+    map_marks.sign_map(figure, chart, map_marks.failures(chart))
     return figure
 
 

@@ -23,19 +23,8 @@ if TYPE_CHECKING:
 def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 4: the sum of all forces on the armature, equation (2), after a single pulse.
 
-    The impacts on a rigid backstop have no finite force and are not drawn.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        Any hammer with a waveform.
-    duration : float or str, optional
-        Time shown, s, or text with a unit; by default until the armature has settled, at most 4 ms.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
+    The impacts on a rigid backstop have no finite force and are not drawn. The time shown ends, unless given,
+    when the armature has settled, at most after 4 ms.
     """
     motion = fired(hammer, duration=duration)
     until = motion.end if duration is not None else shown_until(motion)

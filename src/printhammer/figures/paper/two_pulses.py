@@ -27,8 +27,6 @@ def two_pulses(
 
     Parameters
     ----------
-    hammer : Hammer
-        Any hammer with a waveform.
     delays : sequence of float, optional
         Times from the first firing to the second, s; one to three.
     duration : float or str, optional

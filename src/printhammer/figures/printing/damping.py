@@ -25,34 +25,34 @@ _BAR: Final = 0.66
 
 
 @styled
-def plot(found: DampingStudy) -> Figure:
+def plot(study: DampingStudy) -> Figure:
     """Draw a damping study.
 
     A row a material. Bars: safe rate, settle-out time, change of momentum at the backstop, all at the same
     print force. Hollow: that takes more current than is allowed. Dashed: the hammer as it is. What is not
     known is said instead of a bar.
     """
-    count = len(found.materials)
+    count = len(study.materials)
     figure = new_figure(1.3 + _ROW * count, 7.6)
     axes = figure.subplots(1, 3, sharey=True, width_ratios=(1.25, 1.0, 1.0))
-    prints = [status in ("ok", "current limit") for status in found.status.tolist()]
-    none = f"not even {found.grid[0]:g} Hz"
+    prints = [status in ("ok", "current limit") for status in study.status.tolist()]
+    none = f"not even {study.grid[0]:g} Hz"
     panels = (
-        ("Safe rate  [Hz]", found.safe_rate, none),
-        ("Settle-out  [ms]", 1e3 * found.settle_out, "not in 20 ms"),
-        ("Wear: impulse  [mN s a dot]", 1e3 * found.impulse, ""),
+        ("Safe rate  [Hz]", study.safe_rate, none),
+        ("Settle-out  [ms]", 1e3 * study.settle_out, "not in 20 ms"),
+        ("Wear: impulse  [mN s a dot]", 1e3 * study.impulse, ""),
     )
     for ax, (name, values, missing) in zip(axes, panels, strict=True):
-        status = found.status.tolist() if ax is axes[0] else [""] * count
+        status = study.status.tolist() if ax is axes[0] else [""] * count
         told = [missing if well else str(text) for well, text in zip(prints, status, strict=True)]
-        _panel(ax, found, values, told)
+        _panel(ax, study, values, told)
         ax.set_xlabel(name)
-    labels = [one.label.replace(" us", " µs") for one in found.materials]
+    labels = [one.label.replace(" us", " µs") for one in study.materials]
     axes[0].set_yticks(range(count), labels, fontsize=style.TINY)
     axes[0].set_ylim(count - 0.4, -0.6)
-    for tick, one in zip(axes[0].get_yticklabels(), found.materials, strict=True):
+    for tick, one in zip(axes[0].get_yticklabels(), study.materials, strict=True):
         tick.set_color(COLOURS[one.kind])
-    kinds = [kind for kind in COLOURS if any(one.kind == kind for one in found.materials)]
+    kinds = [kind for kind in COLOURS if any(one.kind == kind for one in study.materials)]
     for place, kind in enumerate(kinds):
         beside(
             axes[0],
@@ -62,21 +62,21 @@ def plot(found: DampingStudy) -> Figure:
             xycoords="axes fraction",
             color=COLOURS[kind],
         )
-    over = int((found.status == "current limit").sum())
-    limit = f"; hollow: over {found.current_limit:g} A" if over else f", {found.current_limit:g} A at most"
-    axes[2].set_title(f"All print with {found.nominal.force:.1f} N{limit}", loc="right", fontsize=style.SMALL)
-    sign(figure, found.hammer)
+    over = int((study.status == "current limit").sum())
+    limit = f"; hollow: over {study.current_limit:g} A" if over else f", {study.current_limit:g} A at most"
+    axes[2].set_title(f"All print with {study.nominal.force:.1f} N{limit}", loc="right", fontsize=style.SMALL)
+    sign(figure, study.hammer)
     return figure
 
 
-def _panel(ax: Axes, found: DampingStudy, values: FloatArray, otherwise: list[str]) -> None:
-    best = found.best
-    for row, one in enumerate(found.materials):
+def _panel(ax: Axes, study: DampingStudy, values: FloatArray, otherwise: list[str]) -> None:
+    best = study.best
+    for row, one in enumerate(study.materials):
         colour = COLOURS[one.kind]
         if not np.isfinite(values[row]):
             beside(ax, otherwise[row], (0.0, row), (3.0, 0.0), xycoords=ALONG_Y, va="center")
             continue
-        hollow = found.status[row] == "current limit"
+        hollow = study.status[row] == "current limit"
         ax.barh(
             row,
             values[row],

@@ -25,7 +25,7 @@ _ROOM: Final = 1.25
 
 
 @styled
-def plot(found: Quality) -> Figure:
+def plot(quality: Quality) -> Figure:
     """Draw where the dots of a pattern lie in force and arrival, and one after the other.
 
     Left: every dot, its force over that of the single pulse against how late it arrives, the limits as a box.
@@ -36,27 +36,27 @@ def plot(found: Quality) -> Figure:
     plane = figure.add_subplot(grid[:, 0])
     force = figure.add_subplot(grid[0, 1])
     arrival = figure.add_subplot(grid[1, 1], sharex=force)
-    share = 100.0 * (found.force / found.nominal.force - 1.0)
-    late = _US * found.arrival_deviation
-    good = found.fault < 0
-    limits = found.limits
+    share = 100.0 * (quality.force / quality.nominal.force - 1.0)
+    late = _US * quality.arrival_deviation
+    good = quality.fault < 0
+    limits = quality.limits
     _box(plane, limits, late, share)
     for which, colour, name in (
         (good, style.BLUE, "within limits"),
-        (~good & ~found.lost, style.ORANGE, "off"),
+        (~good & ~quality.lost, style.ORANGE, "off"),
     ):
         if which.any():
             plane.plot(
                 late[which], share[which], "o", ms=3.2, mew=0.0, alpha=0.7, color=colour, label=name, gid=name
             )
-    if found.lost.any():
-        plane.plot([], [], "x", ms=5.0, color=style.INK, label=f"{int(found.lost.sum())} lost")
+    if quality.lost.any():
+        plane.plot([], [], "x", ms=5.0, color=style.INK, label=f"{int(quality.lost.sum())} lost")
     plane.set_xlabel("Arrives late by  [µs]")
     plane.set_ylabel("Force against the single pulse  [%]")
     plane.legend(loc="upper right", fontsize=style.TINY, frameon=False, handletextpad=0.2)
-    begin = _window(found)
-    shown = (found.slot >= begin) & (found.slot < begin + _MOST_SLOTS)
-    where = found.slot[shown]
+    begin = _window(quality)
+    shown = (quality.slot >= begin) & (quality.slot < begin + _MOST_SLOTS)
+    where = quality.slot[shown]
     for ax, values, bound in ((force, share, 100.0 * limits.force), (arrival, late, _US * limits.arrival)):
         ax.axhspan(-bound, bound, color=style.FAINT, alpha=0.5, lw=0.0)
         ax.axhline(0.0, color=style.MUTED, lw=style.HAIR)
@@ -64,34 +64,30 @@ def plot(found: Quality) -> Figure:
             where, 0.0, values[shown], color=np.where(good[shown], style.BLUE, style.ORANGE), lw=style.THIN
         )
         ax.scatter(where, values[shown], s=7.0, color=np.where(good[shown], style.BLUE, style.ORANGE), lw=0.0)
-        gone = found.slot[shown & np.isnan(values)]
+        gone = quality.slot[shown & np.isnan(values)]
         ax.plot(gone, np.zeros(gone.size), "x", ms=5.0, color=style.INK, gid="lost")
         _symmetric(ax, values, bound)
     force.set_ylabel("Force  [%]")
     arrival.set_ylabel("Arrival  [µs]")
     force.tick_params(axis="x", labelbottom=False)
     arrival.set_xlabel("Slot" if begin == 0 else f"Slot; the {_MOST_SLOTS} with the worst dot")
-    arrival.set_xlim(begin - 1.0, min(begin + _MOST_SLOTS, len(found.wanted)))
-    told = f"{found.rate:g} Hz, {found.strategy}: {int(good.sum())} of {good.size} dots within limits"
+    arrival.set_xlim(begin - 1.0, min(begin + _MOST_SLOTS, len(quality.wanted)))
+    told = f"{quality.rate:g} Hz, {quality.strategy}: {int(good.sum())} of {good.size} dots within limits"
     force.set_title(told, loc="left", fontsize=style.SMALL)
-    sign(figure, found.hammer, "" if found.ok else f"The run ended early: {found.status}.")
+    sign(figure, quality.hammer, "" if quality.ok else f"The run ended early: {quality.status}.")
     return figure
 
 
 @styled
-def plot_safe_rate(*found: SafeRate) -> Figure:
+def plot_safe_rate(*safe_rates: SafeRate) -> Figure:
     """Draw how force and arrival deviate against the rate, and up to which rate all patterns pass.
 
-    Bands from the least to the largest deviation of any dot of any pattern; grey: within limits.
-
-    Parameters
-    ----------
-    found : SafeRate
-        From `printhammer.safe_rate`; several, such as of different strategies, are drawn over each other.
+    Bands from the least to the largest deviation of any dot of any pattern; grey: within limits. Several safe
+    rates, such as of different strategies, are drawn over each other.
     """
     figure = new_figure(4.6)
     axes = figure.subplots(2, 1, sharex=True)
-    for number, one in enumerate(found):
+    for number, one in enumerate(safe_rates):
         colour = (style.BLUE, style.GREEN, style.ORANGE)[number % 3]
         for ax, low, high in (
             (axes[0], 100.0 * one.force_low, 100.0 * one.force_high),
@@ -113,17 +109,17 @@ def plot_safe_rate(*found: SafeRate) -> Figure:
                 fontsize=style.SMALL,
                 color=colour,
             )
-    limits = found[0].limits
+    limits = safe_rates[0].limits
     for ax, bound in ((axes[0], 100.0 * limits.force), (axes[1], _US * limits.arrival)):
         ax.axhspan(-bound, bound, color=style.FAINT, alpha=0.5, lw=0.0, zorder=0)
         ax.axhline(0.0, color=style.MUTED, lw=style.HAIR)
     axes[0].set_ylabel("Force  [%]")
     axes[1].set_ylabel("Arrival  [µs]")
     axes[1].set_xlabel("Slots per second  [Hz]")
-    if len(found) > 1:
+    if len(safe_rates) > 1:
         axes[0].legend(loc="lower left", fontsize=style.TINY, frameon=False)
-    remarks = [one.failure.text for one in found if one.failure is not None]
-    sign(figure, found[0].hammer, *remarks[:1])
+    remarks = [one.failure.text for one in safe_rates if one.failure is not None]
+    sign(figure, safe_rates[0].hammer, *remarks[:1])
     return figure
 
 
@@ -151,16 +147,16 @@ def _reach(values: FloatArray, bound: float) -> float:
     return float(_ROOM * max(bound, known.max(initial=0.0))) or 1.0
 
 
-def _window(found: Quality) -> int:
+def _window(quality: Quality) -> int:
     """Return the first slot shown, so that the worst dot is in the middle."""
-    if len(found.wanted) <= _MOST_SLOTS:
+    if len(quality.wanted) <= _MOST_SLOTS:
         return 0
-    bounds = np.maximum([found.limits.force, found.limits.arrival], 1e-300)
+    bounds = np.maximum([quality.limits.force, quality.limits.arrival], 1e-300)
     off = np.maximum(
-        np.abs(found.force / found.nominal.force - 1.0) / bounds[0],
-        np.abs(found.arrival_deviation) / bounds[1],
+        np.abs(quality.force / quality.nominal.force - 1.0) / bounds[0],
+        np.abs(quality.arrival_deviation) / bounds[1],
     )
     # Lost dots, whose deviations are NaN, and extra contacts are worse than any deviation.
-    worst = int(np.argmax(np.where(np.isnan(off) | (found.extra_contacts > 0), np.inf, off)))
-    middle = int(found.slot[worst]) - _MOST_SLOTS // 2
-    return max(found.judged_from, min(middle, len(found.wanted) - _MOST_SLOTS))
+    worst = int(np.argmax(np.where(np.isnan(off) | (quality.extra_contacts > 0), np.inf, off)))
+    middle = int(quality.slot[worst]) - _MOST_SLOTS // 2
+    return max(quality.judged_from, min(middle, len(quality.wanted) - _MOST_SLOTS))

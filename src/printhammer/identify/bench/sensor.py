@@ -41,18 +41,7 @@ class Amount:
 
     @classmethod
     def read(cls, text: str | float, si: str, name: str, *, signed: bool = False) -> Amount:
-        """Read a quantity such as "0.2 um", "0.5 %" (of full scale) or "1 % of reading".
-
-        Parameters
-        ----------
-        text : str or float
-            The text, or a number in SI.
-        si : str
-            SI unit.
-        name : str
-            For messages.
-        signed : bool, optional
-            Whether it may be negative.
+        """Read a quantity such as "0.2 um", "0.5 %" (of full scale) or "1 % of reading", or a number in SI.
 
         Raises
         ------
@@ -101,20 +90,7 @@ class Channel:
             raise InputError(f"a resolution {READING} is given, expected one in steps of the same size")
 
     def readings(self, true: FloatArray, normal: FloatArray) -> FloatArray:
-        """Return what is read.
-
-        Parameters
-        ----------
-        true : array, shape (n,)
-            What is there, SI.
-        normal : array, shape (n,)
-            Standard normal numbers.
-
-        Returns
-        -------
-        array, shape (n,)
-            SI.
-        """
+        """Return what is read of true values, SI, with standard normal numbers for the noise, shape (n,)."""
         shown = true + self.offset.at(true) + self.noise.at(true) * normal
         return self.rounded(shown, true)
 
@@ -190,23 +166,9 @@ def full_scale(true: FloatArray) -> float:
 def wrong_rows(
     share: float, true: FloatArray, rng: np.random.Generator
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Draw which readings are wrong, and by how much.
+    """Draw which readings, a share of all, are wrong, ascending, and by how much.
 
-    Parameters
-    ----------
-    share : float
-        Of all rows.
-    true : array, shape (n,)
-        What is there, SI.
-    rng : Generator
-        Where they are drawn from.
-
-    Returns
-    -------
-    rows : array of int
-        Ascending.
-    errors : array, shape of `rows`
-        SI; normal, a tenth of the full scale.
+    Errors are normal, a tenth of the full scale of what is there, SI.
     """
     count = int(share * len(true) + 0.5)
     rows = np.sort(rng.permutation(len(true))[:count])

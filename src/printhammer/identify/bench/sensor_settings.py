@@ -23,18 +23,11 @@ _OTHERS: Final = ("exact", "sampling_rate", "bandwidth", "outliers")
 
 
 def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, str]) -> Sensor:
-    """Return a sensor with settings changed.
+    """Return a sensor with settings changed; `units` are the SI units of the quantities.
 
-    Parameters
-    ----------
-    sensor : Sensor
-        What is changed.
-    settings : mapping
-        "noise", "resolution", "offset": mapping of quantity to amount, such as {"force": "0.5 %"};
-        "sampling_rate", "bandwidth": "100 kHz" or a number in Hz, "none" for no limit; "outliers": share,
-        "2 %" or 0.02; "exact": True to begin without any error.
-    units : mapping of str to str
-        SI unit of each quantity.
+    Settings are "noise", "resolution", "offset": mapping of quantity to amount, such as {"force": "0.5 %"};
+    "sampling_rate", "bandwidth": "100 kHz" or a number in Hz, "none" for no limit; "outliers": share, "2 %"
+    or 0.02; "exact": True to begin without any error.
 
     Raises
     ------
@@ -80,19 +73,7 @@ def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
 def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> dict[str, str]:
     """Read settings such as "force=0.5 %" or "0.2 um", which goes to all quantities of its dimension.
 
-    Parameters
-    ----------
-    texts : list of str
-        As given on the command line.
-    part : str
-        "noise", "resolution" or "offset", for messages.
-    quantities : mapping of str to str
-        SI unit of each quantity that may be named.
-
-    Returns
-    -------
-    dict
-        Text of the amount, by quantity.
+    The text of the amount is returned by quantity; `part`, such as "noise", is for messages.
 
     Raises
     ------

@@ -44,15 +44,7 @@ class Prior:
 
 
 class Priors:
-    """What is known of the parameters, over its standard errors; parameters are counted in their scales.
-
-    Parameters
-    ----------
-    priors : sequence of Prior
-        Independent of each other.
-    scales : array, shape (p,)
-        Sizes of the parameters, SI.
-    """
+    """Several `Prior`, independent of each other, over their standard errors, parameters in their scales."""
 
     def __init__(self, priors: Sequence[Prior], scales: FloatArray) -> None:
         self.scales = scales
@@ -85,15 +77,7 @@ def largest_gap(chains: Sequence[Chain], units: FloatArray) -> float:
 
 
 class Approach:
-    """Steps towards a minimum of data, priors and gaps.
-
-    Parameters
-    ----------
-    priors : Priors
-        What is known beside.
-    spikes : sequence of bool array
-        Samples of each shot that do not count.
-    """
+    """Steps towards a minimum of data, priors and gaps; spikes of each shot do not count."""
 
     def __init__(
         self,

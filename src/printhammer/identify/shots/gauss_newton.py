@@ -76,15 +76,7 @@ class Solution:
 
 
 class GaussNewton:
-    """The fit of the parameters of a `Shooting`.
-
-    Parameters
-    ----------
-    priors : sequence of Prior
-        What is known beside.
-    robust : bool
-        Whether outliers are weighed down and left out.
-    """
+    """The fit of the parameters of a `Shooting`; a robust one weighs outliers down and leaves them out."""
 
     def __init__(self, shooting: Shooting, priors: Sequence[Prior], *, robust: bool) -> None:
         self.shooting = shooting
@@ -118,18 +110,10 @@ class GaussNewton:
         held: npt.NDArray[np.bool_] | None = None,
         noise: Solution | None = None,
     ) -> Solution:
-        """Find the parameters.
+        """Find the parameters from values, SI, and states at the joints of each shot, each shape (j, 2).
 
-        Parameters
-        ----------
-        values : array, shape (p,)
-            Where to begin, SI.
-        states : sequence of array, shape (j, 2)
-            States at the joints of each shot to begin with.
-        held : bool array, shape (p,), optional
-            Parameters that stay where they are.
-        noise : Solution, optional
-            Whose noise and outliers are taken as known, near it.
+        Parameters that are held stay where they are. With the noise of a solution near by its outliers are
+        taken as known too.
 
         Raises
         ------
@@ -265,24 +249,10 @@ class GaussNewton:
         )
 
     def profile(self, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
-        """Return how much worse the fit becomes where one parameter is held at other values.
+        """Return how much worse the fit becomes where one parameter is held, and its 95 % interval.
 
-        The noise is taken as found at the solution; where there is no fit, or the constant would change its
-        sign, the profile ends.
-
-        Parameters
-        ----------
-        solution : Solution
-            The solution of the fit.
-        which : int
-            Number of the parameter.
-        degrees_of_freedom : float
-            Of the estimate of the noise.
-
-        Returns
-        -------
-        Profile
-            With the interval of 95 %.
+        The noise is taken as found at the solution, with so many degrees of freedom; where there is no fit,
+        or the constant would change its sign, the profile ends.
         """
         error = float(np.sqrt(solution.covariance[which, which]))
         best = solution.values[which]

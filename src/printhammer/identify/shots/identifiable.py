@@ -44,14 +44,7 @@ def singular(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
 def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> None:
     """Refuse constants that can change together without any change of the motion.
 
-    Parameters
-    ----------
-    where : str
-        Names of the files.
-    design : array, shape (m, p)
-        Jacobian over the standard errors of the data.
-    names : sequence of str, of length p
-        Of the parameters.
+    `where` names the files; the design is the Jacobian over the standard errors of the data, shape (m, p).
 
     Raises
     ------
@@ -101,21 +94,9 @@ def would_be_found(
 ) -> list[tuple[str, float, float]]:
     """Return what the records would say of further constants, one at a time, were they free too.
 
-    Parameters
-    ----------
-    design : array, shape (m, p)
-        Jacobian of what was fitted, over the standard errors of the data.
-    columns : array, shape (m, q)
-        Likewise of further constants, per relative change.
-    names : sequence of str, of length q
-        Their names.
-    residuals : array, shape (m,)
-        Over the standard errors.
-
-    Returns
-    -------
-    list of tuple
-        Name, relative standard error, and relative change that would fit best, of each.
+    `design`, shape (m, p), and `residuals` are over the standard errors of the data, as are `columns`, shape
+    (m, q), of the further constants per relative change. Returned are name, relative standard error, and
+    relative change that would fit best, of each.
     """
     basis, _r = np.linalg.qr(design)
     found = []

@@ -167,21 +167,10 @@ class Shooting:
     def chains(
         self, values: FloatArray, states: Sequence[FloatArray], *, derivatives: bool
     ) -> list[Chain] | None:
-        """Integrate all stretches.
+        """Integrate all stretches; None where there is no such hammer, or a run does not come to its end.
 
-        Parameters
-        ----------
-        values : array, shape (p,)
-            Of the parameters, SI.
-        states : sequence of array, shape (j, 2)
-            Displacement, m, and velocity, m/s, at the joints of each shot.
-        derivatives : bool
-            Whether to find the derivatives.
-
-        Returns
-        -------
-        list of Chain or None
-            None where there is no such hammer, or a run does not come to its end.
+        From values of the parameters, SI, and displacement, m, and velocity, m/s, at the joints of each shot,
+        each shape (j, 2).
         """
         try:
             variants = self._variants(values, derivatives)
@@ -263,19 +252,9 @@ class Shooting:
         return Chain(motion, ends[:-1] - states, by_parameter, by_state, ends_p[:-1], ends_s[:-1])
 
     def shown(self, shot: int, motion: FloatArray) -> FloatArray:
-        """Return what the sensor shows at the samples of a shot.
+        """Return what the sensor shows at the samples of a shot, shape (n, ...); before the firing, at rest.
 
-        Parameters
-        ----------
-        shot : int
-            Its number.
-        motion : array, shape (g, 2, ...)
-            Displacement and velocity on the grid, or derivatives of them.
-
-        Returns
-        -------
-        array, shape (n, ...)
-            At the samples; before the firing, at rest.
+        Of displacement and velocity on the grid, or derivatives of them, shape (g, 2, ...).
         """
         plan = self.plans[shot]
         flat = motion.reshape(len(motion), 2, -1)

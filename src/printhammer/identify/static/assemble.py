@@ -59,23 +59,10 @@ def assemble(
     p_value: float = math.nan,
     notes: Sequence[str] = (),
 ) -> Fit:
-    """Make the result of a fit.
+    """Make the result of a fit, with intervals, and profiles of weak constants by the law.
 
-    Parameters
-    ----------
-    data : Data
-        What was fitted.
-    law : Law
-        For the profiles.
-    parameters : sequence of tuple
-        Key, SI unit, and whether a hammer file has it; an empty key for a parameter that is of no interest.
-    given, indistinct, rejected, p_value, notes
-        As in `Fit`.
-
-    Returns
-    -------
-    Fit
-        Also with intervals, and profiles of weak constants.
+    Of each parameter key, SI unit, and whether a hammer file has it; an empty key stands for one that is of
+    no interest. `given`, `indistinct`, `rejected`, `p_value` and `notes` are as in `Fit`.
     """
     kept = [k for k, (key, _unit, _in_file) in enumerate(parameters) if key]
     errors = solution.standard_errors
@@ -124,17 +111,7 @@ def assemble(
 def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profile:
     """Hold one parameter at values about the best one and fit the others again.
 
-    Parameters
-    ----------
-    data : array, shape (m,)
-        The data.
-    index : int
-        Of the parameter.
-
-    Returns
-    -------
-    Profile
-        At values up to four standard errors away; rows and weights as in the fit.
+    The values go up to four standard errors away; rows and weights are as in the fit.
     """
     from scipy.optimize import least_squares
 
@@ -204,12 +181,7 @@ def enough(data: Data, needed: int, what: str) -> None:
 def positive(fit: Fit, path: Path, remedies: Mapping[str, str]) -> None:
     """Refuse a fit with a constant that the data do not tell from zero.
 
-    Parameters
-    ----------
-    path : Path
-        The table, for the message.
-    remedies : mapping of str to str
-        By key, what to measure to find the constant.
+    `remedies` say by key what to measure to find the constant.
 
     Raises
     ------

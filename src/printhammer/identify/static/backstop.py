@@ -115,21 +115,10 @@ class Stiffness:
 def fit_backstop(
     path: str | Path | None = None, *, stiffness: Stiffness | float | None = None, robust: bool = True
 ) -> Fit:
-    """Find the constants of the backstop.
+    """Find l/k from rebounds, "backstop.stiffness" from the bodies, and "backstop.damping" with both.
 
-    Parameters
-    ----------
-    path : path, optional
-        Table with the columns ``impact speed`` and ``rebound speed``.
-    stiffness : Stiffness or float, optional
-        k, N/m^1.5; a float is taken as known.
-    robust : bool, optional
-        Whether rows that lie too far off are left out.
-
-    Returns
-    -------
-    Fit
-        With l/k from rebounds, "backstop.stiffness" from the bodies, and "backstop.damping" with both.
+    The table has the columns ``impact speed`` and ``rebound speed``; a stiffness k that is a float, N/m^1.5,
+    is taken as known. See `printhammer.identify.fitting.fit`.
 
     Raises
     ------

@@ -84,20 +84,10 @@ def _need(solution: Solution, term: FloatArray) -> float:
 
 
 def runs_p_value(values: FloatArray) -> float:
-    """Test whether the signs of residuals come in too few or too many runs.
+    """Test whether the signs of residuals, in their order, come in too few or too many runs.
 
-    Equation: A. Wald and J. Wolfowitz, Ann. Math. Statist. 11 (1940) 147, by the normal distribution of the
-    number of runs.
-
-    Parameters
-    ----------
-    values : array, shape (m,)
-        Residuals in the order in which they are to be looked at.
-
-    Returns
-    -------
-    float
-        Probability of a number of runs as far from the expected one; NaN for fewer than 8 of either sign.
+    The probability of a number of runs as far from the expected one is by the normal distribution of that
+    number (A. Wald and J. Wolfowitz, Ann. Math. Statist. 11 (1940) 147); NaN for fewer than 8 of either sign.
     """
     from scipy.stats import norm
 
@@ -113,18 +103,10 @@ def runs_p_value(values: FloatArray) -> float:
 
 
 def together(solution: Solution, names: Sequence[str]) -> list[str]:
-    """Say which parameters the data hardly tell apart.
+    """Say which parameters the data hardly tell apart; nothing where the condition number is small.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of its parameters; an empty name for one that is of no interest.
-
-    Returns
-    -------
-    list of str
-        A sentence with the parameters whose common change the data resist least; nothing where the condition
-        number is small.
+    A sentence has the parameters whose common change the data resist least; one with an empty name is of no
+    interest.
     """
     if solution.condition_number < _HARD_TO_TELL:
         return []

@@ -51,24 +51,11 @@ def fit_magnet(
 ) -> Fit:
     """Fit the magnet, and with it the spring.
 
-    Parameters
-    ----------
-    path : path
-        Table with the columns ``displacement``, ``current`` and ``force``, of magnet and spring together.
-    position : float, optional
-        Position b of the backstop, m; needed with `spring`.
-    spring : path, optional
-        Table with the columns ``displacement`` and ``force`` of the spring alone (no magnet).
-    zero : float or None, optional
-        What the displacement sensor shows at x = 0, m; None to fit it.
-    robust : bool, optional
-        Whether rows that lie too far off are left out.
-
-    Returns
-    -------
-    Fit
-        With "magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs" and "spring.As"; without a table of the spring
-        only "magnet.Am", "magnet.Bm" and the two combinations that the forces determine.
+    The table has the columns ``displacement``, ``current`` and ``force``, of magnet and spring together;
+    `spring` is one of the spring alone, without currents, which needs the position b of the backstop, m.
+    `zero` is what the displacement sensor shows at x = 0, m; None to fit it. Found are "magnet.F0",
+    "magnet.Am", "magnet.Bm", "spring.Bs" and "spring.As"; without a table of the spring only "magnet.Am",
+    "magnet.Bm" and the two combinations that the forces determine. See `printhammer.identify.fitting.fit`.
 
     Raises
     ------
@@ -142,13 +129,7 @@ def _current(table: Table, alone: Table | None) -> FloatArray:
 
 
 def _check(table: Table, alone: Table | None, zero: float, position: float | None) -> int:
-    """Refuse a table with which no fit can succeed; return the number of different currents, 0 for very many.
-
-    Raises
-    ------
-    InputError
-        Says what is missing.
-    """
+    """Refuse a table that allows no fit; return the number of different currents, 0 for very many."""
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     low = int(np.argmin(x))
     if x[low] <= zero:

@@ -101,19 +101,7 @@ class TotalLaw:
 def start_of(table: Table, levels: int, zero: float) -> FloatArray:
     """Return C, Am, Bm and K to begin with, from a fit that is linear in Am^2, Am Bm and Bm^2.
 
-    Parameters
-    ----------
-    table : Table
-        Displacement, current and force.
-    levels : int
-        Number of different currents; 0 for very many.
-    zero : float
-        What the sensor shows at x = 0, m.
-
-    Returns
-    -------
-    array, shape (4,)
-        The parameters.
+    `levels` is the number of different currents, 0 for very many, `zero` what the sensor shows at x = 0, m.
 
     Raises
     ------

@@ -103,23 +103,10 @@ class PackLaw:
 
 
 def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, robust: bool = True) -> Fit:
-    """Fit the pack.
+    """Fit "pack.stiffness" to a table with the columns ``indentation``, ``force`` and perhaps ``branch``.
 
-    Parameters
-    ----------
-    path : path
-        Table with the columns ``indentation``, ``force`` and perhaps ``branch``.
-    thickness : float
-        Thickness d of the pack, platen less front, m.
-    exponents : bool, optional
-        Whether the exponents of loading and unloading are fitted instead of 2.7 and 11.
-    robust : bool, optional
-        Whether rows that lie too far off are left out.
-
-    Returns
-    -------
-    Fit
-        With "pack.stiffness", and with the exponents if asked.
+    The thickness d of the pack, platen less front, is in m. With `exponents` those of loading and unloading
+    are fitted too, instead of 2.7 and 11. See `printhammer.identify.fitting.fit`.
 
     Raises
     ------
@@ -168,13 +155,7 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
 
 
 def _start(law: PackLaw, table: Table) -> FloatArray:
-    """Return the parameters to begin with.
-
-    Raises
-    ------
-    InputError
-        No row of loading lies inside the pack, or the forces are not positive there.
-    """
+    """Return the parameters to begin with; refuse too few or negative forces of loading in the pack."""
     force, cycles = table.values["force"], law.cycles
     rows = np.flatnonzero(law.inside & ~cycles.unloading)
     if len(rows) < _LOADING_ROWS:

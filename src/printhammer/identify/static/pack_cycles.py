@@ -37,17 +37,9 @@ class Cycles:
 
 
 def cycles_of(table: Table) -> Cycles:
-    """Divide a table into load cycles.
+    """Divide a table into load cycles; each run of loading rows begins a new one.
 
-    Parameters
-    ----------
-    table : Table
-        The column ``indentation``, and perhaps ``branch``; without it the sense of the indentation decides.
-
-    Returns
-    -------
-    Cycles
-        Each run of loading rows begins a new one.
+    Without the column ``branch`` the sense of the indentation decides.
     """
     depth = table.values["indentation"]
     words = table.words.get("branch")

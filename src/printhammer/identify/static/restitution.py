@@ -23,19 +23,9 @@ _SMALL: Final = 0.02
 
 
 def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the restitution of the law and its derivative.
+    """Return the restitution e = y / z of the law and its derivative de/dz, for z = (l/k) v_in > -1.
 
-    Parameters
-    ----------
-    z : array
-        (l/k) v_in, more than -1.
-
-    Returns
-    -------
-    e : array
-        Restitution y / z.
-    slope : array
-        de/dz; from dy/dz = z (1 - y) / ((1 + z) y).
+    The derivative is from dy/dz = z (1 - y) / ((1 + z) y).
     """
     small = np.abs(z) < _SMALL
     wide = np.where(small, 1.0, z)
@@ -55,13 +45,7 @@ def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class RestitutionLaw:
-    """Rebound speed against impact speed; p = [l/k].
-
-    Parameters
-    ----------
-    speed : array, shape (m,)
-        Impact speeds, m/s, positive.
-    """
+    """Rebound speed against impact speed, m/s, positive, shape (m,); p = [l/k]."""
 
     def __init__(self, speed: FloatArray) -> None:
         self.speed = speed

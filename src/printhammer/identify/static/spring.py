@@ -27,13 +27,7 @@ _ROWS = 5
 
 
 class SpringLaw:
-    """Equation (4) at measured displacements; p = [Bs, As].
-
-    Parameters
-    ----------
-    travel : array, shape (m,)
-        Displacement from the backstop, x - b, m.
-    """
+    """Equation (4) at displacements from the backstop, x - b, m, shape (m,); p = [Bs, As]."""
 
     def __init__(self, travel: FloatArray) -> None:
         self.travel = travel
@@ -52,21 +46,10 @@ class SpringLaw:
 
 
 def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit:
-    """Fit the spring.
+    """Fit "spring.Bs" and "spring.As" to a table with the columns ``displacement`` and ``force``.
 
-    Parameters
-    ----------
-    path : path
-        Table with the columns ``displacement`` and ``force``.
-    position : float
-        Position b of the backstop, m.
-    robust : bool, optional
-        Whether rows that lie too far off are left out.
-
-    Returns
-    -------
-    Fit
-        With "spring.Bs" and "spring.As".
+    The position b of the backstop is in m; options of all fits are described with
+    `printhammer.identify.fitting.fit`.
 
     Raises
     ------

@@ -21,21 +21,14 @@ _HEADING = "displacement [mm],current [A],force [N]"
 
 @dataclass(frozen=True)
 class ForceTable:
-    """Forces on a complete grid, SI.
-
-    Attributes
-    ----------
-    x : tuple of float
-        Displacements, ascending, m.
-    current : tuple of float
-        Currents, ascending, 0 within their range, A.
-    force : tuple of tuple of float
-        `force[i][j]` at `x[i]` and `current[j]`, N.
-    """
+    """Forces on a complete grid, SI."""
 
     x: tuple[float, ...]
+    """Displacements, ascending, m."""
     current: tuple[float, ...]
+    """Currents, ascending, 0 within their range, A."""
     force: tuple[tuple[float, ...], ...]
+    """`force[i][j]` at `x[i]` and `current[j]`, N."""
 
 
 def gather(rows: Iterable[tuple[float, float, float]], what: str) -> ForceTable:

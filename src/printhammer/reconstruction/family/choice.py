@@ -48,14 +48,7 @@ def scaled(
 ) -> dict[str, float]:
     """Return constants with the same motion: all forces and the mass times `force`, currents times `current`.
 
-    Parameters
-    ----------
-    constants : mapping
-        Key of a hammer file to value, SI.
-    units : mapping
-        Key to SI unit.
-    force, current : float, optional
-        Factors.
+    `constants` are in SI, `units` their SI units, both by key of a hammer file.
     """
     return {
         key: value
@@ -70,14 +63,7 @@ def at_gauge(
 ) -> dict[str, float]:
     """Return constants with the same motion at the common print force and current of the search.
 
-    Parameters
-    ----------
-    constants : mapping
-        Key of a hammer file to value, SI.
-    units : mapping
-        Key to SI unit.
-    print_force : float
-        Peak force of the single-pulse dot with these constants, N.
+    As `scaled`; `print_force` is the peak force of the single-pulse dot with these constants, N.
     """
     amplitude = constants["waveform.amplitude"]
     return scaled(constants, units, PRINT_FORCE / print_force, CURRENT / amplitude)
@@ -86,14 +72,8 @@ def at_gauge(
 def distances(one: FloatArray, others: FloatArray) -> FloatArray:
     """Return how far a hammer is from others, shape (n,): its third largest distance of a constant.
 
-    Two hammers are clearly different where this is at least `APART`.
-
-    Parameters
-    ----------
-    one : array, shape (k,)
-        Constants of a hammer.
-    others : array, shape (n, k)
-        The same constants of others.
+    Two hammers are clearly different where this is at least `APART`. The constants of the one have shape
+    (k,), those of the others (n, k).
     """
     least = np.minimum(np.abs(one), np.abs(others))
     apart = np.abs(others - one)

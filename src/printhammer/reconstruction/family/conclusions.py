@@ -97,25 +97,18 @@ QUANTITIES: Final[dict[str, Quantity]] = {
 
 @dataclass(frozen=True)
 class Conclusions:
-    """The conclusions about one hammer; what they are is said by `QUANTITIES`."""
+    """The conclusions about one hammer; what they are is said by `QUANTITIES`. None: it has none."""
 
     safe_rate_Hz: float | None
-    """Safe rate, Hz; None where even the slowest rate tried prints badly."""
     chaos_onset_s: float | None
-    """Longest strobe time of a strange train, s; None where there is none."""
     flight_time_spread_s: float
-    """Largest peak-to-peak flight time of nine-pulse bursts, s."""
     engraved_limit_Hz: float | None
     dot_matrix_limit_Hz: float | None
-    """Lowest rate at which it exceeds 30 us and 200 us, Hz; None where it never does."""
     energy_per_dot_J: float
     pack_loss_J: float
     backstop_loss_J: float
-    """Coil work of the single pulse, and what pack and backstop take, J."""
     settle_out_s: float
-    """Settle-out time of the single pulse, s."""
     print_force_N: float
-    """Peak force of the single-pulse dot, N."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values by name, for JSON."""
@@ -123,14 +116,7 @@ class Conclusions:
 
 
 def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
-    """Return the conclusions about a hammer.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer, with magnet, pack, backstop and waveform.
-    context : Context, optional
-        Runs to share; by default a new one.
+    """Return the conclusions about a hammer with magnet, pack, backstop and waveform; a context shares runs.
 
     Raises
     ------

@@ -69,15 +69,8 @@ class Member:
 def family_hammers(folder: str | Path | None = None) -> list[Hammer]:
     """Return the hammers of the family, each constant with status "reconstructed".
 
-    Parameters
-    ----------
-    folder : path, optional
-        Folder with a `family.json`; by default that which ships with the program.
-
-    Returns
-    -------
-    list of Hammer
-        In the order of the table, named "hendriks-1983-family-01" and so on.
+    They come in the order of the table, named "hendriks-1983-family-01" and so on, from the `family.json` in
+    a folder, or the one that ships with the program.
 
     Raises
     ------
@@ -160,7 +153,7 @@ def write_family(
 
     def accept(number: int) -> bool:
         member = _judged(found[number], hammers[number], shelf)
-        tell(f"{found[number].source}: {_told(member)}")
+        tell(f"{found[number].source}: {_described(member)}")
         if member is not None:
             members[number] = member
         return member is not None
@@ -188,14 +181,9 @@ def _too_few(paths: Sequence[str | Path], count: int, least: int) -> str:
 
 
 def promising(logged: Sequence[Logged], most: int = _MOST) -> list[Logged]:
-    """Return the hammers of logs that nothing speaks against, the best first, nearly equal ones only once.
+    """Return the hammers of logs that nothing speaks against, the best first.
 
-    Parameters
-    ----------
-    logged : sequence of Logged
-        From the logs.
-    most : int, optional
-        Number from which on nearly equal hammers count once.
+    From `most` on, nearly equal hammers count once.
     """
     found = sorted(
         (row for row in logged if row.promising),
@@ -233,12 +221,7 @@ def print_forces(hammers: Sequence[Hammer]) -> FloatArray:
 def compared(constants: Sequence[Mapping[str, float]], forces: Sequence[float]) -> list[FloatArray]:
     """Return the constants of hammers as they are, and at the common gauge, each of shape (n, k).
 
-    Parameters
-    ----------
-    constants : sequence of mapping
-        Key of a hammer file to value, SI; what one lacks is that of the shipped hammer.
-    forces : sequence of float
-        Peak forces of the single-pulse dots, N.
+    What one lacks is that of the shipped hammer; `forces` are the peak forces of the single-pulse dots, N.
     """
     keys = _keys(constants)
     units = {key: constant.si_unit for key, constant in template().constants.items()}
@@ -296,7 +279,7 @@ def _judge(hammer: Hammer) -> dict[str, Any]:
     return found
 
 
-def _told(member: Member | None) -> str:
+def _described(member: Member | None) -> str:
     if member is None:
         return "no member"
     rate, onset = member.conclusions["safe_rate_Hz"], member.conclusions["chaos_onset_s"]
@@ -313,10 +296,7 @@ def named(number: int) -> str:
 def json_text(family: Sequence[Member], gauged: Sequence[Mapping[str, float]]) -> str:
     """Return the text of `family.json`, see `printhammer.reconstruction.results.Family`.
 
-    Parameters
-    ----------
-    gauged : sequence of mapping
-        Their constants at the common gauge, key to value, SI.
+    `gauged` are the constants of the members at the common gauge, key to value, SI.
     """
     told = robustness([dict(member.conclusions) for member in family], gauged)
     rows = [

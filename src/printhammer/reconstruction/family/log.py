@@ -37,18 +37,10 @@ class Logged:
 
 
 def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
-    """Read logs of judged candidates.
+    """Read logs of judged candidates, see `reconstruction.judging.log`, in the order of the files.
 
-    Parameters
-    ----------
-    paths : iterable of path
-        See `printhammer.reconstruction.judging.log`.
-
-    Returns
-    -------
-    list of Logged
-        In the order of the files. A hammer that was judged several times, in whatever files, comes once, with
-        all verdicts on it, the last of each claim.
+    A hammer that was judged several times, in whatever files, comes once, with all verdicts on it, the last
+    of each claim.
 
     Raises
     ------

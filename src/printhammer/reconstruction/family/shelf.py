@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 class Shelf:
     """Hammers judged, a JSON line each, by their fingerprint and the version of the program.
 
-    Parameters
-    ----------
-    path : Path
-        The file; it need not exist. A line that breaks off, since the program was killed, is left out.
+    The file need not exist. A line that breaks off, since the program was killed, is left out.
     """
 
     def __init__(self, path: Path) -> None:

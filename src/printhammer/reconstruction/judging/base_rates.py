@@ -36,15 +36,7 @@ _NEAR: Final = 1e-6
 
 
 def draw(count: int, seed: int) -> list[dict[str, float]]:
-    """Return the constants of random hammers with the printed stroke, SI.
-
-    Parameters
-    ----------
-    count : int
-        How many.
-    seed : int
-        Of the draws.
-    """
+    """Return the constants of so many random hammers with the printed stroke, SI."""
     rng = np.random.default_rng([seed, 0])
     found: list[dict[str, float]] = []
     while len(found) < count:
@@ -82,25 +74,10 @@ def base_rates(
     pool: Executor | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Count for how many random hammers each claim holds.
+    """Count for how many random hammers each claim holds: what `base_rates.json` holds.
 
-    Parameters
-    ----------
-    count : int
-        Number of hammers.
-    seed : int
-        Of the draws.
-    slow : int, optional
-        Number of hammers, the first ones, for which the slow claims are judged too; by default all.
-    pool : Executor, optional
-        Processes.
-    tell : callable, optional
-        Called with the numbers of hammers done and of all.
-
-    Returns
-    -------
-    dict
-        What `base_rates.json` holds.
+    The slow claims are judged for the first `slow` hammers only, or for all. `tell` is called with the
+    numbers of hammers done and of all.
     """
     drawn = draw(count, seed)
     rng = np.random.default_rng([seed, 1])

@@ -31,11 +31,6 @@ def plain_panels(hammer: Hammer, tolerance: float = TOLERANCE) -> dict[str, tupl
 
     Without the changes of constants and tolerance under which the claim wants the verdict to stay: where this
     is another than the printed one, the claim fails.
-
-    Parameters
-    ----------
-    tolerance : float, optional
-        Of the integration; by default that of the claims.
     """
     printed = printed_verdicts()
     periods = list(printed)
@@ -47,23 +42,11 @@ def plain_panels(hammer: Hammer, tolerance: float = TOLERANCE) -> dict[str, tupl
 
 
 def row_of(constants: Mapping[str, float], names: Iterable[str], *, panels: bool = True) -> dict[str, Any]:
-    """Judge a candidate.
+    """Judge a candidate, its constants in SI, by the claims named, and by Fig. 11 if asked for.
 
-    Parameters
-    ----------
-    constants : mapping
-        Of its hammer file, SI.
-    names : iterable of str
-        Claims to judge.
-    panels : bool, optional
-        Whether to look at Fig. 11 too; the claim itself, with all its changes, is judged only where all
-        panels are as printed without them.
-
-    Returns
-    -------
-    dict
-        `constants`, `verdicts` (claim to true or false), `values` (claim to the measured values in bands),
-        and `panels` and `panel_verdicts` where asked for.
+    The claim of Fig. 11 itself, with all its changes, is judged only where all panels are as printed without
+    them. The row has `constants`, `verdicts` (claim to true or false), `values` (claim to the measured values
+    in bands), and `panels` and `panel_verdicts` where asked for.
     """
     hammer = hammer_of(constants)
     context = Context(hammer)

@@ -24,20 +24,10 @@ def key_of(constants: Mapping[str, float]) -> Key:
 
 
 def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
-    """Return the candidates of a log in the order of their first lines; none where there is no file.
+    """Return the candidates of a log, see `judged.row_of`, in the order of their first lines.
 
     A candidate that was judged again comes once, with all verdicts on it, the last of each claim. A last line
-    that breaks off is left out: the program was stopped while it wrote.
-
-    Parameters
-    ----------
-    some : bool, optional
-        Whether there must be some.
-
-    Returns
-    -------
-    list of dict
-        Rows, see `printhammer.reconstruction.judging.judged.row_of`.
+    that breaks off is left out: the program was stopped while it wrote. Without a file there are none.
 
     Raises
     ------

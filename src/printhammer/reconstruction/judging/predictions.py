@@ -12,22 +12,10 @@ if TYPE_CHECKING:
 
 
 def predictions(rows: Sequence[dict[str, Any]], seed: int, candidates: int) -> dict[str, Any]:
-    """Count for how many hammers each claim of kind "shape" holds.
+    """Count for how many hammers each claim of kind "shape" holds: what `predictions.json` holds.
 
-    Parameters
-    ----------
-    rows : sequence of dict
-        Judged candidates of a search on the stated claims alone, see `judged.row_of`; those count for which
-        all stated claims outside Fig. 11 hold.
-    seed : int
-        Of the search.
-    candidates : int
-        Number of candidates that it tried.
-
-    Returns
-    -------
-    dict
-        What `predictions.json` holds.
+    Rows are judged candidates of a search on the stated claims alone; those count for which all stated claims
+    outside Fig. 11 hold. `seed` and `candidates` say which search it was and how many it tried.
     """
     kept = [row for row in rows if all(row["verdicts"].get(name) for name in STATED)]
     counts: dict[str, dict[str, Any]] = {}

@@ -29,14 +29,7 @@ _TOGETHER: Final = 8
 def shortlist(rows: Sequence[dict[str, Any]], count: int, apart: float = APART) -> list[dict[str, Any]]:
     """Return the best candidates of a log that are not next to each other.
 
-    Parameters
-    ----------
-    rows : sequence of dict
-        Candidates.
-    count : int
-        How many at most.
-    apart : float, optional
-        Any two differ by so much in one variable at least, in shares of its range.
+    Any two differ by `apart` in one variable at least, in shares of its range.
     """
     chosen: list[dict[str, Any]] = []
     points = np.empty((0, 0))
@@ -70,23 +63,9 @@ def judge_candidates(
 ) -> list[dict[str, Any]]:
     """Judge candidates and add them to a log; what is in it already is not judged again.
 
-    Parameters
-    ----------
-    every : iterable of dict
-        Constants of hammer files, SI.
-    path : Path
-        The log, JSON lines.
-    names : sequence of str, optional
-        Claims to judge beside Fig. 11; by default the stated ones.
-    pool : Executor, optional
-        Processes.
-    tell : callable, optional
-        Called with the number done, of all, and the row.
-
-    Returns
-    -------
-    list of dict
-        The rows of these candidates, see `printhammer.reconstruction.judging.judged.row_of`.
+    Candidates are constants of hammer files, SI; claims to judge beside Fig. 11 are the stated ones unless
+    others are named. `tell` is called with the number done, of all, and the row. The rows of these candidates
+    are returned, see `judged.row_of`.
     """
     wanted = [dict(constants) for constants in every]
     known = {key_of(row["constants"]): row for row in read_judged(path)}

@@ -60,15 +60,7 @@ def losses_digest() -> str:
 
 
 def evaluate(points: Sequence[FloatArray], aim: Aim) -> list[tuple[Candidate | None, Score]]:
-    """Score points in this thread.
-
-    Parameters
-    ----------
-    points : sequence of arrays
-        Shares of the ranges of the variables.
-    aim : str
-        Which claims count.
-    """
+    """Score points, shares of the ranges of the variables, by the claims of an aim in this thread."""
     weights = WEIGHTS[aim]
     found = candidates(points)
     scores = [Score() for _ in points]
@@ -124,17 +116,7 @@ def rows(points: Sequence[FloatArray], aim: Aim) -> list[dict[str, Any]]:
 
 
 def scored(points: Sequence[FloatArray], aim: Aim, pool: Executor | None) -> list[dict[str, Any]]:
-    """Score points, in the order given, whatever the number of processes.
-
-    Parameters
-    ----------
-    points : sequence of arrays
-        Shares of the ranges of the variables.
-    aim : str
-        Which claims count.
-    pool : Executor or None
-        Processes; None for this one alone.
-    """
+    """Score points, each as a row of the log, in the order given, whatever the number of processes."""
     pieces = [points[start : start + PIECE] for start in range(0, len(points), PIECE)]
     if pool is None:
         done = [rows(piece, aim) for piece in pieces]

@@ -50,15 +50,9 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 class Log:
-    """A log on disk, begun or gone on with.
+    """A log on disk, begun or gone on with: JSON lines, the first of which says what decides on the search.
 
-    Parameters
-    ----------
-    path : Path
-        JSON lines; made where it is missing. A last line that breaks off is cut: the search was stopped
-        while it wrote.
-    heading : dict
-        First line: what decides on the search.
+    A last line that breaks off is cut: the search was stopped while it wrote.
 
     Raises
     ------

@@ -82,16 +82,7 @@ class Plan:
 
 
 def starts_of(path: Path, aim: Aim, count: int = STARTS) -> tuple[tuple[float, ...], ...]:
-    """Return the best points of another search that are not next to each other.
-
-    Parameters
-    ----------
-    path : Path
-        Its log.
-    aim : str
-        Aim of the search that is to begin there.
-    count : int, optional
-        How many points at most.
+    """Return the best points of another search for one with this aim, not next to each other.
 
     Raises
     ------
@@ -114,23 +105,10 @@ def search(
     pool: Executor | None = None,
     tell: Callable[[int, float, dict[str, Any]], None] | None = None,
 ) -> Iterator[dict[str, Any]]:
-    """Search without end; every candidate is yielded after it was noted.
+    """Search without end; every candidate is yielded, as a row of the log, after it was noted.
 
-    Parameters
-    ----------
-    plan : Plan
-        What to search for.
-    path : Path
-        Log; a search begun there goes on.
-    pool : Executor, optional
-        Processes to compute in; by default this one.
-    tell : callable, optional
-        Called after each batch with the number of candidates, the least total loss, and its row.
-
-    Yields
-    ------
-    dict
-        A row of the log.
+    A search begun in the log goes on. `tell` is called after each batch with the number of candidates, the
+    least total loss, and its row.
 
     Raises
     ------

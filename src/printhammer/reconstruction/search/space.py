@@ -117,14 +117,7 @@ def _reached(width: float, rise: float) -> float:
 def constants_at(values: Mapping[str, float], mass: float, stiffness: float) -> dict[str, float]:
     """Return the constants of a hammer file, SI, for values of the variables and any scale of mass.
 
-    Parameters
-    ----------
-    values : mapping
-        Values of the variables.
-    mass : float
-        Of the armature, kg.
-    stiffness : float
-        Of the pack, N.
+    The mass of the armature is in kg, the stiffness of the pack in N.
     """
     b = geometry()["b"]
     current = max(CURRENT, values["release"] * BEYOND * largest_current())
