@@ -98,7 +98,7 @@ hammer = ph.load("hendriks-1983")
 period_1 = ph.continuation(hammer, "period", ("1.23 ms", "1.36 ms"), period="1.25 ms")
 print(period_1.message)
 for event in period_1.events:
-    print(f"{1e3 * event.value:.6f} ms  {event.told}")
+    print(f"{1e3 * event.value:.6f} ms  {event.message}")
 
 figure, axes = plt.subplots()
 draw(axes, period_1, 1e3 * period_1.values, period_1.v, "C0")

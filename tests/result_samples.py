@@ -1,15 +1,15 @@
 """One small result of every class, by the name of the class."""
 
 from collections.abc import Callable
+from functools import cache
 
+import numpy as np
+from tests.chaos.samples import CHAOS
+
+import printhammer as ph
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result
-
-
-def strobe(hammer: Hammer) -> Result:
-    from printhammer.chaos.strobe.points import strobe
-
-    return strobe(hammer, period=1.3e-3, points=5, verdict=False)
+from printhammer.run.ensemble import EnsembleResult
 
 
 def quality(hammer: Hammer) -> Result:
@@ -44,11 +44,105 @@ def page(hammer: Hammer) -> Result:
     return print_page(hammer, "Hi", 1500.0)
 
 
+def compensation_table(hammer: Hammer) -> Result:
+    from tests.control.table.by_hand import by_hand
+
+    return by_hand(hammer)
+
+
+def table_report(hammer: Hammer) -> Result:
+    from tests.control.table.by_hand import by_hand
+
+    from printhammer.control.table.report import judge_table
+    from printhammer.printing.rates.perturbation import Perturbation
+
+    return judge_table(hammer, by_hand(hammer), rates=[900.0], perturbations=[Perturbation()])
+
+
+def fit(hammer: Hammer) -> Result:
+    from printhammer.identify.result import Fit, FittedConstant
+
+    return Fit(
+        kind="spring",
+        source=("spring.csv",),
+        constants={"spring.Bs": FittedConstant.of("spring.Bs", 1.0, 0.1, 3.0, "N")},
+        keys=("spring.Bs",),
+        covariance=np.array([[0.01]]),
+        abscissa=np.array([1e-4, 2e-4, 3e-4]),
+        data=np.array([1.0, 0.9, 0.7]),
+        fitted=np.array([1.0, 0.9, 0.8]),
+        residuals=np.array([0.0, 0.0, -0.1]),
+        axes=(("displacement", "m"), ("force", "N")),
+        degrees_of_freedom=2.0,
+        residual_scale=0.1,
+        weights=np.ones(3),
+        outliers=np.array([False, False, True]),
+        condition_number=1.5,
+        series=np.zeros(3, np.int64),
+        series_names=("spring",),
+        lines=np.array([2, 3, 5]),
+        given={"backstop.position": "50 um"},
+    )
+
+
+def not_none(result: Result | None) -> Result:
+    assert result is not None
+    return result
+
+
+@cache
+def ensemble(hammer: Hammer) -> EnsembleResult:
+    drives = [ph.PulseTrain(hammer.waveform, rate=rate, pulses=2) for rate in (400.0, 500.0)]
+    return ph.Ensemble(hammer, drives, 6e-3).run(dots=True, strobes="firings", times=[1e-3, 2e-3, 3e-3])
+
+
+def feedback(hammer: Hammer) -> Result:
+    from tests.control.feedback.by_hand import by_hand
+
+    return by_hand(hammer)
+
+
+def least_work(hammer: Hammer) -> Result:
+    import pytest
+    from tests.control.least_work.test_burst import let_go, thrown
+
+    from printhammer.control.least_work import search
+    from printhammer.control.least_work.burst import least_work
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "printing_current", thrown)
+        patch.setattr(search, "landing_current", let_go)
+        return least_work(hammer, rate="400 Hz", dots=2, force=0.3)
+
+
+def least_work_rates(hammer: Hammer) -> Result:
+    import numpy as np
+
+    from printhammer.control.least_work.rates import LeastWorkRates
+
+    ratio = np.array([1.2, np.nan])
+    status = np.array(["ok", "no current found"])
+    return LeastWorkRates(
+        hammer, np.array([400.0, 4e3]), 2, ratio, ratio, ratio, ratio, np.array([2, 0]), status
+    )
+
+
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
+    **CHAOS,
+    "CompensationTable": compensation_table,
     "DampingStudy": damping_study,
+    "DotTable": lambda hammer: not_none(ensemble(hammer).dots),
+    "EnsembleResult": ensemble,
+    "Feedback": feedback,
+    "Fit": fit,
+    "LeastWork": least_work,
+    "LeastWorkRates": least_work_rates,
+    "Measurement": lambda hammer: ph.measure("pack", hammer, seed=1, points=5),
+    "Motion": lambda hammer: ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=20),
     "Page": page,
     "Quality": quality,
     "SafeRate": safe_rate,
-    "Strobe": strobe,
+    "Strobes": lambda hammer: not_none(ensemble(hammer).strobes),
+    "TableReport": table_report,
     "ToleranceYield": tolerance_yield,
 }

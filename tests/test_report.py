@@ -5,16 +5,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from tests import results
+from tests import reconstruction_files
 
 from printhammer.claims import claims
 from printhammer.errors import InputError
 from printhammer.reconstruction.results import Results, results_in
-from printhammer.report import build, write_report
+from printhammer.report import build, pdf, write_report
 from printhammer.report.citations import cited_figures
 from printhammer.report.misses import distance, misses_of
 from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text
-from printhammer.report.sheet import Words
 
 if TYPE_CHECKING:
     import printhammer as ph
@@ -67,18 +66,20 @@ class Page(HTMLParser):
         return re.sub(r"[ \n]+", " ", " ".join(self.words))
 
 
-def found_of(hammer: "ph.Hammer", folder: Path, **changes: object) -> Results:
+def results_of(hammer: "ph.Hammer", folder: Path, **changes: object) -> Results:
     """Return made-up results of a reconstruction of a hammer."""
     place = folder / "results"
     place.mkdir(parents=True)
-    search = {**results.SAMPLE["search"], "shipped": hammer.fingerprint}
-    return results_in(results.write(place, **{"search": search, **changes}))
+    search = {**reconstruction_files.SAMPLE["search"], "shipped": hammer.fingerprint}
+    return results_in(reconstruction_files.write(place, **{"search": search, **changes}))
 
 
 @pytest.fixture(scope="module")
 def folder(hammer: "ph.Hammer", tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("paper") / "new" / "folder"
-    report = write_report(hammer, out, claims=CLAIMS, figures=[2, 3], found=found_of(hammer, out.parent))
+    report = write_report(
+        hammer, out, claims=CLAIMS, figures=[2, 3], reconstruction=results_of(hammer, out.parent)
+    )
     assert all(path.is_file() for path in report.files)
     assert {path for path in out.rglob("*") if path.is_file()} == set(report.files)
     return out
@@ -168,8 +169,8 @@ def test_a_claim_that_fails_is_told_by_how_much(page: Page, folder: Path) -> Non
 
 
 def test_results_about_another_hammer_are_left_out(hammer: "ph.Hammer", tmp_path: Path) -> None:
-    found = found_of(hammer.replace("mass", "0.5 g"), tmp_path)
-    report = write_report(hammer, tmp_path / "out", claims=CLAIMS, figures=[], found=found)
+    made = results_of(hammer.replace("mass", "0.5 g"), tmp_path)
+    report = write_report(hammer, tmp_path / "out", claims=CLAIMS, figures=[], reconstruction=made)
     assert not report.reconstructed
     text = Page((tmp_path / "out" / "index.html").read_text("utf-8")).text
     assert "is about another hammer" in text
@@ -183,7 +184,9 @@ def test_results_about_another_hammer_are_left_out(hammer: "ph.Hammer", tmp_path
 def test_without_results_the_report_says_so(hammer: "ph.Hammer", tmp_path: Path) -> None:
     empty = tmp_path / "results"
     empty.mkdir()
-    write_report(hammer, tmp_path / "out", claims=CLAIMS, figures=[], found=results_in(empty), pdf=True)
+    write_report(
+        hammer, tmp_path / "out", claims=CLAIMS, figures=[], reconstruction=results_in(empty), pdf=True
+    )
     shown = Page((tmp_path / "out" / "index.html").read_text("utf-8"))
     assert "No results of a search for the constants ship with this version." in shown.text
     assert "No family of hammers ships with this version." in shown.text
@@ -193,9 +196,9 @@ def test_without_results_the_report_says_so(hammer: "ph.Hammer", tmp_path: Path)
 
 
 def test_corrupt_results_are_told_before_anything_is_done(hammer: "ph.Hammer", tmp_path: Path) -> None:
-    found = found_of(hammer, tmp_path, **results.changed("family", "hammers", to=[]))
+    made = results_of(hammer, tmp_path, **reconstruction_files.changed("family", "hammers", to=[]))
     with pytest.raises(InputError, match=r"family\.json: hammers: expected"):
-        write_report(hammer, tmp_path / "out", found=found)
+        write_report(hammer, tmp_path / "out", reconstruction=made)
     assert not (tmp_path / "out").exists()
 
 
@@ -217,7 +220,7 @@ def test_claims_are_shown_beside_the_figures_they_cite() -> None:
 
 def test_the_same_again_is_the_same(hammer: "ph.Hammer", folder: Path, tmp_path: Path) -> None:
     again = tmp_path / "again"
-    write_report(hammer, again, claims=CLAIMS, figures=[2], found=found_of(hammer, tmp_path))
+    write_report(hammer, again, claims=CLAIMS, figures=[2], reconstruction=results_of(hammer, tmp_path))
     for name in ("claims.json", "figures/figure02.svg"):
         assert (again / name).read_bytes() == (folder / name).read_bytes()
 
@@ -305,31 +308,40 @@ def test_a_page_that_is_there_stands_for_a_complete_report(
 
 
 def test_the_pdf_has_a_page_for_each_figure(hammer: "ph.Hammer", tmp_path: Path) -> None:
-    found, out = found_of(hammer, tmp_path), tmp_path / "out"
-    report = write_report(hammer, out, claims=CLAIMS, figures=[2, 11], found=found, pdf=True)
+    made, out = results_of(hammer, tmp_path), tmp_path / "out"
+    report = write_report(hammer, out, claims=CLAIMS, figures=[2, 11], reconstruction=made, pdf=True)
     assert out / "report.pdf" in report.files
     text = (out / "report.pdf").read_bytes()
     assert text.startswith(b"%PDF-")
     assert b"hendriks-1983" in text
     assert b"CreationDate" not in text
+    assert b"/Title(Figure 2 " in text
     # The front, two figures, and at least two pages of claims and results.
-    (count,) = re.findall(rb"/Count (\d+)", text)
+    (count,) = re.findall(rb"/Type/Pages/Count (\d+)", text)
     assert int(count) >= 5
+    pdf.write_pdf(report, out / "again.pdf")
+    assert (out / "again.pdf").read_bytes() == text
 
 
 def test_a_figure_that_cannot_be_drawn_has_its_page(hammer: "ph.Hammer", tmp_path: Path) -> None:
     report = write_report(hammer.replace("waveform", None), tmp_path, claims=[], figures=[3], pdf=True)
-    assert [drawing.figure for drawing in report.drawings] == [None]
+    assert [drawing.pdf for drawing in report.drawings] == [None]
     assert (tmp_path / "report.pdf").is_file()
 
 
-def test_long_words_and_long_texts_fit_their_lines() -> None:
-    words = Words("a " * 30 + "x" * 200, size=8.0)
-    lines = words.lines(100.0)
-    assert "".join(lines).replace(" ", "") == "a" * 30 + "x" * 200
-    assert all(words._width(line) <= 100.0 for line in lines)
-    assert words.height(100.0) == pytest.approx(len(lines) * words.leading)
-    assert Words("").lines(10.0) == []
+def test_a_pdf_without_its_typesetter_is_refused_before_any_work(
+    hammer: "ph.Hammer", tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pdf, "find_spec", lambda _name: None)
+    with pytest.raises(InputError, match=r"needs typst, which the extra printhammer\[pdf\] installs"):
+        write_report(hammer, tmp_path / "out", pdf=True)
+    assert not (tmp_path / "out").exists()
+
+
+def test_texts_are_texts_in_the_pdf(hammer: "ph.Hammer", tmp_path: Path) -> None:
+    odd = hammer.replace({"title": "#panic() $x *y* _z_ `c` @label </script>", "note": "a < b & c #"})
+    write_report(odd, tmp_path, claims=["geometry"], figures=[], pdf=True)
+    assert b"hendriks-1983" in (tmp_path / "report.pdf").read_bytes()
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from .chaos.basins.basins import basins as basins
 from .chaos.basins.quench import quench_map as quench_map
-from .chaos.bifurcation.diagram import bifurcation as bifurcation
+from .chaos.bifurcation.bifurcation import bifurcation as bifurcation
 from .chaos.continuation.continuation import continuation as continuation
 from .chaos.continuation.regimes import regimes as regimes
 from .chaos.continuation.stability_chart import stability_chart as stability_chart
@@ -16,7 +16,7 @@ from .chaos.strobe.points import strobe as strobe
 from .control.feedback.comparison import feedback as feedback
 from .control.least_work.burst import least_work as least_work
 from .control.table.compensation import CompensationTable as CompensationTable
-from .control.table.files import load_table as load_table
+from .control.table.compensation import load_table as load_table
 from .control.table.report import judge_table as judge_table
 from .control.table.tuning import tune as tune
 from .derivatives.sensitivities import sensitivities as sensitivities

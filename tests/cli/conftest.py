@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -24,6 +25,34 @@ def cli(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
         # Compiling is told on the standard error as well.
         told = [line for line in err.splitlines() if not line.startswith("compiling")]
         return Outcome(int(end.value.code or 0), out, "\n".join(told))
+
+    return call
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def refused(
+    cli: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., None]:
+    """Run a command line that cannot be used: one sentence, status 2, no file written or changed."""
+
+    def call(*arguments: object, said: str | tuple[str, ...]) -> None:
+        monkeypatch.chdir(tmp_path)
+        before, entries = contents(tmp_path), sorted(tmp_path.rglob("*"))
+        done = cli(*arguments)
+        assert done.status == 2, done
+        assert done.out == ""
+        assert len(done.err.splitlines()) == 1
+        assert done.err.startswith("printhammer: ")
+        assert "Traceback" not in done.err
+        assert "Error" not in done.err
+        for part in (said,) if isinstance(said, str) else said:
+            assert part in done.err
+        assert contents(tmp_path) == before
+        assert sorted(tmp_path.rglob("*")) == entries
 
     return call
 

@@ -117,7 +117,7 @@ def test_a_sharp_edge_is_left_out_and_said() -> None:
         assert "waveform.rise" not in found.constants
         with pytest.raises(ph.InputError, match=r"waveform\.rise.* 0\.0"):
             ph.sensitivities(hammer, drive, constants=["waveform.rise"])
-    assert "waveform.rise" in found.provenance["left_out"]
+    assert "waveform.rise" in found.attributes["left_out"]
 
 
 def test_a_run_that_does_not_get_there_says_so() -> None:

@@ -142,7 +142,7 @@ def test_a_current_of_another_shape_is_taken_from_the_record(tmp_path: Path) -> 
     pulse = HalfSine(amplitude=1.5, width=450e-6)
     path = shots.write(tmp_path / "shot.csv", HAMMER, waveform=pulse, current_noise=2e-3, bandwidth=None)
     fit = fit_motion([path], FAR)
-    assert any("a rectangle does not describe the current" in note for note in fit.notes)
+    assert any("a rectangle does not describe the current" in note for note in fit.remarks)
     assert fit["mass"].value == pytest.approx(MASS, rel=2e-3)
 
 
@@ -223,8 +223,8 @@ def test_an_offset_is_noticed(tmp_path: Path) -> None:
     """A record that rests elsewhere than the hammer."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, offset=3e-6)
     fit = fit_motion([path], HAMMER)
-    assert any("rests" in note and "offset of the sensor" in note for note in fit.notes)
-    assert not any("rests" in note for note in fit_motion([shots.write(path, HAMMER)], HAMMER).notes)
+    assert any("rests" in note and "offset of the sensor" in note for note in fit.remarks)
+    assert not any("rests" in note for note in fit_motion([shots.write(path, HAMMER)], HAMMER).remarks)
 
 
 BAD: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
@@ -315,4 +315,4 @@ def test_without_a_rebound_only_the_mass_is_found(tmp_path: Path) -> None:
     fit = fit_motion([path], HAMMER.replace("mass", 1.3 * MASS))
     assert list(fit.constants) == ["mass"]
     assert abs(fit["mass"].value - MASS) < 4.0 * fit["mass"].standard_error
-    assert any("its damping cannot be found" in note for note in fit.notes)
+    assert any("its damping cannot be found" in note for note in fit.remarks)

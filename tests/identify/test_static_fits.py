@@ -116,7 +116,7 @@ def test_a_weak_constant_has_a_profile(tmp_path: Path) -> None:
     assert found.interval == pytest.approx(constant.interval, abs=constant.standard_error)
     assert found.increase.min() == pytest.approx(0.0, abs=1e-6)
     assert np.all(np.diff(found.values) > 0.0)
-    assert any("weakly determined" in note for note in fit.notes)
+    assert any("weakly determined" in note for note in fit.remarks)
 
 
 def test_constants_that_go_together_are_named(tmp_path: Path) -> None:
@@ -335,7 +335,7 @@ def test_missing_pieces_in_one_sentence(tmp_path: Path) -> None:
     columns, branch = lab.pack()
     loading = np.array(branch) == "loading"
     table = write(tmp_path / "p.csv", {name: values[loading] for name, values in columns.items()})
-    assert "not tested" in fit_pack(table, thickness=lab.THICKNESS).notes[0]
+    assert "not tested" in fit_pack(table, thickness=lab.THICKNESS).remarks[0]
     with pytest.raises(InputError, match="no rows of unloading"):
         fit_pack(table, thickness=lab.THICKNESS, exponents=True)
     for bodies, said in (

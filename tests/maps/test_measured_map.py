@@ -10,8 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.maps.layout import UNITS, save_map
+from printhammer.maps.layout import LAYOUT
 from printhammer.maps.measured import load_measured_map
+from printhammer.results import save_dataset
 
 Write = Callable[[str], Path]
 
@@ -52,7 +53,7 @@ def test_one_row_for_each_sample(write: Write) -> None:
     assert found["displacement"].dtype == np.float32
     assert found["displacement"].dims == ("rate", "time")
     for name, variable in found.variables.items():
-        assert (variable.attrs["units"], variable.attrs["long_name"]) == UNITS[str(name)]
+        assert LAYOUT[str(name)].attributes.items() <= variable.attrs.items()
     assert found.attrs["source"] == "measured.csv"
 
 
@@ -108,7 +109,7 @@ def test_times_may_be_asked_for(write: Write) -> None:
 def test_a_computed_map_is_read_as_a_measured_one(hammer: "ph.Hammer", tmp_path: Path, engine: str) -> None:
     chart = ph.frequency_map(hammer, [500.0, 900.0], times=101)
     path = tmp_path / ("map.zarr" if engine == "zarr" else "map.nc")
-    save_map(chart, path)
+    save_dataset(chart, path)
     found = load_measured_map(path)
     xr.testing.assert_equal(found, chart[["displacement"]].drop_vars("firing", errors="ignore"))
 

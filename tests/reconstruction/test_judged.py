@@ -14,7 +14,8 @@ from printhammer.claims import Context, claims, judge
 from printhammer.errors import InputError
 from printhammer.reconstruction.judging import judged as module
 from printhammer.reconstruction.judging.judged import FIGURE_11, SLOW, STATED, plain_panels, row_of, text_of
-from printhammer.reconstruction.judging.log import append, joined, key_of, mend, read_judged
+from printhammer.reconstruction.judging.log import joined, key_of, mend, read_judged
+from printhammer.reconstruction.lines import append
 from printhammer.reconstruction.search.space import hammer_of
 
 QUICK = ("geometry", "single_pulse_stroke", "release_margin", "two_pulses_660us", "print_force")
@@ -108,8 +109,11 @@ def test_panels_are_those_of_the_strobe(monkeypatch: pytest.MonkeyPatch) -> None
 def test_rows_are_lines_of_json_and_come_back(tmp_path: Path) -> None:
     path = tmp_path / "judged.jsonl"
     assert read_judged(path) == []
-    append(path, ROW)
-    append(path, {**ROW, "constants": {"mass": 2e-3}, "values": {"geometry": {"platen_m": np.float64(3.0)}}})
+    append(path, text_of(ROW))
+    append(
+        path,
+        text_of({**ROW, "constants": {"mass": 2e-3}, "values": {"geometry": {"platen_m": np.float64(3.0)}}}),
+    )
     first, second = read_judged(path)
     assert first == ROW
     assert second["values"] == {"geometry": {"platen_m": 3.0}}
@@ -122,7 +126,7 @@ def test_a_candidate_comes_once_with_all_that_is_known_of_it(tmp_path: Path) -> 
     other = {**ROW, "constants": {"mass": 2e-3}}
     later = {**ROW, "verdicts": {"settle_out": False}, "values": {"settle_out": {}}, "panels": None}
     for row in (ROW, other, later):
-        append(path, row)
+        append(path, text_of(row))
     first, second = read_judged(path)
     assert second == other
     assert first["verdicts"] == {"geometry": True, "settle_out": False}
@@ -135,7 +139,7 @@ def test_a_candidate_comes_once_with_all_that_is_known_of_it(tmp_path: Path) -> 
 
 def test_a_line_that_breaks_off_is_left_out_and_cut_before_more_is_added(tmp_path: Path) -> None:
     path = tmp_path / "judged.jsonl"
-    append(path, ROW)
+    append(path, text_of(ROW))
     whole = path.read_bytes()
     path.write_bytes(whole + whole[:20])
     assert read_judged(path) == [ROW]
@@ -196,7 +200,7 @@ def test_files_that_cannot_be_read_or_written_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the file cannot be read"):
         read_judged(tmp_path)
     with pytest.raises(InputError, match="the file cannot be written"):
-        append(tmp_path / "none" / "judged.jsonl", ROW)
+        append(tmp_path / "none" / "judged.jsonl", text_of(ROW))
     (tmp_path / "a.jsonl").write_bytes(b"\xff\xfe\n")
     with pytest.raises(InputError, match="not UTF-8"):
         read_judged(tmp_path / "a.jsonl")

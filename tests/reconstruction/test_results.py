@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
-from tests.results import changed, write
+from tests.reconstruction_files import changed, write
 
 from printhammer.errors import InputError
 from printhammer.reconstruction.judging.shares import Share

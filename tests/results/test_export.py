@@ -30,10 +30,11 @@ def test_dataset(motion: ph.Motion) -> None:
 def test_csv_round_trip(motion: ph.Motion, tmp_path: Path) -> None:
     path = tmp_path / "motion.csv"
     motion.to_csv(path)
-    heading = path.read_text().splitlines()[0].split(",")
+    head = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    heading = head[0].split(",")
     assert heading == list(motion.to_pandas().columns)
     assert heading[:4] == ["t [s]", "x [m]", "v [m/s]", "current [A]"]
-    np.testing.assert_array_equal(np.loadtxt(path, delimiter=",", skiprows=1), motion.to_pandas().to_numpy())
+    np.testing.assert_array_equal(np.loadtxt(head[1:], delimiter=","), motion.to_pandas().to_numpy())
     assert [entry.name for entry in tmp_path.iterdir()] == ["motion.csv"]
 
 

@@ -57,7 +57,7 @@ def fingerprint(motion: ph.Motion) -> str:
 
 SCRIPT = """
 from tests import hammers
-from tests.test_motion import fingerprint
+from tests.run.test_motion import fingerprint
 import printhammer as ph
 hammer = hammers.crude()
 print(fingerprint(ph.simulate(hammer, ph.PulseTrain(hammer.waveform, period=1.3e-3, pulses=2), points=500)))

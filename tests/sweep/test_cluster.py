@@ -167,8 +167,8 @@ def test_an_address_that_is_none(address: str, spec_file: Callable[..., Path], t
 
 
 def test_a_worker_of_another_version_is_told(spec_file: Callable[..., Path]) -> None:
+    from printhammer.results.provenance import versions
     from printhammer.sweep.plan import make_plan
-    from printhammer.sweep.provenance import versions
     from printhammer.sweep.spec import read_spec
 
     plan = make_plan(read_spec(spec_file()))

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.chaos.bifurcation.windows import hysteresis
+from printhammer.chaos.bifurcation.diagram import hysteresis
 
 GRAVITY, RESTITUTION, FREQUENCY, MASS = 9.80665, 0.8, 50.0, 1e-3
 OMEGA, PERIOD = 2.0 * math.pi * FREQUENCY, 1.0 / FREQUENCY

@@ -6,6 +6,7 @@ from tests import hammers
 
 import printhammer as ph
 from printhammer.control.feedback.estimator.flight import Expected, Flight, FreeForce, flight_from_samples
+from printhammer.control.feedback.estimator.sensor import Samples
 
 
 def expected(touch: float, speed: float, errors: tuple[float, float, float], count: int = 1) -> Expected:
@@ -27,9 +28,8 @@ def estimated(
     def accelerations(x: np.ndarray, t: np.ndarray, scale: np.ndarray) -> np.ndarray:
         return force(x, (1.0 + scale) * real * drive.value(t)) / hammer.mass
 
-    used = np.ones((1, len(times)))
-    front = np.array([hammer.front])
-    return flight_from_samples(times[np.newaxis], shown[np.newaxis], used, 1e-9, before, front, accelerations)
+    samples = Samples(times[np.newaxis], shown[np.newaxis], np.ones((1, len(times)), np.bool_), 1e-9)
+    return flight_from_samples(samples, before, np.array([hammer.front]), accelerations)
 
 
 def test_a_parabola() -> None:
@@ -89,10 +89,7 @@ def test_noise_is_averaged_as_least_squares_do() -> None:
     shown = hammers.FRONT + speed * late - 0.5 * pull * late**2 + error * random.normal(size=(400, 60))
     force = FreeForce(hammer, hammer.origin, hammers.FRONT, 2.0)
     touches = flight_from_samples(
-        np.broadcast_to(times, shown.shape),
-        shown,
-        np.ones(shown.shape),
-        error,
+        Samples(np.broadcast_to(times, shown.shape), shown, np.ones(shown.shape, np.bool_), error),
         expected(touch, speed, (1.0, 100.0, 1e-3), 400),
         np.full(400, hammers.FRONT),
         lambda x, _t, _s: force(x, np.zeros_like(x)) / hammer.mass,

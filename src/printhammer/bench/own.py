@@ -11,6 +11,7 @@ from printhammer.run.problem import TOLERANCE, Problem
 
 if TYPE_CHECKING:
     from printhammer.bench.problem import Task
+    from printhammer.kernel.schemes_1983 import Scheme
     from printhammer.run.ensemble import Ensemble
     from printhammer.support.arrays import FloatArray
 
@@ -34,13 +35,12 @@ def engines() -> list[str]:
 def singles(task: Task, quick: bool) -> list[Entry]:
     """Return the single runs."""
     pulses = 5 if quick else 50
-    start = (task.rest, 0.0)
-    found = []
+    entries = []
     for tolerance in _chosen(quick):
-        problem = Problem(task.hammer, task.drive(pulses), start, 0.0, tolerance)
+        problem = Problem(task.hammer, task.drive(pulses), (task.rest, 0.0), 0.0, tolerance)
         default = " (default)" if tolerance == TOLERANCE else ""
-        found.append(_single(f"printhammer, {tolerance:.0e}{default}", problem, pulses))
-    return found
+        entries.append(_single(f"printhammer, {tolerance:.0e}{default}", problem, pulses))
+    return entries
 
 
 def schemes(task: Task, quick: bool) -> list[Entry]:
@@ -48,20 +48,18 @@ def schemes(task: Task, quick: bool) -> list[Entry]:
     from printhammer.run.scheme_runs import SchemeProblem
 
     pulses = 5 if quick else 50
-    found = []
-    for scheme, label in (("trapezoid", "implicit trapezoidal rule"), ("runge-kutta-4", "Runge-Kutta 4")):
-        problem = SchemeProblem(
-            task.hammer,
-            task.drive(pulses),
-            (task.rest, 0.0),
-            TOLERANCE,
-            scheme,  # type: ignore[arg-type]
-            1.0,
-        )
+    labels: dict[Scheme, str] = {
+        "trapezoid": "implicit trapezoidal rule",
+        "runge-kutta-4": "Runge-Kutta 4",
+    }
+    entries = []
+    for scheme, label in labels.items():
+        start = (task.rest, 0.0)
+        problem = SchemeProblem(task.hammer, task.drive(pulses), start, TOLERANCE, scheme, 1.0)
         entry = _single(f"1983: {label}, 10/1/20 us", problem, pulses)
         entry.integrate, entry.ours = partial(problem.integrate, entry.duration), False
-        found.append(entry)
-    return found
+        entries.append(entry)
+    return entries
 
 
 def _single(name: str, problem: Problem, pulses: int) -> Entry:
@@ -81,25 +79,17 @@ def ensembles(task: Task, quick: bool, members: int) -> list[Entry]:
     some = [tasks[i] for i in checked(members)]
 
     def strobed(runs: Ensemble, engine: str) -> FloatArray:
-        found = runs.run(strobes=[ENDS] * runs.size, threads=1, engine=engine).strobes  # type: ignore[arg-type]
-        assert found is not None
-        return found.x.T
+        strobes = runs.run(strobes=[ENDS] * runs.size, threads=1, engine=engine).strobes  # type: ignore[arg-type]
+        assert strobes is not None
+        return strobes.x.T
 
-    found = []
+    entries, duration = [], pulses * PERIOD
     for engine in engines():
         for tolerance in _chosen(quick):
-            runs = Ensemble(
-                task.hammer, [one.drive(pulses) for one in tasks], pulses * PERIOD, tolerance=tolerance
-            )
+            runs = Ensemble(task.hammer, [one.drive(pulses) for one in tasks], duration, tolerance=tolerance)
             few = Ensemble(task.hammer, [one.drive(3) for one in some], FIRST, tolerance=tolerance)
-            found.append(
-                Entry(
-                    f"printhammer, {engine} engine, {tolerance:.0e}",
-                    partial(strobed, few, engine),
-                    partial(runs.run, threads=1, engine=engine),  # type: ignore[arg-type]
-                    pulses * PERIOD * members,
-                    members=members,
-                    ours=True,
-                )
-            )
-    return found
+            positions = partial(strobed, few, engine)
+            integrate = partial(runs.run, threads=1, engine=engine)  # type: ignore[arg-type]
+            name = f"printhammer, {engine} engine, {tolerance:.0e}"
+            entries.append(Entry(name, positions, integrate, duration * members, members, ours=True))
+    return entries

@@ -3,7 +3,8 @@
 from printhammer.chaos.basins.basins import Basins, basins
 from printhammer.chaos.basins.entropy import BasinEntropy, basin_entropy
 from printhammer.chaos.basins.quench import QuenchMap, quench_map
-from printhammer.chaos.bifurcation.diagram import Bifurcation, bifurcation
+from printhammer.chaos.bifurcation.bifurcation import bifurcation
+from printhammer.chaos.bifurcation.diagram import Bifurcation
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.continuation import continuation
 from printhammer.chaos.continuation.events import BranchEvent

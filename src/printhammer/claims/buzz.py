@@ -29,7 +29,7 @@ def buzz_search(context: Context) -> BuzzSearch:
     return context.once("buzz", lambda: find_buzz_train(context.hammer, fewest=fewest, forces=forces))
 
 
-def _told(train: BuzzTrain) -> str:
+def _described(train: BuzzTrain) -> str:
     how = "one every" if train.kind == "uniform" else "each after the leaving of the pack by"
     return f"{len(train.times)} pulses, {how} {train.interval * 1e6:.1f} us"
 
@@ -58,10 +58,11 @@ def buzz_printing(context: Context, claim: Claim) -> Measured:
         "trains_tried": found.tried,
     }
     if found.train is None:
-        return Measured(value, f"The best of {found.tried} trains tried, {_told(train)}, is not enough.")
+        return Measured(value, f"The best of {found.tried} trains tried, {_described(train)}, is not enough.")
     return Measured(
         value,
-        f"{_told(train)}: {len(struck)} dots of {min(forces):.2f} to {max(forces):.2f} of the single force.",
+        f"{_described(train)}: {len(struck)} dots of {min(forces):.2f} to {max(forces):.2f} of the single"
+        " force.",
     )
 
 

@@ -24,21 +24,8 @@ _SPACING: Final = 10e-6
 def sensitivity(context: Context, band: tuple[float, float], grid: float, step: float, pulses: int) -> float:
     """Return the root-mean-square change of the displacement record per hertz, m/Hz, in a band of rates.
 
-    The records of two rates are compared at the same times, from the first firing to 1 ms after the last one
-    at the slower rate.
-
-    Parameters
-    ----------
-    context : Context
-        Runs of the hammer.
-    band : tuple of float
-        Lowest and highest rate, Hz.
-    grid : float
-        Between the slower rates of the pairs, Hz.
-    step : float
-        Between the two rates of a pair, Hz.
-    pulses : int
-        Of a burst.
+    Each of the slower rates, `grid` apart, is compared with that `step` above it, Hz, in bursts of some
+    pulses: at the same times, from the first firing to 1 ms after the last one at the slower rate.
 
     Raises
     ------

@@ -90,15 +90,7 @@ JUDGES: Final[dict[str, tuple[tuple[str, ...], Judge]]] = {}
 
 
 def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
-    """Register the function that measures what a claim is about.
-
-    Parameters
-    ----------
-    name : str
-        Name of the claim.
-    *needs : str
-        Attributes of the hammer without which the claim cannot hold.
-    """
+    """Register the function that measures a claim, which cannot hold for a hammer without what it needs."""
 
     def register(function: Judge) -> Judge:
         if name in JUDGES or name not in claims():

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 
 class Units(StrEnum):
@@ -47,3 +52,10 @@ def shown(value: float | None, kind: str, units: Units) -> str:
 def with_unit(value: float | None, kind: str, units: Units) -> str:
     """Return a quantity in SI as text with its unit, a dash for None."""
     return "–" if value is None else f"{shown(value, kind, units)} {unit(kind, units)}"
+
+
+def range_with_unit(values: npt.NDArray[np.float64], kind: str, units: Units) -> str | None:
+    """Return the least and the largest of quantities in SI as text with units; None if there are none."""
+    if not values.size:
+        return None
+    return " to ".join(with_unit(float(end), kind, units) for end in (values.min(), values.max()))

@@ -7,8 +7,6 @@ tolerances of the constants show in what is printed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -19,6 +17,7 @@ from printhammer.derivatives.parameters import parameter_names, parameters
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.hammer.names import unknown
+from printhammer.results import Column, Result, column, coordinate, derived, part, scalar
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem, check_tolerance
 from printhammer.run.simulate import end_of_run
@@ -27,75 +26,82 @@ from printhammer.run.start import initial_state
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import xarray as xr
-
     from printhammer.derivatives.parameters import Parameter
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
+_IN_PARTS: Final = "change of a quantity in parts of it for a change of a constant in parts of it"
+_INDEPENDENT: Final = "standard deviation for independent constants"
+_WORST: Final = "deviation with all constants at their worst ends"
+
 TOLERANCE: Final = 1e-12
 """Tolerance of the run unless told otherwise."""
 
 
-@dataclass(frozen=True)
-class Sensitivities:
+class Sensitivities(Result):
     """Derivatives of what a hammer prints with respect to its constants.
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    drive : Drive
-        The drive.
-    constants : tuple of str
-        Names of the n constants, as in `printhammer.derivatives.parameters`.
-    units, meanings : tuple of str
-        SI unit and meaning of each constant.
-    values : array, shape (n,)
-        Their values, SI.
-    quantities : tuple of str
-        Names of the q quantities of a dot: flight_time, impact_speed, peak_force, indentation, contact_time,
-        loading_work, net_loss, return_time, return_speed.
-    dots : array, shape (d, q)
-        Their values for each firing, SI; NaN for a lost dot, and for what the run does not reach.
-    derivatives : array, shape (d, q, n)
-        d(quantity) / d(constant), SI.
-    run_quantities : tuple of str
-        Names of the quantities of the whole run: coil_work, drive_work, pack_loss, backstop_loss.
-    run : array, shape (4,)
-        Their values, J.
-    run_derivatives : array, shape (4, n)
-        d(quantity) / d(constant), SI, the end of the run staying where it is.
-    left_out : dict of str
-        Constants at whose value nothing is differentiable with them, and why.
-    duration : float
-        End of the run, s.
-    smooth : bool
-        False where the motion passes a touch without velocity: derivatives after it mean nothing.
-    status : str
-        How the run ended; the derivatives are NaN unless it is "ok".
-    tolerance : float
-        Tolerance of the integration.
+    Units differ along `quantity` and `constant`, and stand beside them as coordinates.
     """
 
-    hammer: Hammer
-    drive: Drive
-    constants: tuple[str, ...]
-    units: tuple[str, ...] = field(repr=False)
-    meanings: tuple[str, ...] = field(repr=False)
-    values: FloatArray = field(repr=False)
-    quantities: tuple[str, ...] = field(repr=False)
-    dots: FloatArray = field(repr=False)
-    derivatives: FloatArray = field(repr=False)
-    run_quantities: tuple[str, ...] = field(repr=False)
-    run: FloatArray = field(repr=False)
-    run_derivatives: FloatArray = field(repr=False)
-    left_out: Mapping[str, str] = field(repr=False)
-    duration: float
-    smooth: bool
-    status: str
-    tolerance: float
+    hammer: Hammer = part("the hammer")
+    drive: Drive = part("the drive")
+    constants: tuple[str, ...] = coordinate(
+        "",
+        "name of the constant",
+        "constant",
+        more="as in `printhammer.derivatives.parameters`",
+        name="constant",
+    )
+    units: tuple[str, ...] = coordinate("", "SI unit of the constant", "constant", name="constant_unit")
+    meanings: tuple[str, ...] = coordinate("", "meaning of the constant", "constant", name="constant_meaning")
+    values: FloatArray = column("constant_unit", "value of a constant", "constant", name="constant_value")
+    quantities: tuple[str, ...] = coordinate(
+        "",
+        "name of the quantity of a dot",
+        "quantity",
+        more="see `printhammer.derivatives.dots.DOT_QUANTITIES`",
+        name="quantity",
+    )
+    dots: FloatArray = column(
+        "quantity_unit",
+        "value",
+        "dot quantity",
+        more="nan for a lost dot, and for what the run does not reach",
+        name="value",
+    )
+    derivatives: FloatArray = column(
+        "quantity_unit / constant_unit",
+        "change of a quantity with a constant",
+        "dot quantity constant",
+        name="derivative",
+    )
+    run_quantities: tuple[str, ...] = coordinate(
+        "", "name of the energy of the whole run", "energy", name="energy"
+    )
+    run: FloatArray = column("J", "energy of the run", "energy", name="run_value")
+    run_derivatives: FloatArray = column(
+        "J / constant_unit",
+        "change of a quantity with a constant",
+        "energy constant",
+        more="the end of the run staying where it is",
+        name="run_derivative",
+    )
+    left_out: Mapping[str, str] = part(
+        "constants at whose value nothing is differentiable with them, and why", repr=False
+    )
+    duration: float = scalar("s", "end of the run")
+    smooth: bool = part(
+        "False where the motion passes a touch without velocity", more="derivatives after it mean nothing"
+    )
+    status: str = part("how the run ended", more='the derivatives are nan unless it is "ok"')
+    tolerance: float = part("tolerance of the integration")
+
+    @property
+    def title(self) -> str:
+        """One line that says what the table is."""
+        return f"sensitivities of {self.hammer.name}"
 
     @property
     def ok(self) -> bool:
@@ -108,6 +114,7 @@ class Sensitivities:
         return tuple(int(k) for k in np.flatnonzero(np.isnan(self.dots[:, 0])))
 
     @property
+    @derived("1", _IN_PARTS, "dot quantity constant")
     def logarithmic(self) -> FloatArray:
         """Relative change of a quantity of a dot per relative change of a constant, shape (d, q, n).
 
@@ -116,6 +123,7 @@ class Sensitivities:
         return _relative(self.derivatives, self.values, self.dots)
 
     @property
+    @derived("1", _IN_PARTS, "energy constant")
     def run_logarithmic(self) -> FloatArray:
         """The same for the energies of the run, shape (4, n); NaN for an energy that is zero."""
         return _relative(self.run_derivatives, self.values, self.run)
@@ -155,43 +163,31 @@ class Sensitivities:
             run=np.abs(self.run_derivatives * self.values) * given,
         )
 
-    @property
-    def provenance(self) -> dict[str, Any]:
-        """Where the table comes from: fingerprints, versions, tolerance."""
-        import numba
+    def notes(self) -> dict[str, Any]:
+        """Return what the derivatives leave out, for the attributes of the Dataset."""
+        return {"smooth": str(self.smooth), "left_out": "; ".join(self.left_out.values())}
 
-        from printhammer import __version__
-
-        return {
-            "hammer": self.hammer.name,
-            "hammer_fingerprint": self.hammer.fingerprint,
-            "drive": repr(self.drive),
-            "drive_fingerprint": self.drive.fingerprint,
-            "duration": self.duration,
-            "status": self.status,
-            "smooth": str(self.smooth),
-            "left_out": "; ".join(self.left_out.values()),
-            "tolerance": repr(self.tolerance),
-            "printhammer": __version__,
-            "numpy": np.__version__,
-            "numba": numba.__version__,
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return the columns, with units and meanings of the quantities beside their names."""
+        known = {
+            "quantity_unit": ("quantity", "SI unit of the quantity", self.quantities, DOT_QUANTITIES, 0),
+            "quantity_meaning": ("quantity", "meaning of the quantity", self.quantities, DOT_QUANTITIES, 1),
+            "energy_meaning": ("energy", "meaning of the energy", self.run_quantities, RUN_QUANTITIES, 1),
         }
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the table as a Dataset, with units and provenance in the attributes.
-
-        Over `dot`, `quantity` and `constant`: `derivative` and `logarithmic`, and `value` of each quantity;
-        over `energy` and `constant` the same of the whole run; `constant_value` over `constant`. Units
-        differ along `quantity` and `constant` and stand beside them as coordinates.
-        """
-        from printhammer.derivatives.tables import sensitivity_dataset
-
-        return sensitivity_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the largest sensitivities of one dot as bars; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.sensitivity").plot(self, **options)
+        number = Column(
+            "1", "number of the firing, from 0", ("dot",), "coordinate", name="dot", dtype=np.int32
+        )
+        return (
+            super().entries()
+            | {"dot": (number, np.arange(len(self.dots)))}
+            | {
+                name: (
+                    Column("", meaning, (dim,), "coordinate", name=name),
+                    [told[quantity][place] for quantity in quantities],
+                )
+                for name, (dim, meaning, quantities, told, place) in known.items()
+            }
+        )
 
     def __repr__(self) -> str:
         struck = len(self.dots) - len(self.lost)
@@ -201,52 +197,67 @@ class Sensitivities:
         )
 
 
-@dataclass(frozen=True)
-class Spread:
-    """How tolerances of constants show in what is printed, to first order.
+class Spread(Result):
+    """How tolerances of constants show in what is printed, to first order."""
 
-    Attributes
-    ----------
-    sensitivities : Sensitivities
-        What it follows from.
-    spreads : array, shape (n,)
-        Relative spread of each constant.
-    dots : array, shape (d, q, n)
-        What each constant contributes to the deviation of a quantity of a dot, SI, not negative.
-    run : array, shape (4, n)
-        The same of the quantities of the run, J.
-    """
-
-    sensitivities: Sensitivities
-    spreads: FloatArray
-    dots: FloatArray = field(repr=False)
-    run: FloatArray = field(repr=False)
+    sensitivities: Sensitivities = part("what it follows from", repr=False)
+    spreads: FloatArray = column("1", "relative spread of a constant", "constant", name="spread")
+    dots: FloatArray = column(
+        "quantity_unit",
+        "deviation that one constant alone makes",
+        "dot quantity constant",
+        more="of a quantity of a dot, not negative",
+        name="contribution",
+    )
+    run: FloatArray = part("the same of the quantities of the run, J", more="shape (4, n)", repr=False)
 
     @property
+    def title(self) -> str:
+        """One line that says what the table is."""
+        return f"spread of what {self.sensitivities.hammer.name} prints"
+
+    @property
+    @derived("quantity_unit", _INDEPENDENT, "dot quantity")
     def deviation(self) -> FloatArray:
         """Standard deviation of each quantity of each dot for independent constants, SI, shape (d, q)."""
         return np.asarray(np.sqrt((self.dots**2).sum(axis=-1)))
 
     @property
+    @derived("quantity_unit", _WORST, "dot quantity")
     def worst(self) -> FloatArray:
         """Deviation with all constants at their worst ends, SI, shape (d, q)."""
         return np.asarray(self.dots.sum(axis=-1))
 
     @property
+    @derived("J", _INDEPENDENT, "energy")
     def run_deviation(self) -> FloatArray:
         """Standard deviation of each quantity of the run, J, shape (4,)."""
         return np.asarray(np.sqrt((self.run**2).sum(axis=-1)))
 
     @property
+    @derived("J", _WORST, "energy")
     def run_worst(self) -> FloatArray:
         """Deviation of the quantities of the run with all constants at their worst ends, J, shape (4,)."""
         return np.asarray(self.run.sum(axis=-1))
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return deviations over `dot` and `quantity`, and over `energy`, with provenance."""
-        from printhammer.derivatives.tables import spread_dataset
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the sensitivities come from."""
+        return self.sensitivities.provenance
 
-        return spread_dataset(self)
+    def notes(self) -> dict[str, Any]:
+        """Return what is known of the run, for the attributes of the Dataset."""
+        return {"duration": self.sensitivities.duration, **self.sensitivities.notes()}
+
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return deviations beside the values and coordinates of the sensitivities."""
+        kept = self.sensitivities.entries()
+        names = [name for name, (note, _) in kept.items() if note.kind == "coordinate"]
+        return super().entries() | {name: kept[name] for name in (*names, "value", "run_value")}
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the sensitivities that the spread follows from; returns a matplotlib figure."""
+        return self.sensitivities.plot(**options)
 
 
 def sensitivities(

@@ -27,24 +27,16 @@ __all__ = ["FIGURES", "FORMATS", "PaperFigure", "save"]
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure of the paper.
-
-    Attributes
-    ----------
-    number : int
-        Its number in the paper.
-    name : str
-        Name of the function that draws it, and of its module in `printhammer.figures.paper`.
-    title : str
-        A few words.
-    caption : str
-        What is to be seen, one or two sentences.
-    """
+    """A figure of the paper."""
 
     number: int
+    """Its number in the paper."""
     name: str
+    """Name of the function that draws it, and of its module in `printhammer.figures.paper`."""
     title: str
+    """A few words."""
     caption: str
+    """What is to be seen, one or two sentences."""
 
     @property
     def function(self) -> Callable[..., Figure]:

@@ -6,21 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.figures.elements.marks import note
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    FAMILY,
-    HAIR,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    TINY,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import ALONG_Y, beside, note
+from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
@@ -57,6 +45,8 @@ def family(
 ) -> Figure:
     """Draw the constants of a family over those of a hammer, and below them the conclusions.
 
+    A dot for each member in each row.
+
     Parameters
     ----------
     hammer : Hammer
@@ -70,18 +60,13 @@ def family(
         drawn.
     order : str, optional
         Conclusion by which members are coloured, light to dark, in all panels.
-
-    Returns
-    -------
-    Figure
-        A dot for each member in each row.
     """
     from matplotlib.colors import LinearSegmentedColormap
 
     own, *members = constants
     rows = [key for key in own if any(abs(row[key] - own[key]) > _EQUAL * abs(own[key]) for row in members)]
     ranks = _ranks([row.get(order) for row in conclusions])
-    shades = LinearSegmentedColormap.from_list("family", FAMILY)(ranks)
+    shades = LinearSegmentedColormap.from_list("family", style.FAMILY)(ranks)
     deep = -(-len(told) // _COLUMNS)
     upper, lower = 0.55 + _ROW * len(rows), _STRIP * deep
     figure = new_figure(0.5 + upper + lower)
@@ -89,7 +74,7 @@ def family(
     ax = top.add_subplot()
     _constants(ax, rows, own, members, ranks, shades)
     key = f"A dot for each of {len(members)} hammers; darker: higher {told[order]['title']}"
-    ax.set_title(key, loc="left", fontsize=SMALL, color=MUTED)
+    ax.set_title(key, loc="left", fontsize=style.SMALL, color=style.MUTED)
     grid = bottom.add_gridspec(deep, _COLUMNS, wspace=0.06)
     for number, (name, entry) in enumerate(told.items()):
         column, row = divmod(number, deep)
@@ -116,25 +101,16 @@ def _constants(
 ) -> None:
     ratios = np.array([[member[key] / own[key] for key in rows] for member in members])
     ax.set_xscale("log")
-    ax.axvline(1.0, color=MUTED, lw=HAIR, zorder=1.0)
+    ax.axvline(1.0, color=style.MUTED, lw=style.HAIR, zorder=1.0)
     fan = _FAN * (0.5 - ranks)
     for row, key in enumerate(rows):
         found = ratios[:, row]
         inside = found > 0.0
-        ax.axhline(row, color=FAINT, lw=HAIR, zorder=0.5)
+        ax.axhline(row, color=style.FAINT, lw=style.HAIR, zorder=0.5)
         ax.scatter(found[inside], row + fan[inside], s=11, c=shades[inside], lw=0.0, zorder=3.0, gid=key)
         if not inside.all():
             signs = f"{int((~inside).sum())} of the other sign"
-            ax.annotate(
-                signs,
-                (0.0, row),
-                (3, 0),
-                xycoords=("axes fraction", "data"),
-                textcoords="offset points",
-                fontsize=TINY,
-                color=ORANGE,
-                va="center",
-            )
+            beside(ax, signs, (0.0, row), (3, 0), "left center", xycoords=ALONG_Y, color=style.ORANGE)
     seen = ratios[ratios > 0.0]
     low, high = min(float(seen.min(initial=1.0)), 0.9) / 1.06, max(float(seen.max(initial=1.0)), 1.1) * 1.06
     ax.set(xlim=(low, high), ylim=(len(rows) - 0.4, -0.6))
@@ -165,7 +141,7 @@ def _conclusion(
     factor = from_si(1.0, entry["unit"], unit)
     known = np.array([value is not None for value in values], dtype=np.bool_)
     found = np.array([np.nan if value is None else value * factor for value in values])
-    colour = BLUE if entry["robust"] else ORANGE
+    colour = style.BLUE if entry["robust"] else style.ORANGE
     if known.any():
         low, high = float(np.nanmin(found)), float(np.nanmax(found))
         room = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
@@ -177,12 +153,12 @@ def _conclusion(
         ax.scatter(found[known], fan[known], s=9, c=shades[known], lw=0.0, zorder=3.0, gid=entry["title"])
     ax.set(ylim=(-0.75, 0.75), yticks=[])
     ax.locator_params(axis="x", nbins=5)
-    ax.tick_params(axis="x", labelsize=TINY, pad=1.5)
+    ax.tick_params(axis="x", labelsize=style.TINY, pad=1.5)
     ax.spines[["left", "right", "top"]].set_visible(False)
     missing = int((~known).sum())
     told = f"{entry['title'].replace(' us ', ' µs ')}  [{written}]" + (
         f", {missing} without" if missing else ""
     )
-    ax.set_title(told, loc="left", fontsize=SMALL, color=INK, pad=2.0)
+    ax.set_title(told, loc="left", fontsize=style.SMALL, color=style.INK, pad=2.0)
     word = "robust" if entry["robust"] else "depends"
-    note(ax, word, (1.0, 1.02), ha="right", va="bottom", color=colour, fontsize=TINY)
+    note(ax, word, (1.0, 1.02), ha="right", va="bottom", color=colour, fontsize=style.TINY)

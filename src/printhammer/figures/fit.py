@@ -9,23 +9,10 @@ from typing import TYPE_CHECKING, Final, cast
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import note
 from printhammer.figures.elements.scales import Name, Scale, label, scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    HAIR,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    TINY,
-    YELLOW,
-    new_figure,
-    styled,
-)
+from printhammer.figures.elements.style import foot, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +21,7 @@ if TYPE_CHECKING:
     from printhammer.identify.result import Fit
     from printhammer.support.arrays import FloatArray
 
-_COLOURS: Final = (BLUE, GREEN, YELLOW, INK, "#56b4e9", "#cc79a7", MUTED)
+_COLOURS: Final = (style.BLUE, style.GREEN, style.YELLOW, style.INK, "#56b4e9", "#cc79a7", style.MUTED)
 _KINDS: Final = {
     "displacement": "displacement",
     "indentation": "displacement",
@@ -58,16 +45,8 @@ _NAMED: Final = 6
 def plot(fit: Fit) -> Figure:
     """Draw a fit.
 
-    Parameters
-    ----------
-    fit : Fit
-        From `printhammer.identify`.
-
-    Returns
-    -------
-    Figure
-        Data with the law, residuals below; on the right the correlation of the constants and the residuals
-        against those of a normal distribution. Outliers that were left out are ringed.
+    Data with the law, residuals below; on the right the correlation of the constants and the residuals
+    against those of a normal distribution. Outliers that were left out are ringed.
 
     Raises
     ------
@@ -89,11 +68,7 @@ def plot(fit: Fit) -> Figure:
     else:
         _quantiles(figure.add_subplot(grid[:, 1]), fit)
     told = f"{fit.kind} · {' and '.join(fit.source)}"
-    text = figure.supxlabel(told, x=0.99, ha="right", fontsize=TINY, color=MUTED)
-    text.set_in_layout(True)
-    if fit.rejected:
-        remark = fill(f"The data reject the law: {fit.rejected}.", 118)
-        figure.suptitle(remark, x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
+    foot(figure, told, fill(f"The data reject the law: {fit.rejected}.", 118) if fit.rejected else "")
     return figure
 
 
@@ -112,13 +87,13 @@ def _data(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
         order = mine[np.argsort(x[mine], kind="stable")]
         ax.plot(x[order], measured[order], ls="none", marker="o", ms=_size(fit), mew=0.0, color=colour)
         if _is_curve(law[order]):
-            ax.plot(x[order], law[order], lw=THIN, color=colour, label=name)
+            ax.plot(x[order], law[order], lw=style.THIN, color=colour, label=name)
         else:
             ax.plot(x[order], law[order], ls="none", marker="_", ms=5.0, color=colour, label=name)
     _ring(ax, fit, x, measured)
     if len(fit.series_names) <= _LEGEND:
         columns = 1 + (len(fit.series_names) > 4)
-        ax.legend(fontsize=TINY, loc="best", ncols=columns, framealpha=0.85, edgecolor="none")
+        ax.legend(fontsize=style.TINY, loc="best", ncols=columns, framealpha=0.85, edgecolor="none")
     label(ax, "x", across, fit.axes[0][0].capitalize())
     label(ax, "y", up, fit.axes[1][0].capitalize())
     ax.margins(0.03, 0.06)
@@ -131,14 +106,16 @@ def _is_curve(values: FloatArray) -> bool:
 
 def _residuals(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
     x, residuals = across.shown(fit.abscissa), up.shown(fit.residuals)
-    ax.axhline(0.0, color=MUTED, lw=HAIR, zorder=1.0)
+    ax.axhline(0.0, color=style.MUTED, lw=style.HAIR, zorder=1.0)
     used = ~fit.outliers
     half = 1.96 * float(up.shown(fit.residual_scale)) * _spread(fit)
     order = np.argsort(x[used], kind="stable")
     if np.ptp(half) == 0.0:
-        ax.axhspan(-half[0], half[0], color=FAINT, alpha=0.6, lw=0.0, zorder=0.5)
+        ax.axhspan(-half[0], half[0], color=style.FAINT, alpha=0.6, lw=0.0, zorder=0.5)
     else:
-        ax.vlines(x[used][order], -half[used][order], half[used][order], color=FAINT, lw=2.4, zorder=0.5)
+        ax.vlines(
+            x[used][order], -half[used][order], half[used][order], color=style.FAINT, lw=2.4, zorder=0.5
+        )
     for number, colour in zip(range(len(fit.series_names)), cycle(_COLOURS), strict=False):
         mine = used & (fit.series == number)
         ax.plot(x[mine], residuals[mine], ls="none", marker="o", ms=_size(fit), mew=0.0, color=colour)
@@ -148,7 +125,15 @@ def _residuals(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
     ax.set_ylim(-top, top)
     beyond = int(fit.outliers.sum()) - int(inside.sum())
     if beyond:
-        note(ax, f"{beyond} beyond", (0.98, 0.05), ha="right", va="bottom", color=ORANGE, fontsize=TINY)
+        note(
+            ax,
+            f"{beyond} beyond",
+            (0.98, 0.05),
+            ha="right",
+            va="bottom",
+            color=style.ORANGE,
+            fontsize=style.TINY,
+        )
     label(ax, "x", across, fit.axes[0][0].capitalize())
     label(ax, "y", up, "Data − law")
     ax.margins(x=0.03)
@@ -158,45 +143,48 @@ def _spread(fit: Fit) -> FloatArray:
     """Return the standard deviation of each datum over the residual scale."""
     used = ~fit.outliers
     spread = 1.0 / np.sqrt(fit.weights)
-    found: FloatArray = spread / np.sqrt(np.mean(spread[used] ** 2))
-    return found
+    return np.asarray(spread / np.sqrt(np.mean(spread[used] ** 2)))
 
 
 def _ring(ax: Axes, fit: Fit, x: FloatArray, y: FloatArray) -> None:
     rows = np.flatnonzero(fit.outliers)
-    ax.plot(x[rows], y[rows], ls="none", marker="o", ms=5.0, mew=0.9, mfc="none", mec=ORANGE, zorder=4.0)
+    ax.plot(
+        x[rows], y[rows], ls="none", marker="o", ms=5.0, mew=0.9, mfc="none", mec=style.ORANGE, zorder=4.0
+    )
     if len(rows) <= _NAMED and len(fit.lines):
         for row in rows:
             where = (float(x[row]), float(y[row]))
             text = f"line {fit.lines[row]}"
-            ax.annotate(text, where, (5, -2), textcoords="offset points", fontsize=TINY, color=ORANGE)
+            ax.annotate(
+                text, where, (5, -2), textcoords="offset points", fontsize=style.TINY, color=style.ORANGE
+            )
 
 
 def _correlation(ax: Axes, fit: Fit) -> None:
     from matplotlib.colors import LinearSegmentedColormap
 
-    colours = LinearSegmentedColormap.from_list("correlation", [BLUE, "white", ORANGE])
+    colours = LinearSegmentedColormap.from_list("correlation", [style.BLUE, "white", style.ORANGE])
     found = fit.correlation
     n = len(fit.keys)
     ax.imshow(found, vmin=-1.0, vmax=1.0, cmap=colours, aspect="equal")
     for row in range(n):
         for column in range(n):
             value = float(found[row, column])
-            shade = "white" if abs(value) > 0.7 else INK
+            shade = "white" if abs(value) > 0.7 else style.INK
             ax.text(
                 column,
                 row,
                 f"{round(value, 2) + 0.0:.2f}",
                 ha="center",
                 va="center",
-                fontsize=TINY,
+                fontsize=style.TINY,
                 color=shade,
             )
     names = [_short(key) for key in fit.keys]
-    ax.set_xticks(range(n), names, fontsize=TINY, rotation=30.0, ha="right", rotation_mode="anchor")
-    ax.set_yticks(range(n), names, fontsize=TINY)
+    ax.set_xticks(range(n), names, fontsize=style.TINY, rotation=30.0, ha="right", rotation_mode="anchor")
+    ax.set_yticks(range(n), names, fontsize=style.TINY)
     ax.tick_params(length=0.0)
-    ax.set_title("Correlation", loc="left", fontsize=SMALL)
+    ax.set_title("Correlation", loc="left", fontsize=style.SMALL)
 
 
 def _short(key: str) -> str:
@@ -216,8 +204,8 @@ def _quantiles(ax: Axes, fit: Fit) -> None:
     ordered = np.sort(fit.residuals[used] / np.where(scale_of > 0.0, scale_of, 1.0))
     at = norm.ppf((np.arange(1, len(ordered) + 1) - 0.375) / (len(ordered) + 0.25))
     end = 1.1 * max(float(np.abs(ordered).max()), float(np.abs(at).max()))
-    ax.plot([-end, end], [-end, end], color=MUTED, lw=HAIR)
-    ax.plot(at, ordered, ls="none", marker="o", ms=0.8 * _size(fit) + 0.4, mew=0.0, color=BLUE)
+    ax.plot([-end, end], [-end, end], color=style.MUTED, lw=style.HAIR)
+    ax.plot(at, ordered, ls="none", marker="o", ms=0.8 * _size(fit) + 0.4, mew=0.0, color=style.BLUE)
     ax.set_xlim(-end, end)
     ax.set_ylim(-end, end)
     ax.set_aspect("equal")

@@ -32,18 +32,15 @@ if TYPE_CHECKING:
 def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     """Draw a computed and a measured map side by side, with the root mean square of their difference.
 
+    In the third panel, "difference" is the gid of the root mean square over time, for every rate that both
+    have; in grey areas the displacement is not known.
+
     Parameters
     ----------
     computed : xarray.Dataset
         A map from `printhammer.frequency_map`.
     measured : xarray.Dataset
         A map from `printhammer.maps.measured.load_measured_map`, or another computed one.
-
-    Returns
-    -------
-    Figure
-        The figure. In the third panel, "difference" is the gid of the root mean square over time, for every
-        rate that both have; in grey areas the displacement is not known.
 
     Raises
     ------

@@ -26,11 +26,6 @@ def plot(motion: Motion, *, until: float | str | None = None, heading: str = "")
     heading : str, optional
         What is shown, written above the panel.
 
-    Returns
-    -------
-    Figure
-        The figure.
-
     Raises
     ------
     InputError

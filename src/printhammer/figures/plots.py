@@ -9,35 +9,35 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PLOTS: Final = {
-    "Basins": "basins.plot",
-    "Bifurcation": "bifurcation.plot",
-    "Branch": "continuation.plot",
-    "Branches": "continuation.plot",
-    "CompensationTable": "tables.plot",
-    "DampingStudy": "damping.plot",
-    "Feedback": "feedback.plot",
-    "Feedback.run": "feedback_run.plot",
+    "Basins": "chaos.basins.plot",
+    "Bifurcation": "chaos.bifurcation.plot",
+    "Branch": "chaos.continuation.plot",
+    "Branches": "chaos.continuation.plot",
+    "CompensationTable": "control.compensation.plot",
+    "DampingStudy": "printing.damping.plot",
+    "Feedback": "control.feedback.plot",
+    "Feedback.run": "control.feedback_run.plot",
     "Fit": "fit.plot",
-    "ImpactTrain": "impact_train.plot",
-    "LeastWork": "energy.plot",
-    "LeastWorkRates": "energy_rates.plot",
-    "Lyapunov": "lyapunov.plot",
-    "LyapunovChart": "lyapunov.plot_chart",
+    "ImpactTrain": "chaos.impact_train.plot",
+    "LeastWork": "control.energy.plot",
+    "LeastWorkRates": "control.energy_rates.plot",
+    "Lyapunov": "chaos.lyapunov.plot",
+    "LyapunovChart": "chaos.lyapunov.plot_chart",
     "Motion": "motion.plot",
-    "Orbit": "orbits.plot_orbit",
-    "Orbits": "orbits.plot",
-    "Page": "page.plot",
-    "Quality": "quality.plot",
-    "QuenchMap": "quench.plot",
-    "Recurrence": "recurrence.plot",
-    "SafeRate": "quality.plot_safe_rate",
-    "Section": "sections.plot",
-    "Sensitivities": "sensitivity.plot",
-    "StabilityChart": "stability_chart.plot",
-    "Strobe": "strobe.plot",
-    "TableReport": "tables.plot_report",
-    "ToleranceYield": "tolerance.plot",
-    "ZeroOne": "lyapunov.plot_zero_one",
+    "Orbit": "chaos.orbits.plot_orbit",
+    "Orbits": "chaos.orbits.plot",
+    "Page": "printing.page.plot",
+    "Quality": "printing.quality.plot",
+    "QuenchMap": "chaos.quench.plot",
+    "Recurrence": "chaos.recurrence.plot",
+    "SafeRate": "printing.quality.plot_safe_rate",
+    "Section": "chaos.sections.plot",
+    "Sensitivities": "chaos.sensitivity.plot",
+    "StabilityChart": "chaos.stability_chart.plot",
+    "Strobe": "chaos.strobe.plot",
+    "TableReport": "control.compensation.plot_report",
+    "ToleranceYield": "printing.tolerance.plot",
+    "ZeroOne": "chaos.lyapunov.plot_zero_one",
 }
 """Module and function, by the name of the class of the result; a second picture has a name after a dot."""
 
@@ -53,6 +53,6 @@ def plot(result: object, picture: str = "", **options: Any) -> Figure:
     name = ".".join(filter(None, (type(result).__name__, picture)))
     if name not in PLOTS:
         raise AttributeError(f"no picture of {name} is known")
-    module, function = PLOTS[name].split(".")
+    module, _, function = PLOTS[name].rpartition(".")
     drawn: Figure = getattr(import_module(f"{__package__}.{module}"), function)(result, **options)
     return drawn

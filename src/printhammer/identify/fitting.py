@@ -18,11 +18,7 @@ KINDS: Final = ("magnet", "spring", "pack", "backstop", "motion")
 
 
 def fit(
-    kind: str,
-    path: str | Path | Sequence[str | Path],
-    *,
-    hammer: Hammer | None = None,
-    **options: Any,
+    kind: str, path: str | Path | Sequence[str | Path], *, hammer: Hammer | None = None, **options: Any
 ) -> Fit:
     """Find constants from a measurement.
 

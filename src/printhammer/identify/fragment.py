@@ -117,7 +117,7 @@ def report(fit: Fit) -> list[str]:
         lines.append(f"test of the law: p = {fit.p_value:.3g}")
     if fit.rejected:
         lines.append(f"the data reject the law: {fit.rejected}")
-    return [*lines, *fit.indistinct, *fit.notes]
+    return [*lines, *fit.indistinct, *fit.remarks]
 
 
 def outliers(fit: Fit, most: int = 20) -> str:

@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
+from printhammer.identify.residuals import robust_scale
+
 if TYPE_CHECKING:
     import numpy.typing as npt
 
@@ -52,58 +54,41 @@ class Law(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Parameters and what the residuals say.
-
-    Attributes
-    ----------
-    p : array, shape (n,)
-        Parameters.
-    covariance : array, shape (n, n)
-        Of the parameters.
-    fitted, residuals : array, shape (m,)
-        The law, and the data less the law.
-    jacobian : array, shape (m, n)
-        At `p`.
-    variance : array, shape (m,)
-        Of the noise in each row; all 1 where the data are exact.
-    outliers : array of bool, shape (m,)
-        Rows left out.
-    degrees_of_freedom : int
-        Rows used less parameters.
-    freedoms : array, shape (n,)
-        Degrees of freedom with which the variance of each parameter is known.
-    residual_scale : float
-        Root of the sum of squared residuals over the degrees of freedom.
-    condition_number : float
-        Of the weighted Jacobian with columns of unit length.
-    exact : bool
-        Whether the residuals are no more than rounding.
-    """
+    """Parameters and what the residuals say."""
 
     p: FloatArray
+    """Parameters, shape (n,)."""
     covariance: FloatArray
+    """Of the parameters, shape (n, n)."""
     fitted: FloatArray
     residuals: FloatArray
+    """The law, and the data less the law, shape (m,)."""
     jacobian: FloatArray
+    """At `p`, shape (m, n)."""
     variance: FloatArray
+    """Of the noise in each row; all 1 where the data are exact. Shape (m,)."""
     outliers: npt.NDArray[np.bool_]
+    """Rows left out, shape (m,)."""
     degrees_of_freedom: int
+    """Rows used less parameters."""
     freedoms: FloatArray
+    """Degrees of freedom with which the variance of each parameter is known. Shape (n,)."""
     residual_scale: float
+    """Root of the sum of squared residuals over the degrees of freedom."""
     condition_number: float
+    """Of the weighted Jacobian with columns of unit length."""
     exact: bool
+    """Whether the residuals are no more than rounding."""
 
     @property
     def used(self) -> npt.NDArray[np.bool_]:
         """Rows that were not left out."""
-        found: npt.NDArray[np.bool_] = ~self.outliers
-        return found
+        return ~self.outliers
 
     @property
     def standard_errors(self) -> FloatArray:
         """Roots of the diagonal of the covariance, shape (n,)."""
-        found: FloatArray = np.sqrt(np.diag(self.covariance))
-        return found
+        return np.sqrt(np.diag(self.covariance))
 
     @property
     def weights(self) -> FloatArray:
@@ -136,7 +121,7 @@ def solve(law: Law, data: FloatArray, start: FloatArray, *, robust: bool = True)
     p = _least_squares(law, data, np.ones(m), used, start)
     if robust:
         for _ in range(3):
-            scale = _mad(data - law.value(p))
+            scale = robust_scale(data - law.value(p))
             if scale <= _EXACT * np.abs(data).max():
                 break
             p = _least_squares(law, data, np.full(m, scale * scale), used, p, loss="soft_l1")
@@ -251,8 +236,7 @@ def leverage(rows: FloatArray) -> FloatArray:
 def _basis(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis of what the columns span, shape (m, rank)."""
     basis, singular, _ = np.linalg.svd(rows / _lengths(rows), full_matrices=False)
-    found: FloatArray = basis[:, singular > 1e-12 * singular[0]] if singular.size else basis
-    return found
+    return basis[:, singular > 1e-12 * singular[0]] if singular.size else basis
 
 
 def _lengths(rows: FloatArray) -> FloatArray:
@@ -275,12 +259,10 @@ def _least_squares(
     root = np.sqrt(variance[used])
 
     def residuals(p: FloatArray) -> FloatArray:
-        found: FloatArray = (law.value(p)[used] - data[used]) / root
-        return found
+        return (law.value(p)[used] - data[used]) / root
 
     def jacobian(p: FloatArray) -> FloatArray:
-        found: FloatArray = law.jacobian(p)[used] / root[:, None]
-        return found
+        return law.jacobian(p)[used] / root[:, None]
 
     found = least_squares(
         residuals,
@@ -299,11 +281,6 @@ def _least_squares(
 
 def _is_exact(data: FloatArray, residuals: FloatArray) -> bool:
     return bool(np.sqrt(np.mean(residuals**2)) <= _EXACT * np.abs(data).max())
-
-
-def _mad(residuals: FloatArray) -> float:
-    """Return the standard deviation of normal noise that has this median absolute residual."""
-    return 1.482602218505602 * float(np.median(np.abs(residuals)))
 
 
 def variance_of(
@@ -343,7 +320,7 @@ def variance_of(
     size = g.mean(axis=0)
     g = g[:, size > 0.0] / size[size > 0.0]
     kept = spread[:, size > 0.0] / size[size > 0.0]
-    first = _mad(residuals[used]) ** 2 if clipped else float(r2.mean())
+    first = robust_scale(residuals[used]) ** 2 if clipped else float(r2.mean())
     theta = np.full(g.shape[1], (first or float(r2.mean())) / g.shape[1])
     limit = _CLIP * _CLIP
     # Mean of a squared normal number that is cut at the limit.
@@ -376,5 +353,4 @@ def _inside(
     free = np.ones(len(root))
     free[used] = np.maximum(1.0 - leverage(rows[used]), 0.1) if freedom > 0 else 1.0
     limit = float(norm.isf(0.5 * _FALSE_OUTLIERS / len(root)))
-    found: npt.NDArray[np.bool_] = np.abs(residuals) <= limit * root * np.sqrt(free)
-    return found
+    return np.abs(residuals) <= limit * root * np.sqrt(free)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, Self
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
+
+from printhammer.results import Column, Result, column, coordinate, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray
 
 CONFIDENCE: Final = 0.95
@@ -103,80 +105,96 @@ class Profile:
     interval: tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """The result of a fit.
+class Fit(Result):
+    """The result of a fit."""
 
-    Attributes
-    ----------
-    kind : str
-        What was fitted: "magnet", "spring", "pack", "backstop" or "motion".
-    source : tuple of str
-        Names of the files, without their folders.
-    constants : dict of str to FittedConstant
-        By key.
-    keys : tuple of str
-        Order of `covariance`; a constant from which another one was computed may be missing.
-    covariance : array, shape (n, n)
-        Of the constants in `keys`, SI.
-    abscissa, data, fitted, residuals : array, shape (m,)
-        Where each datum was measured, the datum, the law there, and their difference data - fitted, SI.
-    axes : tuple of tuple of str
-        Name and SI unit of the abscissa and of the data, such as (("displacement", "m"), ("force", "N")).
-    degrees_of_freedom : float
-        Data used less parameters fitted; less where residuals depend on each other.
-    residual_scale : float
-        Standard deviation of the noise in the data, SI.
-    weights : array, shape (m,)
-        Of the data, proportional to 1 / variance; the largest is 1.
-    outliers : array of bool, shape (m,)
-        Data left out because they lie too far off.
-    condition_number : float
-        Of the Jacobian with columns of unit length; large where constants cannot be told apart.
-    series : array of int, shape (m,)
-        To which of `series_names` each datum belongs: a current, a branch, a file.
-    series_names : tuple of str
-        For the legend.
-    lines : array of int, shape (m,)
-        Line of the file in which each datum stands; empty where data are no rows.
-    given : dict of str to str
-        What was taken as known: dotted key or a phrase, to its value with unit.
-    indistinct : tuple of str
-        One sentence for each thing that the data cannot tell apart.
-    profiles : dict of str to Profile
-        For constants that are weakly determined.
-    rejected : str
-        Why the data reject the law; empty where they do not.
-    p_value : float
-        Probability of data as far from the law as these if the law holds; NaN where it was not tested.
-    notes : tuple of str
-        Further sentences.
-    """
+    kind: str = scalar("", "what was fitted", more='"magnet", "spring", "pack", "backstop" or "motion"')
+    source: tuple[str, ...] = scalar("", "names of the files", more="without their folders")
+    constants: Mapping[str, FittedConstant] = part("constants by key")
+    keys: tuple[str, ...] = coordinate(
+        "",
+        "constant of the covariance",
+        "key",
+        name="key",
+        more="a constant from which another one was computed may be missing",
+    )
+    covariance: FloatArray = column("SI", "covariance of two constants", "key other_key")
+    abscissa: FloatArray = column("SI", "where the datum was measured", "datum")
+    data: FloatArray = column("SI", "datum", "datum")
+    fitted: FloatArray = column("SI", "the law there", "datum")
+    residuals: FloatArray = column("SI", "datum less law", "datum")
+    axes: tuple[tuple[str, str], tuple[str, str]] = part(
+        "name and SI unit of the abscissa and of the data",
+        more='such as (("displacement", "m"), ("force", "N"))',
+    )
+    degrees_of_freedom: float = scalar(
+        "1", "data used less parameters fitted", more="less where residuals depend on each other"
+    )
+    residual_scale: float = scalar("", "standard deviation of the noise in the data", more="SI")
+    weights: FloatArray = column(
+        "1", "weight, proportional to 1 / variance", "datum", more="the largest is 1"
+    )
+    outliers: npt.NDArray[np.bool_] = column("1", "whether it was left out as too far off", "datum")
+    condition_number: float = scalar(
+        "1",
+        "condition number of the Jacobian with columns of unit length",
+        more="large where constants cannot be told apart",
+    )
+    series: npt.NDArray[np.int64] = column(
+        "1", "place among the series", "datum", more="a current, a branch or a file of `series_names`"
+    )
+    series_names: tuple[str, ...] = scalar("", "names of the series, for the legend")
+    lines: npt.NDArray[np.int64] = part("line of the file of each datum", more="empty where data are no rows")
+    given: Mapping[str, str] = scalar(
+        "",
+        "what was taken as known",
+        more="dotted key or a phrase, to its value with unit",
+        default_factory=dict,
+    )
+    indistinct: tuple[str, ...] = scalar(
+        "", "one sentence for each thing that the data cannot tell apart", default=()
+    )
+    profiles: Mapping[str, Profile] = part(
+        "profiles of constants that are weakly determined", default_factory=dict
+    )
+    rejected: str = scalar("", "why the data reject the law", more="empty where they do not", default="")
+    p_value: float = scalar(
+        "1",
+        "probability of data as far from the law as these if the law holds",
+        more="nan where it was not tested",
+        default=float("nan"),
+    )
+    remarks: tuple[str, ...] = scalar("", "further sentences", default=())
 
-    kind: str
-    source: tuple[str, ...]
-    constants: Mapping[str, FittedConstant]
-    keys: tuple[str, ...]
-    covariance: FloatArray
-    abscissa: FloatArray
-    data: FloatArray
-    fitted: FloatArray
-    residuals: FloatArray
-    axes: tuple[tuple[str, str], tuple[str, str]]
-    degrees_of_freedom: float
-    residual_scale: float
-    weights: FloatArray
-    outliers: npt.NDArray[np.bool_]
-    condition_number: float
-    series: npt.NDArray[np.int64]
-    series_names: tuple[str, ...]
-    lines: npt.NDArray[np.int64]
-    given: Mapping[str, str] = field(default_factory=dict)
-    indistinct: tuple[str, ...] = ()
-    profiles: Mapping[str, Profile] = field(default_factory=dict)
-    rejected: str = ""
-    p_value: float = float("nan")
-    notes: tuple[str, ...] = ()
+    @property
+    def title(self) -> str:
+        """One line that says what was fitted to what."""
+        return f"fit of the {self.kind} to {', '.join(self.source)}"
+
+    def entries(self) -> Entries:
+        """Return the data over `datum`, the constants over `constant`, and their covariance."""
+        entries = super().entries()
+        for name, (meaning, unit) in zip(
+            ("abscissa", "data", "fitted", "residuals"), (self.axes[0], *[self.axes[1]] * 3), strict=True
+        ):
+            note, values = entries[name]
+            told = meaning if name in ("abscissa", "data") else f"{meaning}, {note.meaning}"
+            entries[name] = replace(note, unit=unit, meaning=told), values
+        if self.lines.size:
+            entries["line"] = Column("1", "line of the file", ("datum",)), self.lines
+        entries["other_key"] = replace(entries["key"][0], dims=("other_key",)), self.keys
+        found = list(self.constants.values())
+        for name, unit, meaning, values in (
+            ("value", "SI", "value in its own unit", [one.value for one in found]),
+            ("standard_error", "SI", "standard error", [one.standard_error for one in found]),
+            ("low", "SI", "lower end of the 95 % interval", [one.interval[0] for one in found]),
+            ("high", "SI", "upper end of the 95 % interval", [one.interval[1] for one in found]),
+            ("unit", "", "SI unit", [one.unit for one in found]),
+            ("how", "", "how it was found if not by the fit", [one.how for one in found]),
+        ):
+            entries[name] = Column(unit, meaning, ("constant",)), values
+        key = Column("", "dotted key of the hammer file, or another name", ("constant",), "coordinate")
+        return entries | {"constant": (key, list(self.constants))}
 
     def __getitem__(self, key: str) -> FittedConstant:
         return self.constants[key]
@@ -213,11 +231,6 @@ class Fit:
         from printhammer.identify.fragment import into
 
         return into(self, hammer)
-
-    def plot(self) -> Any:
-        """Draw data with the law, residuals and correlations (`printhammer.figures.fit.plot`)."""
-        # By name, so that no module of physics depends on a picture.
-        return import_module("printhammer.figures.fit").plot(self)
 
     @property
     def report(self) -> list[str]:

@@ -7,7 +7,6 @@ passed over; a comment such as ``# sampling rate: 1 MHz`` is kept as a key and i
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import describe, to_si
 
 if TYPE_CHECKING:
@@ -91,7 +91,10 @@ def read_table(
         or too few cells.
     """
     source = Path(path)
-    lines, comments = _lines(source)
+    if not source.exists():
+        raise InputError(f"{source}: there is no such file, expected a table of measurements")
+    sheet = read_sheet(source, "the table")
+    lines = sheet.rows
     wanted = _wanted(columns, optional, text)
     if not lines:
         raise InputError(f"{source}: the file has no heading, expected {wanted}")
@@ -115,36 +118,7 @@ def read_table(
             else:
                 values[name][row] = _number(cell, *units[name], where)
     rows = np.array([number for number, _cells in lines[1:]], dtype=np.int64)
-    return Table(source, values, words, rows, comments)
-
-
-def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], dict[str, str]]:
-    """Read the lines that carry cells, with their numbers, and the comments with a key."""
-    try:
-        content = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: expected a table in UTF-8 text") from None
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file, expected a table of measurements") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: the table cannot be read ({reason})") from None
-    found: list[tuple[int, list[str]]] = []
-    comments: dict[str, str] = {}
-    for number, line in enumerate(content.split("\n"), start=1):
-        bare = line.strip()
-        if bare.startswith("#"):
-            key, colon, value = bare.lstrip("#").partition(":")
-            if colon and key.strip():
-                comments[key.strip()] = value.strip()
-        elif bare.strip(","):
-            try:
-                found.append((number, next(csv.reader([line], strict=True))))
-            except csv.Error as error:
-                raise InputError(
-                    f"{path}: line {number}: expected comma-separated values ({error})"
-                ) from None
-    return found, comments
+    return Table(source, values, words, rows, sheet.comments)
 
 
 def _heading(
@@ -159,19 +133,18 @@ def _heading(
     names: list[str] = []
     units: dict[str, tuple[str, str]] = {}
     for cell in line[1]:
-        name, bracket, rest = cell.strip().partition("[")
-        unit, closed, tail = rest.partition("]")
-        name, unit = " ".join(name.lower().split()), unit.strip()
+        name, unit = split_heading(cell)
+        name = " ".join(name.lower().split())
         if name not in numbers and name not in text:
             raise InputError(f"{where}: the column {cell.strip()!r} is not known, expected {wanted}")
         if name in names:
             raise InputError(f"{where}: the column {name!r} is given twice, expected it once")
         names.append(name)
         if name in text:
-            if bracket:
+            if "[" in cell:
                 raise InputError(f"{where}: heading {cell.strip()!r}: expected {name!r}, words have no unit")
             continue
-        if not closed or tail.strip() or not unit:
+        if not unit:
             such = f"{name} [{numbers[name]}]"
             raise InputError(
                 f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}"

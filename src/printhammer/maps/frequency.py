@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 import numpy as np
 
 from printhammer.drive.input import read_count, read_number
-from printhammer.drive.text import inline, waveform_text
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.maps.layout import hammer_attributes, map_dataset, matching, on_times
+from printhammer.results.provenance import provenance
 from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
@@ -131,8 +131,15 @@ def frequency_map(
     }
     attributes = {
         "title": f"frequency-time map of {hammer.name}, bursts of {count} pulses",
+        "pulses": count,
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
         **hammer_attributes(hammer),
-        **_provenance(fired, count, overlap, tolerance),
+        **provenance(
+            hammer=hammer,
+            waveform=fired,
+            overlap=overlap,
+            tolerance=read_number(tolerance, "1", "tolerance"),
+        ),
     }
     return map_dataset(grid, moments, variables, attributes, {"status": {"codes": codes}})
 
@@ -203,20 +210,3 @@ def _times(times: npt.ArrayLike | None, end: float) -> FloatArray:
     if found[0] < 0.0 or (np.diff(found) <= 0.0).any() or found[-1] <= 0.0:
         raise InputError("times: expected ascending times, s, not negative, the last one greater than 0 s")
     return found
-
-
-def _provenance(waveform: Waveform, pulses: int, overlap: str, tolerance: float) -> dict[str, Any]:
-    import numba
-
-    from printhammer import __version__
-
-    return {
-        "waveform": inline(waveform_text(waveform)),
-        "pulses": pulses,
-        "overlap": overlap,
-        "tolerance": repr(float(read_number(tolerance, "1", "tolerance"))),
-        "printhammer": __version__,
-        "numpy": np.__version__,
-        "numba": numba.__version__,
-        "made": datetime.now(UTC).isoformat(timespec="seconds"),
-    }

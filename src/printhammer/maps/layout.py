@@ -7,18 +7,13 @@ computed maps. A missing number is NaN.
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from contextlib import suppress
-from importlib.util import find_spec
-from pathlib import Path
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from printhammer.errors import InputError
-from printhammer.support.outputs import write_dataset
+from printhammer.results.declare import Column
+from printhammer.results.files import dataset_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,32 +24,20 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-ZARR: Final = ".zarr"
-FILES: Final = (".nc", ZARR)
-"""Endings of the files that a map is written to."""
+_FIRED: Final = ("rate", "firing")
 
-UNITS: Final = {
-    "rate": ("Hz", "firing rate"),
-    "time": ("s", "time from the first firing"),
-    "firing": ("1", "number of the firing"),
-    "displacement": ("m", "displacement of the armature"),
-    "fired_at": ("s", "time of the firing"),
-    "struck": ("1", "whether the firing made a dot"),
-    "flight_time": ("s", "time from firing to touch of the pack"),
-    "peak_force": ("N", "largest pack force of the dot"),
-    "status": ("1", "how the run ended"),
+LAYOUT: Final = {
+    "rate": Column("Hz", "firing rate", ("rate",), "coordinate", dtype=np.float64),
+    "time": Column("s", "time from the first firing", ("time",), "coordinate", dtype=np.float64),
+    "firing": Column("1", "number of the firing", ("firing",), "coordinate", dtype=np.int32),
+    "displacement": Column("m", "displacement of the armature", ("rate", "time")),
+    "fired_at": Column("s", "time of the firing", _FIRED),
+    "struck": Column("1", "whether the firing made a dot", _FIRED),
+    "flight_time": Column("s", "time from firing to touch of the pack", _FIRED),
+    "peak_force": Column("N", "largest pack force of the dot", _FIRED),
+    "status": Column("1", "how the run ended", ("rate",), dtype=np.int32),
 }
-"""Units and meanings of the variables of a map, by name."""
-
-DIMENSIONS: Final = {
-    "displacement": ("rate", "time"),
-    "fired_at": ("rate", "firing"),
-    "struck": ("rate", "firing"),
-    "flight_time": ("rate", "firing"),
-    "peak_force": ("rate", "firing"),
-    "status": ("rate",),
-}
-"""Dimensions of the variables of a map, by name."""
+"""Unit, meaning and dimensions of the variables of a map, by name."""
 
 PLACES: Final = {"backstop": "backstop_m", "pack": "pack_front_m", "platen": "platen_m"}
 """Attributes of a map that hold the positions of the hammer, m, by the names of the places."""
@@ -76,34 +59,20 @@ def map_dataset(
     times : array, shape (T,)
         Times from the first firing, s.
     variables : mapping
-        Arrays by name, SI, of the dimensions in `DIMENSIONS`; `displacement` among them.
+        Arrays by name, SI, of the dimensions in `LAYOUT`; `displacement` among them.
     attributes : mapping
         Attributes of the set: texts and numbers.
     notes : mapping, optional
         Further attributes of single variables, by name.
-
-    Returns
-    -------
-    xarray.Dataset
-        With `units` and `long_name` in the attributes of every variable and coordinate.
     """
-    import xarray as xr
-
     more = notes or {}
-
-    def entry(name: str, dimensions: tuple[str, ...], values: npt.NDArray[Any]) -> Any:
-        unit, meaning = UNITS[name]
-        return dimensions, values, {"units": unit, "long_name": meaning, **more.get(name, {})}
-
-    coordinates = {
-        "rate": entry("rate", ("rate",), np.asarray(rates, dtype=np.float64)),
-        "time": entry("time", ("time",), np.asarray(times, dtype=np.float64)),
-    }
+    values: dict[str, Any] = {"rate": rates, "time": times, **variables}
     if "fired_at" in variables:
-        firings = np.arange(variables["fired_at"].shape[1], dtype=np.int32)
-        coordinates["firing"] = entry("firing", ("firing",), firings)
-    data = {name: entry(name, DIMENSIONS[name], values) for name, values in variables.items()}
-    return xr.Dataset(data, coords=coordinates, attrs=dict(attributes))
+        values["firing"] = np.arange(variables["fired_at"].shape[1])
+    return dataset_of(
+        {name: (replace(LAYOUT[name], attrs=more.get(name)), array) for name, array in values.items()},
+        attributes,
+    )
 
 
 def places_of(chart: xr.Dataset) -> dict[str, float]:
@@ -125,69 +94,14 @@ def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
 
 
 def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
-    """Return what a map says about its hammer: name, fingerprint, how its constants came about, places."""
+    """Return what a map says about its hammer: how its constants came about, and its places."""
     statuses = {constant.status for constant in hammer.constants.values()}
     guessed = [status for status in ("reconstructed", "assumed") if status in statuses]
     places = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
     return {
-        "hammer": hammer.name,
-        "hammer_fingerprint": hammer.fingerprint,
         "hammer_constants": f"in part {' and '.join(guessed)}" if guessed else "measured or stated",
         **{PLACES[name]: float(place) for name, place in places.items() if place is not None},
     }
-
-
-def save_map(chart: xr.Dataset, path: str | Path) -> None:
-    """Write a map as NetCDF (.nc) or as a Zarr store (.zarr); what was there stays if anything fails.
-
-    Raises
-    ------
-    InputError
-        The name ends in neither, the file cannot be written, or zarr is not installed.
-    """
-    target = Path(path)
-    if target.suffix.lower() == ZARR:
-        _save_zarr(chart, target)
-    elif target.suffix.lower() == ".nc":
-        write_dataset(target, chart)
-    else:
-        raise InputError(f"{target}: expected a name that ends in {' or '.join(FILES)}")
-
-
-def _save_zarr(chart: xr.Dataset, target: Path) -> None:
-    need_zarr(target)
-    if target.exists() and not (target / "zarr.json").is_file():
-        raise InputError(f"{target}: expected a new store, this is no Zarr store")
-    draft: Path | None = None
-    try:
-        draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
-        with catch_warnings():
-            # Metadata in one place spare readers a warning; each array has its own as well.
-            simplefilter("ignore", UserWarning)
-            chart.to_zarr(draft / target.name, mode="w", zarr_format=3, consolidated=True)
-        if target.exists():
-            target.rename(draft / "before")
-        (draft / target.name).rename(target)
-    except OSError as error:
-        raise InputError(f"{target}: the store cannot be written ({error.strerror or error})") from None
-    finally:
-        if draft is not None:
-            if (draft / "before").exists() and not target.exists():
-                (draft / "before").rename(target)
-            with suppress(OSError):
-                shutil.rmtree(draft)
-
-
-def need_zarr(path: Path) -> None:
-    """Make sure that zarr is there.
-
-    Raises
-    ------
-    InputError
-        It is not installed.
-    """
-    if find_spec("zarr") is None:
-        raise InputError(f"{path}: Zarr stores need zarr, which the extra printhammer[sweep] installs")
 
 
 def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.maps.layout import ZARR, interpolated, map_dataset, need_zarr
+from printhammer.maps.layout import interpolated, map_dataset
 from printhammer.maps.records import Record, checked, read_records
+from printhammer.results.files import need_for
 from printhammer.units import to_si
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def load_measured_map(path: str | Path, *, times: npt.ArrayLike | None = None) -
         The file cannot be read or holds something else; the message names file, column and line.
     """
     source = Path(path)
-    stored = source.suffix.lower() == ZARR or _magic(source).startswith((_CLASSIC, _HDF5))
+    stored = source.suffix.lower() == ".zarr" or _magic(source).startswith((_CLASSIC, _HDF5))
     records = _stored_records(source) if stored else read_records(source)
     grid = _common_times(records) if times is None else _given(times)
     rows = np.stack([interpolated(record.times, record.displacement, grid) for record in records])
@@ -139,8 +140,8 @@ def _stored_records(path: Path) -> list[Record]:
 def _opened(path: Path) -> Any:
     import xarray as xr
 
-    if path.suffix.lower() == ZARR:
-        need_zarr(path)
+    if path.suffix.lower() == ".zarr":
+        need_for(path)
         # Metadata in one place are there or not; each array's own always are.
         options: dict[str, Any] = {"engine": "zarr", "consolidated": False}
     elif _magic(path).startswith(_CLASSIC):

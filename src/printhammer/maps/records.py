@@ -11,8 +11,6 @@ empty cell, or nan, is a gap. Blank lines and lines that begin with # are passed
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -20,6 +18,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import parse, to_si
 
 if TYPE_CHECKING:
@@ -196,36 +195,20 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[Recor
 
 def _named(what: str, cell: str) -> tuple[str, str]:
     """Split the cell of a heading into its name and its unit."""
-    name, _, rest = cell.partition("[")
-    unit, closed, tail = rest.partition("]")
-    if not closed or tail.strip() or not unit.strip():
+    name, unit = split_heading(cell)
+    if not unit:
         raise InputError(f"{what}: column {cell!r} is expected to carry its unit, such as 'time [us]'")
-    name = name.strip()
-    return (name.lower() if name.lower() in _SI else name), unit.strip()
+    return (name.lower() if name.lower() in _SI else name), unit
 
 
 def _cells(path: Path) -> Cells:
     what = str(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{what}: the measured map is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{what}: the measured map cannot be read ({reason})") from None
-    reader = csv.reader(io.StringIO(text), strict=True)
-    lines, rows = [], []
-    try:
-        for row in reader:
-            if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#"):
-                lines.append(reader.line_num)
-                rows.append(row)
-    except csv.Error as error:
-        raise InputError(f"{what}: expected comma-separated values ({error})") from None
+    rows = read_sheet(path, "the measured map").rows
     if len(rows) < 2:
         raise InputError(f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples")
-    heading = [cell.strip() for cell in rows[0]]
-    for line, row in zip(lines[1:], rows[1:], strict=True):
+    heading = [cell.strip() for cell in rows[0][1]]
+    for line, row in rows[1:]:
         if len(row) != len(heading):
             raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(heading)}")
-    return Cells(what, heading, np.array(lines[1:], dtype=np.int64), rows[1:])
+    lines = np.array([line for line, _row in rows[1:]], dtype=np.int64)
+    return Cells(what, heading, lines, [row for _line, row in rows[1:]])

@@ -186,13 +186,7 @@ _Model = TypeVar("_Model", bound=_Table)
 
 @dataclass(frozen=True)
 class Results:
-    """The results in a folder; each is None where its file is absent.
-
-    Attributes
-    ----------
-    folder : Path or Traversable
-        The folder.
-    """
+    """The results in a folder; each is None where its file is absent."""
 
     folder: Path | Traversable
 

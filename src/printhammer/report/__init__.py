@@ -1,5 +1,6 @@
 """The report: figures and claims of the paper for one hammer, as one page, pictures and `claims.json`."""
 
-from printhammer.report.build import Report, write_report
+from printhammer.report.build import write_report
+from printhammer.report.contents import Report
 
 __all__ = ["Report", "write_report"]

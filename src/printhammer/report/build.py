@@ -5,105 +5,29 @@ from __future__ import annotations
 import json
 import tomllib
 from contextlib import suppress
-from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.claims import Context, Result, buzz_search, judge_all
+from printhammer.claims import Context, buzz_search, judge_all
 from printhammer.claims.verdicts import panel_strobes, printed_verdicts
 from printhammer.errors import InputError, PrinthammerError
-from printhammer.reconstruction.results import Results, shipped_results
+from printhammer.reconstruction.results import shipped_results
 from printhammer.report.citations import cited_figures
+from printhammer.report.contents import Drawing, Report
 from printhammer.report.publish import CLAIMS, PAGE, PDF, PICTURES, staged
 from printhammer.support.outputs import write_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from matplotlib.figure import Figure
-
+    from printhammer.claims import Result
     from printhammer.hammer.hammer import Hammer
-    from printhammer.reconstruction.results import BaseRates
+    from printhammer.reconstruction.results import BaseRates, Results
 
 _BUZZ: Final = 7
 _POINCARE: Final = 11
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """One figure of the paper, drawn.
-
-    Attributes
-    ----------
-    number : int
-        Number in the paper.
-    title, caption : str
-        What it is, and what it shows for this hammer.
-    says : str
-        What the paper says of it, in our words.
-    svg : bytes
-        The picture; empty where it could not be drawn.
-    reason : str
-        Why it could not be drawn; empty where it was.
-    claims : tuple of Result
-        Claims that cite the figure.
-    seconds : float
-        Time that it took.
-    figure : Figure or None
-        The picture, to be drawn elsewhere.
-    """
-
-    number: int
-    title: str
-    caption: str
-    says: str
-    svg: bytes
-    reason: str
-    claims: tuple[Result, ...]
-    seconds: float
-    figure: Figure | None = field(default=None, repr=False)
-
-
-@dataclass(frozen=True)
-class Report:
-    """What `write_report` found and wrote.
-
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    results : list of Result
-        The claims, judged.
-    drawings : list of Drawing
-        The figures.
-    provenance : mapping
-        Versions, fingerprint, tolerance.
-    found : Results
-        What the reconstruction found.
-    seconds : float
-        Time that all took.
-    files : list of Path
-        What was written.
-    """
-
-    hammer: Hammer
-    results: list[Result]
-    drawings: list[Drawing]
-    provenance: Mapping[str, Any]
-    found: Results
-    seconds: float
-    files: list[Path] = field(default_factory=list)
-
-    def count(self, verdict: str) -> int:
-        """Return how many claims have a verdict."""
-        return sum(result.verdict == verdict for result in self.results)
-
-    @property
-    def reconstructed(self) -> bool:
-        """Whether the hammer is the one that the reconstruction is about."""
-        return self.found.search is not None and self.found.search.shipped == self.hammer.fingerprint
 
 
 def write_report(
@@ -113,7 +37,7 @@ def write_report(
     progress: Callable[[str], None] | None = None,
     claims: Iterable[str] | None = None,
     figures: Iterable[int] | None = None,
-    found: Results | None = None,
+    reconstruction: Results | None = None,
     pdf: bool = False,
 ) -> Report:
     """Judge the claims, draw the figures, and write the report of a hammer.
@@ -128,10 +52,10 @@ def write_report(
         Called with a phrase before each step.
     claims, figures : iterable, optional
         Names and numbers of those to report; by default all.
-    found : Results, optional
-        What the reconstruction found; by default what ships with the package.
+    reconstruction : Results, optional
+        Results of the reconstruction; by default those that ship with the package.
     pdf : bool, optional
-        Whether to write `report.pdf` too.
+        Whether to write `report.pdf` too, which needs the extra `pdf`.
 
     Returns
     -------
@@ -141,14 +65,17 @@ def write_report(
     Raises
     ------
     InputError
-        The folder cannot be written to, or a result of the reconstruction cannot be read. What was there
-        stays.
+        The folder cannot be written to, a result of the reconstruction cannot be read, or what a PDF needs
+        is not installed. What was there stays.
     """
     from printhammer.report.page import page
+    from printhammer.report.pdf import check_typesetter, write_pdf
 
     tell = progress or (lambda _: None)
-    found = shipped_results() if found is None else found
-    found.check()
+    reconstruction = shipped_results() if reconstruction is None else reconstruction
+    reconstruction.check()
+    if pdf:
+        check_typesetter()
     with staged(out) as folder:
         start = perf_counter()
         context = Context(hammer)
@@ -164,14 +91,13 @@ def write_report(
             if drawing is not None:
                 drawings.append(drawing)
         provenance = _provenance(hammer, context)
-        report = Report(hammer, results, drawings, provenance, found, perf_counter() - start, written)
+        took = perf_counter() - start
+        report = Report(hammer, results, drawings, provenance, reconstruction, took, written)
         tell("page")
-        for name, text in ((CLAIMS, claims_json(results, found.base_rates)), (PAGE, page(report))):
+        for name, text in ((CLAIMS, claims_json(results, reconstruction.base_rates)), (PAGE, page(report))):
             write_file(folder / name, text)
             written.append(folder / name)
         if pdf:
-            from printhammer.report.pdf import write_pdf
-
             tell("PDF")
             write_pdf(report, folder / PDF)
             written.append(folder / PDF)
@@ -210,9 +136,9 @@ def _draw(
         return None
     entry = FIGURES[number]
     start = perf_counter()
-    svg, reason, figure = b"", "", None
+    svg, reason, paths = b"", "", dict[str, Path]()
+    options: dict[str, Any] = {}
     try:
-        options: dict[str, Any] = {}
         if number == _BUZZ:
             # The train of Fig. 7 has been sought already.
             options["search"] = buzz_search(context)
@@ -223,21 +149,13 @@ def _draw(
     except InputError as error:
         reason = str(error)
     else:
-        paths = save(figure, folder, f"figure{number:02d}")
-        svg = next(path for path in paths if path.suffix == ".svg").read_bytes()
-        written += paths
+        paths = {path.suffix: path for path in save(figure, folder, f"figure{number:02d}")}
+        svg = paths[".svg"].read_bytes()
+        written += paths.values()
     cited = tuple(result for result in results if number in cited_figures(result.claim.source))
-    return Drawing(
-        number,
-        entry.title,
-        entry.caption,
-        " ".join(says["says"].split()),
-        svg,
-        reason,
-        cited,
-        perf_counter() - start,
-        figure,
-    )
+    vectors = Path(PICTURES, paths[".pdf"].name) if paths else None
+    text, took = " ".join(says["says"].split()), perf_counter() - start
+    return Drawing(number, entry.title, entry.caption, text, svg, vectors, reason, cited, took)
 
 
 def _provenance(hammer: Hammer, context: Context) -> dict[str, Any]:
@@ -248,10 +166,14 @@ def _provenance(hammer: Hammer, context: Context) -> dict[str, Any]:
 
     from printhammer import __version__
 
-    found: dict[str, Any] = {"hammer": hammer.name, "hammer_fingerprint": hammer.fingerprint}
+    settings: dict[str, Any] = {"hammer": hammer.name, "hammer_fingerprint": hammer.fingerprint}
     with suppress(PrinthammerError):
-        found |= context.single.provenance
-    for name in ("drive", "drive_fingerprint", "status"):
-        found.pop(name, None)
-    found |= {"printhammer": __version__, "matplotlib": mpl.__version__, "python": platform.python_version()}
-    return found
+        settings |= context.single.provenance
+    for name in ("drive", "drive_fingerprint", "waveform", "overlap", "status"):
+        settings.pop(name, None)
+    settings |= {
+        "printhammer": __version__,
+        "matplotlib": mpl.__version__,
+        "python": platform.python_version(),
+    }
+    return settings

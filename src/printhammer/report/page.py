@@ -4,30 +4,19 @@ from __future__ import annotations
 
 import base64
 import json
+from collections import Counter
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.report.family_views import (
-    claims_of_family,
-    conclusions_view,
-    constants_of_family,
-    members_view,
-)
-from printhammer.report.misses import misses
-from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text
-from printhammer.report.views import (
-    failing_view,
-    linked_source,
-    panels_view,
-    predictions_view,
-    rates_view,
-    timings_view,
-)
+from printhammer.report.citations import linked_source
+from printhammer.report.family_views import family_view
+from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text, words_of
+from printhammer.report.views import failing_view, panels_view, predictions_view, rates_view, timings_view
 
 if TYPE_CHECKING:
     from printhammer.claims import Result
     from printhammer.hammer.hammer import Hammer
-    from printhammer.report.build import Report
+    from printhammer.report.contents import Report
 
 KINDS: Final = {
     "stated": "the paper prints the number or the verdict; the band is the printed precision",
@@ -50,46 +39,39 @@ def page(report: Report) -> str:
     )
     environment.filters["typeset"] = typeset
     environment.filters["percent"] = percent
-    environment.filters["words"] = lambda name: name.replace("_", " ")
-    folder = files("printhammer").joinpath("report", "templates")
-    found = report.found
-    drawn = {drawing.number for drawing in report.drawings}
+    environment.filters["words"] = words_of
+    style = files("printhammer").joinpath("report", "templates", "page.css").read_text(encoding="utf-8")
+    images = [base64.b64encode(drawing.svg).decode("ascii") for drawing in report.drawings]
+    drawings = [
+        {"drawing": drawing, "image": image} for drawing, image in zip(report.drawings, images, strict=True)
+    ]
     return environment.get_template("page.html.j2").render(
-        style=folder.joinpath("page.css").read_text(encoding="utf-8"),
-        report=report,
-        hammer=report.hammer,
-        statuses=statuses_of(report.hammer),
-        has_reconstructed=any(c.status == "reconstructed" for c in report.hammer.constants.values()),
-        parts=_parts(report.hammer),
-        verdicts={verdict: report.count(verdict) for verdict in VERDICTS},
-        kinds=KINDS,
-        by_kind=by_kind(report.results),
-        judged={result.claim.name for result in report.results},
-        claims=[_claim(result, report, drawn) for result in report.results],
-        drawings=[
-            {"drawing": drawing, "image": base64.b64encode(drawing.svg).decode("ascii")}
-            for drawing in report.drawings
-        ],
-        failing=failing_view(report),
-        rates=rates_view(report),
-        panels=panels_view(report),
-        search=found.search if report.reconstructed else None,
-        predictions=predictions_view(report) if report.reconstructed else None,
-        family=found.family if report.reconstructed else None,
-        conclusions=conclusions_view(report),
-        members=members_view(report),
-        spread=constants_of_family(report),
-        family_claims=claims_of_family(report),
-        timings=timings_view(report),
+        style=style, report=report, drawings=drawings, **view(report)
     )
 
 
-def statuses_of(hammer: Hammer) -> dict[str, int]:
-    """Return how many constants of a hammer have each status."""
-    found: dict[str, int] = {}
-    for constant in hammer.constants.values():
-        found[constant.status] = found.get(constant.status, 0) + 1
-    return found
+def view(report: Report) -> dict[str, Any]:
+    """Return what the page and its printed form show of a report, as texts and places on tracks."""
+    drawn = {drawing.number for drawing in report.drawings}
+    constants = report.hammer.constants.values()
+    return {
+        "hammer": report.hammer,
+        "statuses": dict(Counter(constant.status for constant in constants)),
+        "has_reconstructed": any(constant.status == "reconstructed" for constant in constants),
+        "parts": _parts(report.hammer),
+        "verdicts": {verdict: report.count(verdict) for verdict in VERDICTS},
+        "kinds": KINDS,
+        "by_kind": _by_kind(report.results),
+        "judged": {result.claim.name for result in report.results},
+        "claims": [_claim(result, report, drawn) for result in report.results],
+        "failing": failing_view(report),
+        "rates": rates_view(report),
+        "panels": panels_view(report),
+        "search": report.search,
+        "predictions": predictions_view(report),
+        "family": family_view(report),
+        "timings": timings_view(report),
+    }
 
 
 def _parts(hammer: Hammer) -> list[dict[str, Any]]:
@@ -106,7 +88,7 @@ def _parts(hammer: Hammer) -> list[dict[str, Any]]:
     ]
 
 
-def by_kind(results: list[Result]) -> dict[str, dict[str, int]]:
+def _by_kind(results: list[Result]) -> dict[str, dict[str, int]]:
     """Return how many claims of each kind have each verdict."""
     counts = {kind: dict.fromkeys(VERDICTS, 0) for kind in KINDS}
     for result in results:
@@ -114,7 +96,7 @@ def by_kind(results: list[Result]) -> dict[str, dict[str, int]]:
     return counts
 
 
-def judged_lines(result: Result) -> list[dict[str, Any]]:
+def _judged_lines(result: Result) -> list[dict[str, Any]]:
     """Return the measured values of a claim that are banded, as text."""
     value, missed = result.value or {}, set(result.missed)
     lines = []
@@ -140,12 +122,11 @@ def _claim(result: Result, report: Report, drawn: set[int]) -> dict[str, Any]:
     long = {
         name: json.dumps(entry) for name, entry in rest.items() if isinstance(entry, (dict, list)) and entry
     }
-    rates = report.found.base_rates
+    rates = report.reconstruction.base_rates
     return {
         "result": result,
         "source": linked_source(result.claim.source, drawn),
-        "judged": judged_lines(result),
-        "misses": misses(result),
+        "judged": _judged_lines(result),
         "plain": plain,
         "long": long,
         "measured": result.value is not None,

@@ -45,12 +45,13 @@ def split_name(name: str) -> tuple[str, str]:
     """Split a name such as "peak_force_N" into words and SI unit, ("peak force", "N")."""
     for suffix, unit in _SUFFIXES.items():
         if name.endswith(suffix):
-            return _words(name.removesuffix(suffix)), unit
-    return _words(name), ""
+            return words_of(name.removesuffix(suffix).replace("_over_", " / ")), unit
+    return words_of(name.replace("_over_", " / ")), ""
 
 
-def _words(name: str) -> str:
-    return name.replace("_over_", " / ").replace("_", " ")
+def words_of(name: str) -> str:
+    """Return a name as words."""
+    return name.replace("_", " ")
 
 
 def value_text(value: Any, unit: str, *, other: bool = True) -> str:

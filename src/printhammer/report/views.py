@@ -3,40 +3,22 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import panel_name, printed_verdicts
-from printhammer.report.citations import CITATION, SECTIONS
 from printhammer.report.misses import Miss, misses, misses_of
-from printhammer.report.quantities import band_text, percent, split_name, value_text
+from printhammer.report.quantities import band_text, percent, split_name, value_text, words_of
 
 if TYPE_CHECKING:
-    from printhammer.claims import Claim, Result
+    from printhammer.claims import Claim
     from printhammer.hammer.hammer import Hammer
     from printhammer.reconstruction.judging.shares import Share
     from printhammer.reconstruction.results import BestFor
-    from printhammer.report.build import Report
+    from printhammer.report.contents import Report
 
 SAME: Final = 1e-9
 """Relative difference up to which two constants are the same."""
-
-
-def linked_source(source: str, drawn: set[int]) -> Any:
-    """Return a source as HTML, the numbers of drawn figures linked."""
-    from markupsafe import Markup, escape
-
-    def link(match: re.Match[str]) -> str:
-        number = match[0]
-        return f'<a href="#figure-{number}">{number}</a>' if int(number) in drawn else number
-
-    text = str(escape(source))
-    text = CITATION.sub(lambda found: re.sub(r"\d+", link, found[0]), text)
-    number = SECTIONS.get(source)
-    if number in drawn:
-        text += f' (<a href="#figure-{number}">Fig. {number}</a>)'
-    return Markup(text)
 
 
 def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
@@ -60,7 +42,7 @@ def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
 
 def rates_view(report: Report) -> dict[str, Any] | None:
     """Return the base rates, the rarest first, on a logarithmic axis; None where there are none."""
-    rates = report.found.base_rates
+    rates = report.reconstruction.base_rates
     if rates is None:
         return None
     found = [(result, rates.share(result.claim.name)) for result in report.results]
@@ -87,7 +69,7 @@ def panels_view(report: Report) -> list[dict[str, Any]]:
     for result in report.results:
         if result.claim.name == "poincare" and result.value is not None:
             verdicts = result.value["verdicts"]
-    rates = report.found.base_rates
+    rates = report.reconstruction.base_rates
     shares = {} if rates is None else rates.panels
     if not verdicts:
         return []
@@ -108,10 +90,10 @@ def panels_view(report: Report) -> list[dict[str, Any]]:
 
 def predictions_view(report: Report) -> dict[str, Any] | None:
     """Return what the search on the stated claims alone predicts; None where there is nothing."""
-    found = report.found.predictions
-    if found is None:
+    found = report.reconstruction.predictions
+    if found is None or not report.reconstructed:
         return None
-    rates = report.found.base_rates
+    rates = report.reconstruction.base_rates
     verdicts = {result.claim.name: result for result in report.results}
     rows = []
     for name in every_claim():
@@ -133,7 +115,7 @@ def predictions_view(report: Report) -> dict[str, Any] | None:
 
 def failing_view(report: Report) -> list[dict[str, Any]]:
     """Return the claims that fail: by how much, why, and the best hammer for each that the search met."""
-    search = report.found.search if report.reconstructed else None
+    search = report.search
     rows = []
     for result in report.results:
         if result.verdict == "fails":
@@ -182,7 +164,7 @@ def timings_view(report: Report) -> dict[str, Any]:
         (f"Figure {drawing.number}", f"figure-{drawing.number}", drawing.seconds)
         for drawing in report.drawings
     ]
-    entries += [(_words(result), result.claim.name, result.seconds) for result in report.results]
+    entries += [(words_of(result.claim.name), result.claim.name, result.seconds) for result in report.results]
     longest = max((seconds for *_, seconds in entries), default=0.0) or 1.0
     return {
         "rows": [
@@ -193,7 +175,3 @@ def timings_view(report: Report) -> dict[str, Any]:
         "figures": f"{sum(drawing.seconds for drawing in report.drawings):.1f}",
         "claims": f"{sum(result.seconds for result in report.results):.1f}",
     }
-
-
-def _words(result: Result) -> str:
-    return result.claim.name.replace("_", " ")

@@ -1,7 +1,7 @@
 """Results: declared once, and from that Dataset, table, files, docstring, HTML repr and picture."""
 
 from printhammer.results.declare import Column, column, coordinate, derived, part, scalar
-from printhammer.results.files import ENDINGS, Reopened, reopen
+from printhammer.results.files import ENDINGS, Reopened, reopen, save_dataset
 from printhammer.results.provenance import KEYS, provenance
 from printhammer.results.result import RESULTS, Result
 
@@ -18,5 +18,6 @@ __all__ = [
     "part",
     "provenance",
     "reopen",
+    "save_dataset",
     "scalar",
 ]

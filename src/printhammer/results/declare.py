@@ -74,10 +74,9 @@ class Column:
             **(self.attrs or {}),
         }
 
-    @property
-    def heading(self) -> str:
-        """Heading in the table, such as "x [m]"."""
-        return heading(self.head or self.name, self.unit)
+    def heading(self, name: str) -> str:
+        """Heading in the table of the variable of some name, such as "x [m]"."""
+        return heading(self.head or name, self.unit)
 
     @property
     def sentence(self) -> str:
@@ -151,14 +150,24 @@ def scalar(
     more: str = "",
     name: str = "",
     default: Any = MISSING,
+    default_factory: Any = MISSING,
 ) -> Any:
     """Declare a number, text or short list that is an attribute of the Dataset; arguments as for `column`."""
-    return field(default=default, metadata={_KEY: Column(unit, meaning, (), "scalar", more, name)})
+    note = Column(unit, meaning, (), "scalar", more, name)
+    return field(default=default, default_factory=default_factory, metadata={_KEY: note})
 
 
-def part(meaning: str, *, more: str = "", repr: bool = True, default: Any = MISSING) -> Any:
+def part(
+    meaning: str,
+    *,
+    more: str = "",
+    repr: bool = True,
+    default: Any = MISSING,
+    default_factory: Any = MISSING,
+) -> Any:
     """Declare a field that is no part of the Dataset, such as the hammer; provenance may speak of it."""
-    return field(default=default, repr=repr, metadata={_KEY: Column("", meaning, (), "part", more)})
+    note = Column("", meaning, (), "part", more)
+    return field(default=default, default_factory=default_factory, repr=repr, metadata={_KEY: note})
 
 
 def derived(

@@ -13,7 +13,6 @@ JSON is strict: nan is null, and infinite numbers are "inf" and "-inf".
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import shutil
@@ -22,7 +21,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from io import BytesIO
-from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from warnings import catch_warnings, simplefilter
@@ -33,6 +31,7 @@ from printhammer.errors import InputError
 from printhammer.results.declare import heading
 from printhammer.results.provenance import KEYS
 from printhammer.support.outputs import write_file
+from printhammer.support.sheets import read_sheet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -40,9 +39,15 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from printhammer.results.declare import Column
+
 ENDINGS: Final = (".nc", ".zarr", ".csv", ".parquet", ".json")
 """Endings of the files that hold results."""
 
+_NEEDED: Final = {
+    ".zarr": ("zarr", "Zarr stores need", "sweep"),
+    ".parquet": ("pyarrow", "Parquet files need", "tables"),
+}
 _COLUMNS: Final = "columns"
 _MOST_INT: Final = 2**31
 
@@ -97,6 +102,7 @@ def save(
     if kind not in endings:
         some = f"one of {', '.join(endings)}" if len(endings) > 1 else endings[0]
         raise InputError(f"{target}: expected a name that ends in {some}")
+    need_for(target)
     if kind == ".nc":
         write_file(target, _netcdf(dataset()))
     elif kind == ".zarr":
@@ -104,12 +110,9 @@ def save(
     elif kind == ".json":
         write_file(target, _json(dataset()))
     elif kind == ".csv":
-        write_file(target, csv_text(dataframe()))
+        write_csv(dataframe(), target)
     else:
-        need("pyarrow", target, "writing Parquet needs pyarrow", "tables")
-        content = BytesIO()
-        dataframe().to_parquet(content, index=False)
-        write_file(target, content.getvalue())
+        write_parquet(dataframe(), target)
 
 
 def save_dataset(dataset: xr.Dataset, path: str | Path, endings: Sequence[str] = ENDINGS) -> None:
@@ -135,6 +138,7 @@ def reopen(path: str | Path) -> Reopened:
     kind = source.suffix.lower()
     if kind not in ENDINGS:
         raise InputError(f"{source}: expected a name that ends in one of {', '.join(ENDINGS)}")
+    need_for(source)
     try:
         if kind in (".csv", ".parquet"):
             frame = _read_csv(source) if kind == ".csv" else _read_parquet(source)
@@ -148,16 +152,17 @@ def reopen(path: str | Path) -> Reopened:
     return Reopened(source, dataset, frame_of(dataset))
 
 
-def need(package: str, path: str | Path, what: str, extra: str) -> None:
-    """Make sure that an optional package is there.
+def need_for(path: str | Path, kind: str = "") -> None:
+    """Make sure that the optional package is there that a file needs; `kind` instead of its ending.
 
     Raises
     ------
     InputError
         It is not installed.
     """
+    package, what, extra = _NEEDED.get(kind or Path(path).suffix.lower(), ("json", "", ""))
     if find_spec(package) is None:
-        raise InputError(f"{path}: {what}, which the extra printhammer[{extra}] installs")
+        raise InputError(f"{path}: {what} {package}, which the extra printhammer[{extra}] installs")
 
 
 def plain(value: Any) -> Any:
@@ -169,6 +174,19 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         value = value.item()
     return int(value) if isinstance(value, bool) else value
+
+
+def dataset_of(entries: Mapping[str, tuple[Column, Any]], attributes: Mapping[str, Any]) -> xr.Dataset:
+    """Return a Dataset of columns and coordinates with their values, by name."""
+    import xarray as xr
+
+    data: dict[str, Any] = {}
+    coordinates: dict[str, Any] = {}
+    for name, (note, values) in entries.items():
+        kept = np.asarray(values) if note.dtype is None else np.asarray(values).astype(note.dtype)
+        target = coordinates if note.kind == "coordinate" else data
+        target[name] = (note.dims, kept, note.attributes)
+    return xr.Dataset(data, coords=coordinates, attrs=dict(attributes))
 
 
 def frame_of(dataset: xr.Dataset, attributes: Mapping[str, Any] | None = None) -> pd.DataFrame:
@@ -221,6 +239,31 @@ def csv_text(table: pd.DataFrame) -> str:
     return head + str(table.to_csv(index=False, float_format="%.17g", lineterminator="\n"))
 
 
+def write_csv(table: pd.DataFrame, path: str | Path) -> None:
+    """Write a table as CSV, see `csv_text`.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written; what was there stays.
+    """
+    write_file(path, csv_text(table))
+
+
+def write_parquet(table: pd.DataFrame, path: str | Path) -> None:
+    """Write a table as Parquet, its `attrs` with it.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written, or pyarrow is not installed; what was there stays.
+    """
+    need_for(path, ".parquet")
+    content = BytesIO()
+    table.to_parquet(content, index=False)
+    write_file(path, content.getvalue())
+
+
 def _text(value: Any) -> str:
     """Return text as it is where that can be told from numbers and lists, everything else as JSON."""
     if isinstance(value, str) and _decoded(value) == value == value.strip() and value.isprintable():
@@ -238,16 +281,9 @@ def _decoded(value: str, starts: str = '[{"-0123456789n') -> Any:
 
 
 def _netcdf(dataset: xr.Dataset) -> bytes:
-    # The classic NetCDF format has no truth values and no longer integers.
-    kinds = {"b": np.int8, "i": np.int32, "u": np.int32}
-    kept = dataset.assign(
-        {
-            name: values.astype(kinds[values.dtype.kind])
-            for name, values in dataset.variables.items()
-            if values.dtype.kind == "b" or (values.dtype.kind in "iu" and values.dtype.itemsize > 4)
-        }
-    )
+    kept = dataset.copy()
     kept.attrs = _flat(dataset.attrs)
+    # SciPy writes the classic format, which everything reads.
     return bytes(kept.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT"))
 
 
@@ -256,16 +292,17 @@ def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     found = {}
     for key, value in attributes.items():
         kept = plain(value)
+        # An array of one number would come back as a number.
+        entries = kept if isinstance(kept, list) and len(kept) > 1 else [kept]
         numbers = all(
             isinstance(entry, float) or (isinstance(entry, int) and abs(entry) < _MOST_INT)
-            for entry in (kept if isinstance(kept, list) and kept else [kept])
+            for entry in entries
         )
         found[str(key)] = kept if numbers or isinstance(kept, str) else json.dumps(_strict(kept))
     return found
 
 
 def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
-    need("zarr", target, "Zarr stores need zarr", "sweep")
     if target.exists() and not (target / "zarr.json").is_file():
         raise InputError(f"{target}: expected a new store, this is no Zarr store")
     draft: Path | None = None
@@ -291,18 +328,23 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
 
 
 def _json(dataset: xr.Dataset) -> str:
+    def text(value: Any) -> str:
+        return json.dumps(_strict(value), allow_nan=False, ensure_ascii=False)
+
     columns = {
         str(name): {
             "dims": list(map(str, values.dims)),
             **plain(values.attrs),
             "dtype": values.dtype.str[1:],
             "coordinate": name in dataset.coords,
-            "values": _strict(values.values.tolist()),
+            "values": values.values.tolist(),
         }
         for name, values in dataset.variables.items()
     }
-    content = {**_strict(plain(dict(dataset.attrs))), _COLUMNS: columns}
-    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    # A line for each attribute and each array.
+    head = "".join(f"  {text(str(key))}: {text(plain(value))},\n" for key, value in dataset.attrs.items())
+    body = ",\n".join(f"    {text(name)}: {text(entry)}" for name, entry in columns.items())
+    return f"{{\n{head}  {text(_COLUMNS)}: {{\n{body}\n  }}\n}}\n"
 
 
 def _strict(value: Any) -> Any:
@@ -339,7 +381,6 @@ def _read_arrays(source: Path) -> xr.Dataset:
 
     options: dict[str, Any] = {"engine": "scipy"}
     if source.suffix.lower() == ".zarr":
-        need("zarr", source, "Zarr stores need zarr", "sweep")
         options = {"engine": "zarr", "consolidated": False}
     with xr.open_dataset(source, decode_times=False, **options) as found:
         dataset = found.load()
@@ -351,17 +392,13 @@ def _read_arrays(source: Path) -> xr.Dataset:
 def _read_csv(source: Path) -> pd.DataFrame:
     import pandas as pd
 
-    lines = source.read_text("utf-8-sig").splitlines(keepends=True)
-    attributes = {}
-    head = list(takewhile(lambda line: line.startswith("#"), lines))
-    for line in head:
-        key, colon, value = line[1:].partition(":")
-        if colon:
-            attributes[key.strip()] = _number(_decoded(value.strip()))
-    rows = list(csv.reader(lines[len(head) :]))
-    if not rows or {len(row) for row in rows} != {len(rows[0])}:
+    sheet = read_sheet(source, "the result", gaps=True)
+    lengths = {len(cells) for _line, cells in sheet.rows}
+    if len(lengths) != 1:
         raise InputError(f"{source}: expected a heading, and rows with as many cells")
-    table = pd.DataFrame({head: _typed([row[k] for row in rows[1:]]) for k, head in enumerate(rows[0])})
+    (_line, heads), *rows = sheet.rows
+    table = pd.DataFrame({head: _typed([cells[k] for _line, cells in rows]) for k, head in enumerate(heads)})
+    attributes = {key: _number(_decoded(value)) for key, value in sheet.comments.items()}
     table.attrs.update(attributes)
     return table
 
@@ -379,7 +416,6 @@ def _typed(cells: list[str]) -> Any:
 def _read_parquet(source: Path) -> pd.DataFrame:
     import pandas as pd
 
-    need("pyarrow", source, "reading Parquet needs pyarrow", "tables")
     return pd.read_parquet(source)
 
 

@@ -54,15 +54,10 @@ RESULTS: dict[str, type[Result]] = {}
 class Result:
     """A result of a computation; a class that derives from it is a frozen dataclass.
 
-    Parameters of the class statement
-    ---------------------------------
-    rows : str
-        Dimensions of the table, with spaces between them, the last varying fastest; by default those of the
-        first column.
-    endings : tuple of str
-        Endings of the files that `save` writes.
-    fields : bool
-        False for a class with a constructor of its own, all of whose columns are derived properties.
+    The class statement may say more: `rows`, the dimensions of the table with spaces between them, the last
+    varying fastest (by default those of the first column); `endings`, those of the files that `save` writes
+    (by default all of `printhammer.results.ENDINGS`); and ``fields=False`` for a class with a constructor of
+    its own, all of whose columns are derived properties.
     """
 
     ENDINGS: ClassVar[tuple[str, ...]] = files.ENDINGS
@@ -146,23 +141,15 @@ class Result:
 
     def to_dataset(self) -> xr.Dataset:
         """Return the result as a Dataset, with units and meanings, and provenance in its attributes."""
-        import xarray as xr
-
-        data: dict[str, Any] = {}
-        coordinates: dict[str, Any] = {}
-        for name, (note, values) in self.entries().items():
-            kept = np.asarray(values) if note.dtype is None else np.asarray(values).astype(note.dtype)
-            target = coordinates if note.kind == "coordinate" else data
-            target[name] = (note.dims, kept, note.attributes)
-        return xr.Dataset(data, coords=coordinates, attrs=self.attributes)
+        return files.dataset_of(self.entries(), self.attributes)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the result as a table, columns such as "x [m]", codes by name; provenance in `attrs`."""
-        entries = sorted(self.entries().values(), key=lambda entry: entry[0].kind != "coordinate")
-        dims = self.ROWS or next(note.dims for note, _values in entries if note.kind == "column")
+        entries = sorted(self.entries().items(), key=lambda entry: entry[1][0].kind != "coordinate")
+        dims = self.ROWS or next(note.dims for _name, (note, _values) in entries if note.kind == "column")
         columns = {
-            note.heading: (note.dims, _named(np.asarray(values), note))
-            for note, values in entries
+            note.heading(name): (note.dims, named_codes(np.asarray(values), note))
+            for name, (note, values) in entries
             if note.dims and set(note.dims) <= set(dims)
         }
         return files.frame(columns, dims, files.plain(self.attributes))
@@ -193,8 +180,8 @@ class Result:
     def _repr_html_(self) -> str:
         """Return what a notebook shows: title, columns, and attributes to unfold."""
         columns = [
-            (note.heading, " × ".join(map(str, np.shape(values))), ", ".join(note.dims), note.meaning)
-            for note, values in self.entries().values()
+            (note.heading(name), " × ".join(map(str, np.shape(values))), ", ".join(note.dims), note.meaning)
+            for name, (note, values) in self.entries().items()
         ]
         attributes = [(key, str(value)) for key, value in files.plain(self.attributes).items()]
         return (
@@ -211,7 +198,7 @@ def _html_table(rows: Sequence[Sequence[str]]) -> str:
     return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
-def _named(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:
+def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:
     """Return codes by name, "" for those without one."""
     if not note.codes:
         return values

@@ -8,7 +8,6 @@ in the ensemble, nor on the number of threads.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
+from printhammer.results import Result, column, part
 from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job, kernel_of
 from printhammer.run.problem import TOLERANCE, check_tolerance, laws_of
 from printhammer.run.start import check_branch, initial_state
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.kernel.model.laws import Laws
+    from printhammer.results.result import Entries
     from printhammer.run.ensemble_group import LaneKinds
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
@@ -40,92 +41,75 @@ Engine = Literal["auto", "plain", "lanes"]
 ENGINES: Final = get_args(Engine)
 
 
-@dataclass(frozen=True)
-class DotTable:
-    """What the firings did: arrays of shape (members, most firings of any member).
-
-    Attributes
-    ----------
-    fired : bool array
-        Whether the member has such a firing, and its run came so far.
-    fired_at : array
-        Time of the firing, s; NaN where there is none.
-    struck : bool array
-        False for a lost dot; the values of a lost dot are NaN.
-    flight_time : array
-        From firing to touch, s.
-    impact_speed : array
-        At touch, m/s.
-    peak_force : array
-        Largest pack force, N.
-    indentation : array
-        Largest indentation, m.
-    contact_time : array
-        From touch to leaving, s; NaN also while the contact is open.
-    extra_contacts : int array
-        Further pack contacts before the next firing.
-    """
-
-    fired: npt.NDArray[np.bool_]
-    fired_at: FloatArray
-    struck: npt.NDArray[np.bool_]
-    flight_time: FloatArray
-    impact_speed: FloatArray
-    peak_force: FloatArray
-    indentation: FloatArray
-    contact_time: FloatArray
-    extra_contacts: npt.NDArray[np.int64]
+_FIRINGS: Final = "member firing"
+_TIMES: Final = "member strobe"
 
 
-@dataclass(frozen=True)
-class Strobes:
-    """States at given times: arrays (members, most times of any member), NaN where a run did not get.
+class DotTable(Result):
+    """What the firings did, up to the most firings of any member; nan where there is nothing to tell."""
 
-    Attributes
-    ----------
-    t : array
-        Time, s.
-    x, v : array
-        Displacement, m, and velocity, m/s.
-    branch : int array
-        Code of the mode, see `printhammer.kernel.model.modes`; -1 where a run did not get.
-    memory : array
-        Displacement of the latest local maximum, m, on the unloading branch inside the pack, else 0.
-    """
-
-    t: FloatArray
-    x: FloatArray
-    v: FloatArray
-    branch: npt.NDArray[np.int64]
-    memory: FloatArray
+    fired: npt.NDArray[np.bool_] = column(
+        "1", "whether there was such a firing, and the run came so far", _FIRINGS
+    )
+    fired_at: FloatArray = column("s", "time of the firing", _FIRINGS)
+    struck: npt.NDArray[np.bool_] = column("1", "whether it made a dot", _FIRINGS)
+    flight_time: FloatArray = column("s", "time from firing to touch", _FIRINGS)
+    impact_speed: FloatArray = column("m/s", "velocity at touch", _FIRINGS)
+    peak_force: FloatArray = column("N", "largest pack force", _FIRINGS)
+    indentation: FloatArray = column("m", "largest indentation", _FIRINGS)
+    contact_time: FloatArray = column(
+        "s", "time from touch to leaving", _FIRINGS, more="nan also while the contact is open"
+    )
+    extra_contacts: npt.NDArray[np.int64] = column(
+        "1", "further pack contacts before the next firing", _FIRINGS
+    )
 
 
-@dataclass(frozen=True)
-class EnsembleResult:
-    """What is kept of the runs of an ensemble.
+class Strobes(Result):
+    """States at given times, up to the most times of any member; nan where a run did not get."""
 
-    Attributes
-    ----------
-    status : int array, shape (M,)
-        Codes of the statuses; 0 is ok.
-    reached : array, shape (M,)
-        Time at which each run ended, s.
-    steps : int array, shape (M,)
-        Number of steps of each run.
-    dots : DotTable or None
-        What the firings did, if asked for.
-    strobes : Strobes or None
-        States at the times asked for.
-    x : float32 array, shape (M, T), or None
-        Displacement at the common times, m; NaN where a run did not get.
-    """
+    t: FloatArray = column("s", "time", _TIMES)
+    x: FloatArray = column("m", "displacement", _TIMES)
+    v: FloatArray = column("m/s", "velocity", _TIMES)
+    branch: npt.NDArray[np.int64] = column(
+        "1", "mode of motion", _TIMES, more="-1 where a run did not get", codes=MODE_NAMES
+    )
+    memory: FloatArray = column(
+        "m", "latest local maximum inside the pack", _TIMES, more="0 but on the unloading branch"
+    )
 
-    status: npt.NDArray[np.int64]
-    reached: FloatArray
-    steps: npt.NDArray[np.int64]
-    dots: DotTable | None = None
-    strobes: Strobes | None = None
-    x: npt.NDArray[np.float32] | None = None
+
+class EnsembleResult(Result):
+    """What is kept of the runs of an ensemble."""
+
+    status: npt.NDArray[np.int64] = column(
+        "1", "how the run ended", "member", more="0 is ok", codes=STATUS_NAMES
+    )
+    reached: FloatArray = column("s", "time at which the run ended", "member")
+    steps: npt.NDArray[np.int64] = column("1", "steps of the integrator", "member")
+    dots: DotTable | None = part("what the firings did", more="if asked for", default=None)
+    strobes: Strobes | None = part("states at the times asked for", default=None)
+    x: npt.NDArray[np.float32] | None = column(
+        "m",
+        "displacement at the common times",
+        "member time",
+        more="nan where a run did not get",
+        default=None,
+    )
+
+    @property
+    def title(self) -> str:
+        """One line that says what the result is."""
+        return f"{len(self.status)} runs of an ensemble"
+
+    def entries(self) -> Entries:
+        """Return what was asked for; dots by their names, states as `strobe_t` and so on."""
+        entries = super().entries()
+        if self.x is None:
+            del entries["x"]
+        if self.strobes is not None:
+            entries |= {f"strobe_{name}": entry for name, entry in self.strobes.entries().items()}
+        return entries if self.dots is None else entries | self.dots.entries()
 
     @property
     def ok(self) -> npt.NDArray[np.bool_]:
@@ -354,8 +338,8 @@ class Ensemble:
 
     def _gathered(self, parts: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
         whole = np.empty(self.size, parts[0].dtype if parts else np.int64)
-        for group, part in zip(self.groups, parts, strict=True):
-            whole[group.members] = part
+        for group, gathered in zip(self.groups, parts, strict=True):
+            whole[group.members] = gathered
         return whole
 
     def _spread(self, jobs: Sequence[Job], which: str) -> FloatArray:

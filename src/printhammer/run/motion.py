@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.results import Column, Result, derived, provenance
+from printhammer.results.files import write_csv, write_parquet
 from printhammer.run.coil_work import coil_work_of
 from printhammer.run.contacts import contacts_of, dots_of, loading_works
 from printhammer.run.ledger import increments_of, ledger_of
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.result import Entries
     from printhammer.run.coil_work import CoilWork
     from printhammer.run.contacts import Contact, Dot
     from printhammer.run.ledger import Ledger
@@ -37,7 +40,7 @@ FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drive", "to
 _BISECTIONS: Final = 52
 
 
-class Motion:
+class Motion(Result, fields=False):
     """The motion of one hammer under one drive, from `printhammer.simulate`.
 
     Everything is computed from the recorded steps when it is first asked for, with the integrator itself,
@@ -97,6 +100,7 @@ class Motion:
         return self._record.nodes[:, 0].copy()
 
     @property
+    @derived("s", "time", "t", kind="coordinate")
     def t(self) -> FloatArray:
         """Times of the output grid, s, shape (n,)."""
         return self._times
@@ -106,16 +110,19 @@ class Motion:
         return self._problem.resample(self._record, self._times)
 
     @property
+    @derived("m", "displacement", "t")
     def x(self) -> FloatArray:
         """Displacement on the output grid, m, shape (n,)."""
         return self._grid[:, 0]
 
     @property
+    @derived("m/s", "velocity", "t")
     def v(self) -> FloatArray:
         """Velocity on the output grid, m/s, shape (n,)."""
         return self._grid[:, 1]
 
     @property
+    @derived("A", "coil current", "t")
     def current(self) -> FloatArray:
         """Coil current on the output grid, A, shape (n,); zero under a drive that is a force."""
         return self._grid[:, 2] if self.drive.quantity == "current" else np.zeros(len(self._times))
@@ -236,49 +243,44 @@ class Motion:
         return float(times[best]), float(x[best])
 
     @property
-    def provenance(self) -> dict[str, str]:
+    def title(self) -> str:
+        """One line that says what the motion is."""
+        return f"motion of {self.hammer.name}, {self.start:.9g} s to {self.end:.9g} s"
+
+    @property
+    def provenance(self) -> dict[str, Any]:
         """Where the motion comes from: fingerprints, versions, tolerance."""
-        import numba
-        import scipy
+        return provenance(
+            hammer=self.hammer,
+            drive=self.drive,
+            scheme=self._scheme,
+            tolerance=self._problem.tolerance,
+            status=self.status,
+        )
 
-        from printhammer import __version__
-
-        return {
-            "hammer": self.hammer.name,
-            "hammer_fingerprint": self.hammer.fingerprint,
-            "drive_fingerprint": self.drive.fingerprint,
-            "drive": repr(self.drive),
-            "scheme": self._scheme,
-            "tolerance": repr(self._problem.tolerance),
-            "status": self.status,
-            "printhammer": __version__,
-            "numpy": np.__version__,
-            "numba": numba.__version__,
-            "scipy": scipy.__version__,
+    def entries(self) -> Entries:
+        """Return the output grid by name: `x`, `v`, `current`, and the forces as `force_magnet` and so on."""
+        forces = {f"force_{name}": (name, values) for name, values in self.force.items()}
+        return super().entries() | {
+            key: (Column("N", f"{name} force", ("t",)), values) for key, (name, values) in forces.items()
         }
 
     def to_xarray(self) -> xr.Dataset:
         """Return the output grid as a Dataset over time, with units and provenance in the attributes."""
-        from printhammer.results.export import motion_dataset
-
-        return motion_dataset(self)
+        return self.to_dataset()
 
     def to_pandas(self) -> pd.DataFrame:
         """Return the output grid as a table, units in the column names."""
-        from printhammer.results.export import motion_table
-
-        return motion_table(self)
+        return self.to_dataframe()
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the output grid as CSV, units in the header.
+        """Write the output grid as CSV, units in the heading, provenance in lines ``# key: value`` above it.
 
         Raises
         ------
         InputError
             The file cannot be written.
         """
-        from printhammer.results.export import write_csv
-
         write_csv(self.to_pandas(), path)
 
     def to_parquet(self, path: str | Path) -> None:
@@ -289,14 +291,7 @@ class Motion:
         InputError
             The file cannot be written, or pyarrow is not installed.
         """
-        from printhammer.results.export import write_parquet
-
         write_parquet(self.to_pandas(), path)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw displacement and current against time; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.motion").plot(self, **options)
 
     def __repr__(self) -> str:
         struck = sum(dot.struck for dot in self.dots)

@@ -13,8 +13,6 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    import xarray as xr
-
 
 def write_file(path: str | Path, content: str | bytes) -> None:
     """Write a file; text in UTF-8.
@@ -41,18 +39,6 @@ def write_file(path: str | Path, content: str | bytes) -> None:
             with suppress(OSError):
                 Path(draft).unlink()
         raise InputError(f"{target}: the file cannot be written ({error.strerror or error})") from None
-
-
-def write_dataset(path: str | Path, dataset: xr.Dataset) -> None:
-    """Write a Dataset as NetCDF, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written; what was there stays.
-    """
-    # SciPy writes the classic format, which everything reads.
-    write_file(path, bytes(dataset.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT")))
 
 
 def make_folder(path: str | Path) -> Path:
@@ -92,8 +78,11 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
         if place in seen:
             raise InputError(f"{path}: expected a file of its own, this one is written twice")
         seen.add(place)
-        if place.is_dir():
-            raise InputError(f"{path}: expected a file to write, this is a folder")
+        store = place.suffix.lower() == ".zarr"
+        # A Zarr store is a folder, and written over as a whole.
+        if place.is_dir() and not (store and (place / "zarr.json").is_file()):
+            wanted = "a new store, this is no Zarr store" if store else "a file to write, this is a folder"
+            raise InputError(f"{path}: expected {wanted}")
         if not place.parent.is_dir():
             raise InputError(f"{path}: expected a file in a folder that exists")
         if not os.access(place.parent, os.W_OK):

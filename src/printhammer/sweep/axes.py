@@ -46,33 +46,22 @@ _FIRING: Final = Quantity("s", "t", "time of a firing", ge=0.0)
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One axis of a sweep.
-
-    Attributes
-    ----------
-    key : str
-        As the spec gives it.
-    name : str
-        Of its dimension or coordinate in the store.
-    target : str
-        Whether it changes the hammer, the waveform of the drive, its timing, a firing time or the state.
-    field : str
-        What it changes there: the key, the name of a number, or the number of a firing.
-    note : Quantity
-        Unit, meaning and bounds.
-    values : array
-        In a grid its values; else the two ends of its range; SI.
-    geometric : bool
-        Whether a range is divided geometrically.
-    """
+    """One axis of a sweep."""
 
     key: str
+    """As the spec gives it."""
     name: str
+    """Of its dimension or coordinate in the store."""
     target: Target
+    """Whether it changes the hammer, the waveform of the drive, its timing, a firing time or the state."""
     field: str
+    """What it changes there: the key, the name of a number, or the number of a firing."""
     note: Quantity
+    """Unit, meaning and bounds."""
     values: FloatArray
+    """In a grid its values; else the two ends of its range; SI."""
     geometric: bool = False
+    """Whether a range is divided geometrically."""
 
     @property
     def counts(self) -> bool:

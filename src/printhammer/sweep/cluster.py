@@ -15,8 +15,8 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError, PrinthammerError
+from printhammer.results.provenance import versions
 from printhammer.sweep.outputs import WORKER_LOST
-from printhammer.sweep.provenance import versions
 from printhammer.sweep.work import Results, run_chunk
 
 if TYPE_CHECKING:

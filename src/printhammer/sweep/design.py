@@ -44,24 +44,17 @@ def between(share: FloatArray, low: float, high: float, geometric: bool) -> Floa
         values = np.exp(np.log(low) + share * (np.log(high) - np.log(low)))
     else:
         values = low + share * (high - low)
-    inside: FloatArray = np.clip(values, min(low, high), max(low, high))
-    return inside
+    return np.clip(values, min(low, high), max(low, high))
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """Members of a grid in blocks that are whole chunks of it and consecutive in its order.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Members along each dimension; the last one runs fastest.
-    chunks : tuple of int
-        Those of a block.
-    """
+    """Members of a grid in blocks that are whole chunks of it and consecutive in its order."""
 
     shape: tuple[int, ...]
+    """Members along each dimension; the last one runs fastest."""
     chunks: tuple[int, ...]
+    """Those of a block."""
 
     @classmethod
     def of(cls, shape: Sequence[int], most: int) -> Blocks:

@@ -34,8 +34,6 @@ def run_local(
 
     Parameters
     ----------
-    plan : Plan
-        The plan.
     todo : iterable of index
         The blocks to do.
     write : callable

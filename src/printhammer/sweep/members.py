@@ -36,36 +36,24 @@ class Member:
 
 @dataclass(frozen=True)
 class Base:
-    """What all members have in common; complete, so that another machine can make them.
-
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer, before the axes change it.
-    drive : mapping
-        Tables of the drive file; its waveform only where an axis changes it.
-    waveform : Waveform or None
-        Of the drive; None where that of the hammer is fired, or an axis changes it.
-    folder : Path
-        Where what the drive names lies.
-    state : tuple
-        Displacement, m, and velocity, m/s, at the start; None for those at rest.
-    duration : float or None
-        End of the runs, s.
-    tolerance : float
-        Error allowed in one step.
-    axes : tuple of Axis
-        What a row of values means.
-    """
+    """What all members have in common; complete, so that another machine can make them."""
 
     hammer: Hammer
+    """The hammer, before the axes change it."""
     drive: Mapping[str, Any]
+    """Tables of the drive file; its waveform only where an axis changes it."""
     waveform: Waveform | None
+    """Of the drive; None where that of the hammer is fired, or an axis changes it."""
     folder: Path
+    """Where what the drive names lies."""
     state: tuple[float | None, float | None]
+    """Displacement, m, and velocity, m/s, at the start; None for those at rest."""
     duration: float | None
+    """End of the runs, s."""
     tolerance: float
+    """Error allowed in one step."""
     axes: tuple[Axis, ...]
+    """What a row of values means."""
 
     @property
     def kind(self) -> str:

@@ -119,21 +119,14 @@ OF_MOTION: Final = (
 
 @dataclass(frozen=True)
 class Outputs:
-    """What is kept of each member.
-
-    Attributes
-    ----------
-    arrays : tuple of Output
-        All arrays, the status first.
-    firings : int
-        Length of the dimension of the firings.
-    times : array
-        Times of the displacements, s.
-    """
+    """What is kept of each member."""
 
     arrays: tuple[Output, ...]
+    """All arrays, the status first."""
     firings: int
+    """Length of the dimension of the firings."""
     times: FloatArray
+    """Times of the displacements, s."""
 
     def wants(self, *outputs: Output) -> bool:
         """Tell whether one of some arrays is asked for."""

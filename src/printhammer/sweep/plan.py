@@ -36,24 +36,15 @@ _MOST_BYTES: Final = 2**25
 
 @dataclass(frozen=True)
 class Plan:
-    """A spec and what follows from it.
-
-    Attributes
-    ----------
-    spec : Spec
-        The spec.
-    shape : tuple of int
-        Members along each dimension.
-    dims : tuple of str
-        Names of these dimensions.
-    blocks : Blocks
-        The blocks of work.
-    """
+    """A spec and what follows from it."""
 
     spec: Spec
     shape: tuple[int, ...]
+    """Members along each dimension."""
     dims: tuple[str, ...]
+    """Names of these dimensions."""
     blocks: Blocks
+    """The blocks of work."""
 
     @property
     def members(self) -> int:

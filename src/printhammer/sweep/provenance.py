@@ -2,41 +2,23 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
+
+from printhammer.results.provenance import provenance
 
 if TYPE_CHECKING:
     from printhammer.sweep.spec import Spec
 
 
-def versions() -> dict[str, str]:
-    """Return the versions on which the bits of the results depend."""
-    import numba
-    import numpy as np
-    import scipy
-
-    from printhammer import __version__
-
-    return {
-        "printhammer": __version__,
-        "numpy": np.__version__,
-        "numba": numba.__version__,
-        "scipy": scipy.__version__,
-    }
-
-
 def identity(spec: Spec) -> dict[str, str]:
     """Return what must be the same for results to lie in one store; the readable first."""
-    import zarr
-
     from printhammer.sweep.plan import FORMAT
 
     return {
         "store_format": FORMAT,
-        **versions(),
-        "zarr": zarr.__version__,
-        "hammer": spec.base.hammer.name,
-        "hammer_fingerprint": spec.base.hammer.fingerprint,
-        "tolerance": repr(spec.base.tolerance),
+        **provenance(hammer=spec.base.hammer, tolerance=spec.base.tolerance),
+        "zarr": version("zarr"),
         "axes": ", ".join(axis.key for axis in spec.axes),
         "spec_fingerprint": spec.fingerprint,
     }

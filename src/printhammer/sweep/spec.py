@@ -37,40 +37,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Spec:
-    """A sweep as it is meant.
-
-    Attributes
-    ----------
-    where : str
-        What to name in a message, usually the file.
-    text : str
-        TOML.
-    title : str
-        One line that says what it is.
-    base : Base
-        What all members have in common.
-    axes : tuple of Axis
-        The axes.
-    design : str
-        "grid" or "latin-hypercube".
-    members, seed : int or None
-        Of a Latin hypercube.
-    chunk : int or None
-        Members of a block of work.
-    outputs : Outputs
-        What is kept.
-    """
+    """A sweep as it is meant."""
 
     where: str
+    """What to name in a message, usually the file."""
     text: str
+    """TOML."""
     title: str
+    """One line that says what it is."""
     base: Base
+    """What all members have in common."""
     axes: tuple[Axis, ...]
     design: str
+    """Either "grid" or "latin-hypercube"."""
     members: int | None
     seed: int | None
+    """Of a Latin hypercube."""
     chunk: int | None
+    """Members of a block of work."""
     outputs: Outputs
+    """What is kept."""
 
     @property
     def grid(self) -> bool:

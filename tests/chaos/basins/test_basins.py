@@ -14,7 +14,6 @@ from printhammer.chaos import basin_entropy
 from printhammer.chaos.basins import attractors
 from printhammer.chaos.basins.attractors import Attractors
 from printhammer.chaos.basins.basins import FAILED, NO_STATE, UNDECIDED, Basins
-from printhammer.chaos.basins.tables import basins_table, save_basins
 from printhammer.chaos.bifurcation.columns import Columns
 from printhammer.run.regime import Regime
 
@@ -206,15 +205,15 @@ def test_a_dataset_and_files_hold_everything(two: Basins, tmp_path: Path) -> Non
     assert chart["label"].attrs["codes"].endswith("0 undecided, 1 period-1, 2 period-1")
     assert chart["share"].values.tolist() == two.shares[0].tolist()
     assert chart.attrs["basin_entropy"] == two.entropy().entropy
-    save_basins(two, tmp_path / "basins.nc")
+    two.save(tmp_path / "basins.nc")
     with xr.open_dataset(tmp_path / "basins.nc", engine="scipy") as kept:
         np.testing.assert_array_equal(kept["label"], two.labels)
-    save_basins(two, tmp_path / "basins.csv")
-    table = pd.read_csv(tmp_path / "basins.csv")
+    two.save(tmp_path / "basins.csv")
+    table = pd.read_csv(tmp_path / "basins.csv", comment="#")
     assert table["label"].tolist() == two.labels.reshape(-1).tolist()
-    assert set(basins_table(two)["attractor"]) == {"period-1"}
+    assert set(two.to_dataframe()["attractor"]) == {"period-1"}
     with pytest.raises(ph.InputError, match=r"basins\.txt"):
-        save_basins(two, tmp_path / "basins.txt")
+        two.save(tmp_path / "basins.txt")
     assert dataclasses.is_dataclass(two)
 
 

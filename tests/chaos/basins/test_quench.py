@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 import printhammer as ph
 from printhammer.chaos.basins.quench import QuenchMap, two_pulse_drive
-from printhammer.chaos.basins.quench_tables import quench_table, save_quench
 from printhammer.drive.segments import table
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
 
@@ -156,17 +155,17 @@ def test_a_dataset_and_files_hold_everything(found: QuenchMap, tmp_path: Path) -
     chart = found.to_dataset()
     assert chart["force"].dims == ("gap", "width")
     assert chart["flight_gain"].attrs["units"] == "s"
-    save_quench(found, tmp_path / "quench.nc")
+    found.save(tmp_path / "quench.nc")
     with xr.open_dataset(tmp_path / "quench.nc", engine="scipy") as kept:
         np.testing.assert_array_equal(kept["peak"], found.peak)
         np.testing.assert_array_equal(kept["struck"], found.struck)
-    save_quench(found, tmp_path / "quench.csv")
-    rows = pd.read_csv(tmp_path / "quench.csv")
+    found.save(tmp_path / "quench.csv")
+    rows = pd.read_csv(tmp_path / "quench.csv", comment="#")
     assert len(rows) == found.struck.size
     assert rows["struck"].tolist() == found.struck.reshape(-1).tolist()
-    assert "flight_time [s]" in quench_table(found)
+    assert "flight_time [s]" in found.to_dataframe()
     with pytest.raises(ph.InputError, match=r"quench\.txt"):
-        save_quench(found, tmp_path / "quench.txt")
+        found.save(tmp_path / "quench.txt")
 
 
 @pytest.mark.parametrize(

@@ -12,11 +12,12 @@ from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.chaos import Bifurcation, strobes
-from printhammer.chaos.bifurcation import carry, windows
+from printhammer.chaos.bifurcation import carry
+from printhammer.chaos.bifurcation import diagram as kept
+from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
 from printhammer.chaos.bifurcation.columns import Columns, blank_columns, cycles_of, orbit_distance
-from printhammer.chaos.bifurcation.diagram import InterruptedDiagram
-from printhammer.chaos.bifurcation.tables import bifurcation_table, meaning_of, save_bifurcation
-from printhammer.chaos.bifurcation.windows import cells, doublings, hysteresis
+from printhammer.chaos.bifurcation.diagram import hysteresis
+from printhammer.chaos.bifurcation.windows import cells, doublings
 from printhammer.chaos.strobe.verdict import period_of, repeats
 from printhammer.parts.spring.preload import PreloadSpring
 from printhammer.run.regime import Regime
@@ -151,8 +152,8 @@ def test_another_constant_can_be_the_parameter(hammer: "ph.Hammer") -> None:
     )
     alone = ph.bifurcation(hammer.replace("backstop.damping", 5e8), periods=[1.3e-3], refine=0, **SHORT)
     np.testing.assert_array_equal(found.x[0, 1], alone.x[0, 0])
-    assert meaning_of(found.regime, "backstop.damping")[0] == "N s/m^2.5"
-    assert meaning_of(found.regime, "waveform.amplitude")[0] == "A"
+    assert found.regime.meaning_of("backstop.damping")[0] == "N s/m^2.5"
+    assert found.regime.meaning_of("waveform.amplitude")[0] == "A"
 
 
 def test_exponents_tell_strange_from_undecided(hammer: "ph.Hammer") -> None:
@@ -296,14 +297,14 @@ def test_windows_and_the_series_of_doublings() -> None:
 
 
 def test_trains_that_settle_slowly_do_not_hide_a_series(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(windows, "_is_strange", lambda *_arguments: False)
+    monkeypatch.setattr(kept, "_is_strange", lambda *_arguments: False)
     found = diagram({"from rest": [1, 0, 2, 2, 0, 4, 0, 0, 8, -1]}, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10])
     rising, falling = found.routes()
     assert rising.cascade
     assert rising.periods == [1, 2, 4, 8]
     assert rising.first == 10.0
     assert falling.first == 10.0
-    monkeypatch.setattr(windows, "MOST_UNDECIDED", 2)
+    monkeypatch.setattr(kept, "MOST_UNDECIDED", 2)
     rising, _ = found.routes()
     assert not rising.complete
     assert rising.first is None
@@ -342,17 +343,17 @@ def test_a_dataset_and_files_hold_everything(hammer: "ph.Hammer", tmp_path: Path
     }
     assert chart.attrs["hammer_fingerprint"] == hammer.fingerprint
     assert chart.attrs["parameter"] == "period"
-    save_bifurcation(found, tmp_path / "diagram.nc")
+    found.save(tmp_path / "diagram.nc")
     with xr.open_dataset(tmp_path / "diagram.nc", engine="scipy") as kept:
         np.testing.assert_array_equal(kept["x"], found.x)
         np.testing.assert_array_equal(kept["cycle"], found.cycles)
-    save_bifurcation(found, tmp_path / "diagram.csv")
-    table = pd.read_csv(tmp_path / "diagram.csv")
+    found.save(tmp_path / "diagram.csv")
+    table = pd.read_csv(tmp_path / "diagram.csv", comment="#")
     assert len(table) == 4
     assert table["verdict"].tolist() == found.verdicts.reshape(-1).tolist()
-    assert list(bifurcation_table(found))[:3] == ["direction", "period [s]", "verdict"]
+    assert list(found.to_dataframe())[:3] == ["direction", "period [s]", "verdict"]
     with pytest.raises(ph.InputError, match=r"diagram\.txt"):
-        save_bifurcation(found, tmp_path / "diagram.txt")
+        found.save(tmp_path / "diagram.txt")
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ from printhammer.chaos.continuation.branch_points import BranchPoint
 from printhammer.chaos.continuation.events import event_of
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, Touch
 from printhammer.chaos.continuation.regimes import InterruptedBranches
-from printhammer.chaos.continuation.tables import save_branches
 from printhammer.chaos.strobe.map import strobe_map
 from printhammer.run.regime import Regime
 
@@ -109,18 +108,18 @@ def test_dataset_and_files(branch: Branch, tmp_path: Path) -> None:
     np.testing.assert_array_equal(data["x"][:, 0], branch.x[:, 0])
     assert data.attrs["hammer_fingerprint"] == branch.regime.hammer.fingerprint
     assert "bound" in data.attrs["first_end"]
-    save_branches([branch], tmp_path / "b.nc")
+    branch.save(tmp_path / "b.nc")
     read = xr.load_dataset(tmp_path / "b.nc", engine="scipy")
-    np.testing.assert_array_equal(read["flight_time"][0], branch.flight_time)
-    save_branches([branch], tmp_path / "b.csv")
-    table = pd.read_csv(tmp_path / "b.csv", dtype=str)
+    np.testing.assert_array_equal(read["flight_time"], branch.flight_time)
+    branch.save(tmp_path / "b.csv")
+    table = pd.read_csv(tmp_path / "b.csv", dtype=str, comment="#")
     np.testing.assert_array_equal(table["period [s]"].map(float), branch.values)
-    save_branches([branch], tmp_path / "b.json")
-    (read_back,) = json.loads((tmp_path / "b.json").read_text("utf-8"))
-    assert read_back["stable"] == [list(pair) for pair in branch.stable_ranges]
-    assert read_back["orbits"]["v [m/s]"] == branch.v[:, 0].tolist()
+    branch.save(tmp_path / "b.json")
+    read_back = json.loads((tmp_path / "b.json").read_text("utf-8"))
+    assert read_back["stable_ranges"] == [list(pair) for pair in branch.stable_ranges]
+    assert read_back["columns"]["v"]["values"] == branch.v.tolist()
     with pytest.raises(ph.InputError, match="ends in"):
-        save_branches([branch], tmp_path / "b.txt")
+        branch.save(tmp_path / "b.txt")
 
 
 @pytest.mark.parametrize(

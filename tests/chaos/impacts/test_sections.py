@@ -104,7 +104,7 @@ def test_a_dataset_holds_units_and_provenance(hammer: "ph.Hammer") -> None:
         (lambda h: ph.section(h, period=1e-3, transient=9_999_999), "firings"),
         (lambda h: ph.section(h, period=1e-3, tolerance=0.0), "tolerance"),
         (lambda h: ph.section(h.replace("waveform", None), period=1e-3), "waveform"),
-        (lambda h: sections([h, h], [1e-3]), "hammers: 2"),
+        (lambda h: sections([h, h], [1e-3] * 3), "hammers: 2"),
     ],
 )
 def test_bad_input(hammer: "ph.Hammer", call: Callable[["ph.Hammer"], object], said: str) -> None:

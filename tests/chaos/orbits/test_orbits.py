@@ -9,7 +9,7 @@ from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.chaos import Orbits, orbit
-from printhammer.chaos.orbits.tables import save_orbits
+from printhammer.chaos.orbits.orbit import KINDS
 from printhammer.chaos.strobe.map import strobe_map
 from printhammer.run.regime import Regime
 
@@ -193,8 +193,8 @@ def test_no_orbit_near_has_a_status(hammer: ph.Hammer) -> None:
 def test_files(found: Orbits, tmp_path: Path) -> None:
     paths = {kind: tmp_path / f"orbits.{kind}" for kind in ("csv", "nc", "json")}
     for path in paths.values():
-        save_orbits(found, path)
-    table = pd.read_csv(paths["csv"], dtype=str)
+        found.save(path)
+    table = pd.read_csv(paths["csv"], dtype=str, comment="#")
     assert len(table) == sum(one.firings for one in found)
     assert table["x [m]"].map(float).tolist() == [x for one in found for x in one.x]
     assert table["multiplier_real 1"].map(float).tolist() == [
@@ -206,9 +206,9 @@ def test_files(found: Orbits, tmp_path: Path) -> None:
         assert chart.attrs["search"] == found.message
         assert chart.attrs["hammer_fingerprint"] == found.regime.hammer.fingerprint
     kept = json.loads(paths["json"].read_text("utf-8"))
-    assert [row["kind"] for row in kept["orbits"]] == [one.kind for one in found]
+    assert [KINDS[code] for code in kept["columns"]["kind"]["values"]] == [one.kind for one in found]
     with pytest.raises(ph.InputError, match=r"orbits\.txt"):
-        save_orbits(found, tmp_path / "orbits.txt")
+        found.save(tmp_path / "orbits.txt")
     one = found[0].to_dataset()
     assert one["x"].dims == ("firing",)
     assert float(one["x"][0]) == found[0].x[0]

@@ -13,8 +13,8 @@ from printhammer.control.feedback.closed_loop import closed_loops
 from printhammer.control.feedback.comparison import Feedback, FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.driver import driver_of
-from printhammer.control.feedback.estimator.adaptation import FRONT_ERROR, SCALE_ERROR
 from printhammer.control.feedback.estimator.sensor import PositionSensor
+from printhammer.control.feedback.loop import FRONT_ERROR, SCALE_ERROR
 from printhammer.drive.file import read_drive
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.slots import eight_slot_patterns, slots_of
@@ -147,22 +147,20 @@ def test_the_comparison(controller: Controller, monkeypatch: pytest.MonkeyPatch,
     data = found.to_dataset()
     assert data["force"].dims == ("strategy", "pattern", "dot")
     assert data.attrs["hammer_fingerprint"] == controller.hammer.fingerprint
-    from printhammer.control.feedback.tables import save_feedback
-
-    save_feedback(found, tmp_path / "found.nc")
+    found.save(tmp_path / "found.nc")
     with xr.open_dataset(tmp_path / "found.nc", engine="scipy") as read:
         assert np.array_equal(read["arrival"].values, found.arrival, equal_nan=True)
-    with pytest.raises(ph.InputError, match=r"ends in \.nc"):
-        save_feedback(found, tmp_path / "found.csv")
-    again = read_drive(found.seen.motion.drive.to_toml())
-    assert again == found.seen.motion.drive
+    with pytest.raises(ph.InputError, match=r"ends in one of \.nc"):
+        found.save(tmp_path / "found.txt")
+    again = read_drive(found.run.motion.drive.to_toml())
+    assert again == found.run.motion.drive
     forces = [dot.peak_force for dot in ph.simulate(found.driven, again).dots]
-    assert forces == pytest.approx([dot.peak_force for dot in found.seen.motion.dots], rel=1e-3)
+    assert forces == pytest.approx([dot.peak_force for dot in found.run.motion.dots], rel=1e-3)
     figure = found.plot()
     assert [line.get_gid() for line in figure.axes[2].get_lines()][:2] == ["open loop", "feedback"]
     run = found.plot_run()
     samples = next(line for line in run.axes[0].get_lines() if line.get_gid() == "samples")
-    assert len(samples.get_xdata()) == len(found.seen.times)
+    assert len(samples.get_xdata()) == len(found.run.times)
 
 
 @pytest.mark.parametrize(
@@ -173,7 +171,7 @@ def test_the_comparison(controller: Controller, monkeypatch: pytest.MonkeyPatch,
         (["--interval", "0 us"], "interval"),
         (["--current", "0 A"], "current"),
         (["--supply", "0"], "supply"),
-        (["--out", "found.csv"], "--out found.csv"),
+        (["--out", "found.txt"], "--out found.txt"),
         (["--run", "run.nc"], "--run run.nc"),
         (["--table", "nowhere.csv"], "nowhere.csv"),
     ],

@@ -5,8 +5,7 @@ import pytest
 from tests import hammers
 
 import printhammer as ph
-from printhammer.control.feedback.bounded import BoundedSequence
-from printhammer.control.feedback.driver import Driver, driver_of
+from printhammer.control.feedback.driver import BoundedSequence, Driver, driver_of
 from printhammer.drive.waveforms.shapes import Switched
 
 

@@ -14,16 +14,15 @@ from hypothesis import strategies as st
 from tests import hammers
 
 import printhammer as ph
-from printhammer.control.least_work import burst as module
 from printhammer.control.least_work import search
 from printhammer.control.least_work.bound import bound
 from printhammer.control.least_work.burst import LeastWork, NoBurstError, steepest_rise
 from printhammer.control.least_work.coil_force import CoilForce
-from printhammer.control.least_work.pulses import PulsePlan, widest
+from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.rates import least_work_rates
-from printhammer.control.least_work.search import Task, printing_current
-from printhammer.control.least_work.slot import NodeCurrent, Outcomes, SlotState, node_times, outcomes
-from printhammer.control.least_work.tables import save_least_work
+from printhammer.control.least_work.search import printing_current
+from printhammer.control.least_work.slot import NodeCurrent, Outcomes, SlotState, Task, node_times
+from printhammer.control.widths import widest
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
 from printhammer.printing.dots.nominal import nominal
 
@@ -40,8 +39,8 @@ def let_go(_task: Any, _begin: SlotState, _duration: float, nodes: int) -> np.nd
 
 @pytest.fixture
 def unsearched(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "printing_current", thrown)
-    monkeypatch.setattr(module, "landing_current", let_go)
+    monkeypatch.setattr(search, "printing_current", thrown)
+    monkeypatch.setattr(search, "landing_current", let_go)
 
 
 @pytest.fixture
@@ -98,19 +97,19 @@ def test_supply_scales_the_current(burst: LeastWork) -> None:
 
 
 def test_files(burst: LeastWork, tmp_path: Path) -> None:
-    save_least_work(burst, tmp_path / "burst.nc")
+    burst.save(tmp_path / "burst.nc")
     with xr.open_dataset(tmp_path / "burst.nc", engine="scipy") as kept:
         np.testing.assert_array_equal(kept["x"], burst.motion.x)
         assert kept["current"].attrs["units"] == "A"
         assert kept.attrs["net_work"] == burst.work.net
         assert kept.attrs["hammer_fingerprint"] == burst.hammer.fingerprint
-    save_least_work(burst, tmp_path / "current.csv")
-    table = pd.read_csv(tmp_path / "current.csv")
+    burst.save(tmp_path / "current.csv")
+    table = pd.read_csv(tmp_path / "current.csv", comment="#")
     assert table["current [A]"].tolist() == burst.nodes[1]
     record = Sampled(file=str(tmp_path / "current.csv"), interpolation="linear")
     assert record.times == pytest.approx(np.array(burst.nodes[0]), rel=1e-12, abs=1e-18)
-    with pytest.raises(ph.InputError, match=r"\.nc or \.csv"):
-        save_least_work(burst, tmp_path / "burst.txt")
+    with pytest.raises(ph.InputError, match="ends in one of"):
+        burst.save(tmp_path / "burst.txt")
 
 
 def test_the_picture_shows_motion_current_power_and_ledger(burst: LeastWork) -> None:
@@ -125,7 +124,7 @@ def test_the_picture_shows_motion_current_power_and_ledger(burst: LeastWork) -> 
 
 
 def test_no_current_found_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "printing_current", lambda *_: None)
+    monkeypatch.setattr(search, "printing_current", lambda *_: None)
     with pytest.raises(NoBurstError, match=r"at most 2 A .* dot 1 of 8 with 0\.9 .* 1000 Hz"):
         ph.least_work(hammers.crude(), slew=2e4)
 
@@ -193,8 +192,8 @@ def test_a_slot_gives_what_the_whole_run_gives() -> None:
     hammer = hammers.crude()
     begin = SlotState(ph.rest_state(hammer), 0.0, -1, 0.0, 0.0)
     values = np.array([[0.8, 1.6, 1.6, 0.2, 0.0, 0.0], [0.5, 1.7, 1.2, 0.0, 0.1, 0.0]])
-    coil = module.CoilForce(hammer, 2.0)
-    found = outcomes(hammer, coil, begin, values, 8e-4, 1e-10, 2.0)
+    task = Task(hammer, CoilForce(hammer, 2.0), 2.0, 1e4, 20.0, 1e-3, False, 1e-10)
+    found = task.run(begin, values, 8e-4, 1e-10)
     for row, currents in enumerate(values):
         path = np.concatenate([[0.0], currents])
         record = Sampled.from_samples(node_times(8e-4, 6), path, interpolation="linear")
@@ -231,7 +230,7 @@ def test_works_against_the_rate(monkeypatch: pytest.MonkeyPatch, unsearched: Non
     def not_above(task: Any, begin: SlotState, duration: float, *rest: Any) -> Any:
         return thrown(task, begin, duration, *rest) if duration > 1.5e-3 else None
 
-    monkeypatch.setattr(module, "printing_current", not_above)
+    monkeypatch.setattr(search, "printing_current", not_above)
     told: list[tuple[int, int]] = []
     found = least_work_rates(
         hammers.crude(), ["400 Hz", 1000.0], dots=2, progress=lambda *at: told.append(at), force=0.3
@@ -283,9 +282,9 @@ def test_a_current_that_lags_in_the_pack_is_none(
 
 def test_the_widest_pulse_in_closed_form() -> None:
     pulse = Rectangle(amplitude=3.0, width=1e-4, rise=2e-4, decay=2e-5)
-    assert widest(pulse, 2.0, 1.0) == pytest.approx(2e-4 * math.log(3.0), rel=1e-9)
-    assert widest(pulse, 3.5, 1e-3) == 1e-3
-    assert widest(HalfSine(amplitude=3.0, width=1e-4), 2.0, 1.0) == 0.0
+    assert widest(pulse, 2.0, 0.0, 1.0, 60) == pytest.approx(2e-4 * math.log(3.0), rel=1e-9)
+    assert widest(pulse, 3.5, 0.0, 1e-3, 60) == 1e-3
+    assert widest(HalfSine(amplitude=3.0, width=1e-4), 2.0, 0.0, 1.0, 60) == 0.0
 
 
 def test_pulses_without_a_width_are_refused() -> None:

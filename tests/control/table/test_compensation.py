@@ -6,8 +6,8 @@ from tests.control.table.by_hand import by_hand
 from tests.hammers import crude
 
 import printhammer as ph
-from printhammer.control.table.compensation import COLUMNS
-from printhammer.control.table.drive import fading, of_width, print_pulse
+from printhammer.control.table.drive import COLUMNS, fading, print_pulse
+from printhammer.control.widths import of_width
 from printhammer.drive.waveforms.shapes import Chain, HalfSine
 from printhammer.printing.dots.slots import slot_times
 

@@ -6,7 +6,8 @@ from tests.control.table.test_tuning import quick
 
 import printhammer as ph
 from printhammer.control.table import refine, tuning
-from printhammer.control.table.compensation import COLUMNS, CompensationTable
+from printhammer.control.table.compensation import CompensationTable
+from printhammer.control.table.drive import COLUMNS
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ from tests.control.table.test_tuning import RATE, SLOTS, quick
 import printhammer as ph
 from printhammer.control.table import search, tuning
 from printhammer.control.table import ways as table_ways
-from printhammer.control.table.polish import Work
+from printhammer.control.table.task import Task
 from printhammer.control.table.ways import Ways
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.perturbation import perturbed
@@ -19,12 +19,12 @@ PERIOD = 1.0 / RATE
 
 
 @pytest.fixture(scope="module")
-def work() -> Work:
+def task() -> Task:
     """What a table for the hammer of these tests is to be like."""
-    asked: list[Work] = []
+    asked: list[Task] = []
 
-    def stop(work: Work, *_: Any, **__: Any) -> Any:
-        asked.append(work)
+    def stop(task: Task, *_: Any, **__: Any) -> Any:
+        asked.append(task)
         raise RuntimeError
 
     with pytest.MonkeyPatch.context() as patch:
@@ -35,8 +35,8 @@ def work() -> Work:
 
 
 @pytest.fixture(scope="module")
-def found(work: Work) -> Ways:
-    return search.searched(work, PERIOD, brake=True)
+def found(task: Task) -> Ways:
+    return search.searched(task, PERIOD)
 
 
 def row_of(ways: Ways, place: int, dots: int) -> ph.PulseSequence:
@@ -58,7 +58,7 @@ def test_the_best_way_makes_the_second_dot_right(found: Ways) -> None:
     assert touched == pytest.approx(PERIOD + single.flight_time, abs=1e-6)
 
 
-def test_the_cost_is_that_of_the_worst_dot_of_a_row(work: Work, found: Ways) -> None:
+def test_the_cost_is_that_of_the_worst_dot_of_a_row(task: Task, found: Ways) -> None:
     plain = found.some(found.brake == 0.0)
     best = int(np.argmin(plain.cost))
     single = nominal(quick(), tolerance=TOLERANCE)
@@ -70,9 +70,9 @@ def test_the_cost_is_that_of_the_worst_dot_of_a_row(work: Work, found: Ways) -> 
     ]:
         for number, dot in enumerate(ph.simulate(hammer, drive, tolerance=TOLERANCE).dots):
             assert dot.peak_force is not None
-            force = abs(dot.peak_force / single.force - 1.0) / work.limits.force
+            force = abs(dot.peak_force / single.force - 1.0) / task.limits.force
             touched = dot.fired_at + (dot.flight_time or 0.0)
-            arrival = abs(touched - number * PERIOD - single.flight_time) / work.limits.arrival
+            arrival = abs(touched - number * PERIOD - single.flight_time) / task.limits.arrival
             worst = max(worst, factor * force, factor * arrival)
     # A row multiplies what the tolerance of pictures leaves open.
     assert plain.cost[best] == pytest.approx(worst, rel=0.02, abs=0.02)
@@ -96,11 +96,11 @@ def test_nothing_is_fired_while_the_armature_is_in_the_pack() -> None:
         assert not ((drive.times > touch.t_in) & (drive.times < touch.t_out)).any()
 
 
-def test_pulses_that_do_not_fit_are_never_run(work: Work) -> None:
-    early = work.single.left - 1e-6
+def test_pulses_that_do_not_fit_are_never_run(task: Task) -> None:
+    early = task.single.left - 1e-6
     ways = table_ways.ways_of([(PERIOD, 0.0, 0.0, early, 150e-6)])
-    assert not table_ways.fits(work, ways).any()
-    assert np.isinf(table_ways.costs(work, ways)).all()
+    assert not table_ways.fits(task, ways).any()
+    assert np.isinf(table_ways.costs(task, ways)).all()
 
 
 def ways(rows: list[tuple[float, float, float]]) -> Ways:
@@ -130,20 +130,20 @@ def test_a_way_is_left_where_it_is_no_good() -> None:
 
 
 def test_pulses_keep_to_their_bounds_also_where_it_is_looked_closely(
-    work: Work, monkeypatch: pytest.MonkeyPatch
+    task: Task, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(search, "BAD", 0.0)
     monkeypatch.setattr(search, "_WIDER", (1.0, 50.0))
     kept: list[Ways] = []
     known = search._kept
 
-    def watched(work: Work, found: Ways) -> Ways:
+    def watched(task: Task, found: Ways) -> Ways:
         kept.append(found)
-        return known(work, found)
+        return known(task, found)
 
     monkeypatch.setattr(search, "_kept", watched)
-    search.chosen(work, np.array([PERIOD]), brake=True, told=lambda: None)
-    assert max(some.brake.max(initial=0.0) for some in kept) == work.widest
-    assert max(some.width.max(initial=0.0) for some in kept) <= work.widest
+    search.chosen(task, np.array([PERIOD]), lambda: None)
+    assert max(some.brake.max(initial=0.0) for some in kept) == task.widest
+    assert max(some.width.max(initial=0.0) for some in kept) <= task.widest
     brakes = np.concatenate([some.delay[some.brake > 0.0] for some in kept])
-    assert brakes.min() >= table_ways.brake_from(work)
+    assert brakes.min() >= task.brake_from

@@ -1,6 +1,5 @@
 """Rates at which a table is no good are tuned once more, with ways from times around theirs."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,8 @@ import pytest
 from tests.control.table.test_tuning import quick
 
 from printhammer.control.table import tuning
-from printhammer.control.table.compensation import COLUMNS, CompensationTable
+from printhammer.control.table.compensation import CompensationTable
+from printhammer.control.table.draft import blank
 
 RATES = [1700.0, 1800.0, 1900.0, 2000.0]
 
@@ -29,19 +29,16 @@ def asked() -> list[tuple[list[float], Any]]:
 
 @pytest.fixture(scope="module")
 def table(asked: list[tuple[list[float], Any]]) -> CompensationTable:
-    def tuned(blank: Any, rates: Any, *_: Any, around: Any = None, **__: Any) -> Any:
+    def tuned(task: Any, rates: Any, *_: Any, around: Any = None, **__: Any) -> Any:
         asked.append((rates.tolist(), around))
         again = around is not None
-        work = replace(
-            blank,
-            rates=rates,
-            **{name: np.zeros((rates.size, 3)) for name in (*COLUMNS, "deviation")},
-        )
-        work.width[:] = 200e-6
+        draft = blank(task, rates)
+        advance, width = draft.timing
+        width[:] = 200e-6
         off = [SECOND[rate] for rate in rates.tolist()] if again else FIRST
-        work.deviation[:, 1] = off
-        work.advance[:, 1] = MARKS["second" if again else "first"]
-        return work
+        draft.deviation[:, 1] = off
+        advance[:, 1] = MARKS["second" if again else "first"]
+        return draft
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tuning, "_tuned", tuned)

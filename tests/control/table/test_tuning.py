@@ -5,7 +5,8 @@ import pytest
 from tests.hammers import crude
 
 import printhammer as ph
-from printhammer.control.table.compensation import COLUMNS, CompensationTable
+from printhammer.control.table.compensation import CompensationTable
+from printhammer.control.table.drive import COLUMNS
 from printhammer.control.table.report import PERTURBATIONS, STRATEGIES, between, random_patterns
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.slots import slot_times

@@ -10,8 +10,7 @@ undecided.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
@@ -22,15 +21,17 @@ from printhammer.chaos.bifurcation.columns import OK, TOLERANCE, run_columns, sc
 from printhammer.chaos.strobe.verdict import LARGEST_PERIOD
 from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
+from printhammer.results import Column, Result, column, coordinate, part
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Regime
 from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-    import xarray as xr
+    import pandas as pd
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.declare import Kind
     from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
@@ -60,36 +61,39 @@ _FEWEST: Final = 4
 Range = tuple[float | str, float | str, SupportsIndex]
 
 
-@dataclass(frozen=True)
-class Basins:
-    """Which initial states lead to which attractor.
+class Basins(Result, rows="v x"):
+    """Which initial states lead to which attractor."""
 
-    Attributes
-    ----------
-    regime : Regime
-        Hammer and periodic drive.
-    x, v : array, shape (X,), (V,)
-        Displacements, m, and velocities, m/s, of the cells at the first firing.
-    labels : int array, shape (V, X)
-        Number of the attractor, from 1 on; 0 undecided, -1 the run ended early, -2 there is no such state.
-    attractors : tuple of Attractor
-        In the order of their numbers: by period, strange ones last, then by their least displacement.
-    firings : int array, shape (V, X)
-        Firings after which the cell was decided, or given up.
-    status : str array, shape (V, X)
-        How the run ended; "no state" where there is none.
-    tolerance : float
-        Of the integration.
-    """
+    regime: Regime = part("hammer and periodic drive")
+    x: FloatArray = coordinate("m", "displacement at the first firing", "x")
+    v: FloatArray = coordinate("m/s", "velocity at the first firing", "v")
+    labels: npt.NDArray[np.int64] = column(
+        "1",
+        "attractor",
+        "v x",
+        more="its number from 1 on, 0 undecided, -1 the run ended early, -2 there is no such state",
+        name="label",
+        dtype=np.int32,
+    )
+    attractors: tuple[Attractor, ...] = part(
+        "in the order of their numbers: by period, strange ones last, then by their least displacement"
+    )
+    firings: npt.NDArray[np.int64] = column(
+        "1", "firings until it was decided", "v x", more="or given up", dtype=np.int32
+    )
+    status: npt.NDArray[np.str_] = column("", "how the run ended", "v x", more='or "no state"')
+    tolerance: float = part("tolerance of the integration")
 
-    regime: Regime
-    x: FloatArray = field(repr=False)
-    v: FloatArray = field(repr=False)
-    labels: npt.NDArray[np.int64] = field(repr=False)
-    attractors: tuple[Attractor, ...]
-    firings: npt.NDArray[np.int64] = field(repr=False)
-    status: npt.NDArray[np.str_] = field(repr=False)
-    tolerance: float
+    @property
+    def title(self) -> str:
+        """One line that says what the basins are."""
+        return f"basins of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
+
+    @property
+    def names(self) -> dict[int, str]:
+        """Names of the labels."""
+        kinds = {k: attractor.name for k, attractor in enumerate(self.attractors, 1)}
+        return {NO_STATE: "no state", FAILED: "run ended early", UNDECIDED: "undecided", **kinds}
 
     @property
     def counts(self) -> dict[int, int]:
@@ -113,16 +117,38 @@ class Basins:
         """Return the basin entropy, of boxes of so many cells along a side."""
         return basin_entropy(self.labels, box=box)
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the cells as a Dataset over `v` and `x`, with units and provenance in the attributes."""
-        from printhammer.chaos.basins.tables import basins_dataset
+    def notes(self) -> dict[str, Any]:
+        """Return the basin entropy, for the attributes of the Dataset."""
+        entropy = self.entropy(box=min(BOX, *self.labels.shape))
+        return {
+            "box": entropy.box,
+            "basin_entropy": entropy.entropy,
+            "boundary_basin_entropy": entropy.boundary_entropy,
+        }
 
-        return basins_dataset(self)
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return cells over `v` and `x`, and what is known of each attractor over `attractor`."""
+        own = super().entries()
+        codes = ", ".join(f"{label} {name}" for label, name in self.names.items())
+        own["label"] = replace(own["label"][0], attrs={"codes": codes}), self.labels
+        share, error = self.shares
+        kinds = np.array([attractor.name for attractor in self.attractors], "U16")
+        numbers = np.arange(1, len(self.attractors) + 1, dtype=np.int32)
+        for name, unit, meaning, values in (
+            ("verdict", "", "kind of attractor", kinds),
+            ("share", "1", "share of the cells that have a state", share),
+            ("standard_error", "1", "standard error of the share", error),
+            ("attractor", "1", "number of the attractor", numbers),
+        ):
+            sort: Kind = "coordinate" if name == "attractor" else "column"
+            own[name] = Column(unit, meaning, ("attractor",), sort, name=name), values
+        return own
 
-    def plot(self, **options: Any) -> Any:
-        """Draw the basins; returns a matplotlib figure, see `printhammer.figures.chaos.basins`."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.basins").plot(self, **options)
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each cell, with the name of its attractor."""
+        table = super().to_dataframe()
+        table.insert(3, "attractor", [self.names[label] for label in table["label"].tolist()])
+        return table
 
 
 def basins(

@@ -15,8 +15,6 @@ from __future__ import annotations
 
 import math
 from copy import copy
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, SupportsIndex
 
 import numpy as np
@@ -26,6 +24,7 @@ from printhammer.drive.segments import table
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.results import Result, column, coordinate, derived, part, provenance, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.run.simulate import simulate
 
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
@@ -52,52 +50,48 @@ _FIRST, _SECOND = 2, 3
 Range = tuple[float | str, float | str, SupportsIndex]
 
 
-@dataclass(frozen=True)
-class QuenchMap:
-    """What a second pulse does: arrays of shape (G, W), times between the firings by widths.
+class QuenchMap(Result):
+    """What a second pulse does, against the time between the firings and its width."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    waveform : Waveform
-        The first pulse; the second has another width.
-    gaps : array, shape (G,)
-        Times between the two firings, s.
-    widths : array, shape (W,)
-        Widths of the second pulse, s.
-    struck : bool array
-        Whether the second firing made a dot; False for a lost one.
-    peak : array
-        Largest local maximum of the displacement after the second firing, m; NaN where there is none. Of a
-        lost dot it is read from samples, good to 1e-5 of the way to the pack.
-    force : array
-        Largest pack force of the second dot, N; NaN for a lost one.
-    flight_time : array
-        Of the second dot, from the second firing to touch, s; NaN likewise.
-    status : str array
-        How the runs ended.
-    single_force, single_flight_time : float
-        Of the first pulse alone, N and s; NaN where it makes no dot.
-    tail : float
-        Time after the second firing, s, within which a second dot was waited for.
-    tolerance : float
-        Of the integration.
-    """
+    hammer: Hammer = part("the hammer")
+    waveform: Waveform = part("the first pulse; the second has another width")
+    gaps: FloatArray = coordinate("s", "time between the two firings", "gap", name="gap")
+    widths: FloatArray = coordinate("s", "width of the second pulse", "width", name="width")
+    struck: npt.NDArray[np.bool_] = column(
+        "1", "whether the second firing made a dot", "gap width", more="False for a lost one"
+    )
+    peak: FloatArray = column(
+        "m",
+        "largest local maximum after the second firing",
+        "gap width",
+        more="nan where there is none; of a lost dot read from samples, good to 1e-5 of the way to the pack",
+    )
+    force: FloatArray = column(
+        "N", "largest pack force of the second dot", "gap width", more="nan for a lost one"
+    )
+    flight_time: FloatArray = column(
+        "s",
+        "flight time of the second dot",
+        "gap width",
+        more="from firing to touch, nan likewise",
+    )
+    status: npt.NDArray[np.str_] = column("", "how the run ended", "gap width")
+    single_force: float = scalar(
+        "N", "largest pack force of the first pulse alone", more="nan where it makes no dot"
+    )
+    single_flight_time: float = scalar("s", "flight time of the first pulse alone", more="nan likewise")
+    tail: float = scalar("s", "time after the second firing within which a second dot was waited for")
+    tolerance: float = part("tolerance of the integration")
 
-    hammer: Hammer
-    waveform: Waveform
-    gaps: FloatArray = field(repr=False)
-    widths: FloatArray = field(repr=False)
-    struck: npt.NDArray[np.bool_] = field(repr=False)
-    peak: FloatArray = field(repr=False)
-    force: FloatArray = field(repr=False)
-    flight_time: FloatArray = field(repr=False)
-    status: npt.NDArray[np.str_] = field(repr=False)
-    single_force: float
-    single_flight_time: float
-    tail: float
-    tolerance: float
+    @property
+    def title(self) -> str:
+        """One line that says what the map is."""
+        return f"quench map of {self.hammer.name}"
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the map comes from; the waveform is the first pulse, and currents add."""
+        return provenance(hammer=self.hammer, waveform=self.waveform, overlap="add", tolerance=self.tolerance)
 
     @property
     def lost(self) -> npt.NDArray[np.bool_]:
@@ -105,6 +99,7 @@ class QuenchMap:
         return np.asarray(~self.struck & (self.status == "ok"))
 
     @property
+    @derived("1", "second peak, 0 at the backstop and 1 at the pack", "gap width")
     def peak_share(self) -> FloatArray:
         """Second peak in parts of the way to the pack: 0 at the backstop, 1 at the front of the pack."""
         front = self.hammer.front
@@ -112,25 +107,16 @@ class QuenchMap:
         return (self.peak - self.hammer.origin) / (front - self.hammer.origin)
 
     @property
+    @derived("1", "force of the second dot over that of the first alone", "gap width")
     def force_ratio(self) -> FloatArray:
         """Force of the second dot over that of the first pulse alone."""
         return self.force / self.single_force
 
     @property
+    @derived("s", "how much shorter the second dot flies", "gap width")
     def flight_gain(self) -> FloatArray:
         """By how much the second dot flies shorter than that of the first pulse alone, s."""
         return self.single_flight_time - self.flight_time
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the map as a Dataset over `gap` and `width`, with units and provenance in the attributes."""
-        from printhammer.chaos.basins.quench_tables import quench_dataset
-
-        return quench_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the map; returns a matplotlib figure, see `printhammer.figures.chaos.quench`."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.quench").plot(self, **options)
 
 
 class TwoPulses(Waveform):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.carry import Strand, Table, carry, strands_of
+from printhammer.chaos.bifurcation.carry import Strand, Trains, carry, strands_of
 from printhammer.chaos.bifurcation.columns import (
     OK,
     blank_columns,
@@ -19,7 +19,8 @@ from printhammer.chaos.bifurcation.columns import (
     scales_of_columns,
     usable,
 )
-from printhammer.chaos.strobe.train import Train, exponents_of
+from printhammer.chaos.bifurcation.diagram import train_from, window_of_exponent
+from printhammer.chaos.strobe.train import exponents_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,21 +32,6 @@ if TYPE_CHECKING:
 
 JUMP: Final = 0.2
 """Distance of neighbouring orbits of the same period, in half-widths of the window, that is refined."""
-
-_BEFORE: Final = 100
-"""Firings before an exponent counts."""
-
-
-def window_of_exponent(points: int) -> tuple[int, int]:
-    """Return the first and last firing over which the exponent of a train with so many points is taken."""
-    return _BEFORE + 1, _BEFORE + points
-
-
-def train_from(regime: Regime, state: tuple[float, float], points: int) -> Train:
-    """Return a train that goes on from a state at a firing, for its exponent."""
-    _first, last = window_of_exponent(points)
-    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
-    return Train(regime, regime.pulses(last + 2), state)
 
 
 class DiagramBuilder:
@@ -67,7 +53,7 @@ class DiagramBuilder:
         self.values = np.zeros(0)
         self.levels = np.zeros(0, np.int64)
         none = np.zeros(0)
-        self.table = Table([], blank_columns(0, self.points), np.zeros(0, np.int64), none, np.zeros((0, 3)))
+        self.table = Trains([], blank_columns(0, self.points), np.zeros(0, np.int64), none, np.zeros((0, 3)))
         self.exponents, self.errors = none.copy(), none.copy()
         self.done = 0
         self.known = 0
@@ -82,7 +68,7 @@ class DiagramBuilder:
         put(longer, np.arange(len(table.regimes)), table.columns)
         scales = np.repeat(scales_of_columns(regimes), len(self.ways), axis=0)
         nothing = np.full(len(every), np.nan)
-        self.table = Table(
+        self.table = Trains(
             [*table.regimes, *every],
             longer,
             np.concatenate([table.cycles, np.zeros(len(every), np.int64)]),

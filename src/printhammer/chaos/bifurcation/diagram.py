@@ -1,129 +1,113 @@
-"""Bifurcation diagrams by brute force: the states at the firings, against a parameter.
-
-For each value of a parameter a train is fired, the first firings are left out, and the states at the others
-are the column of the diagram above that value: one point for a train that repeats itself at every firing, two
-where it does at every second one, and many for a strange one.
-"""
+"""Bifurcation: a diagram as it is kept, its windows, and the routes to its strange trains."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, Unpack, get_args
+import itertools
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.builder import DiagramBuilder
-from printhammer.chaos.bifurcation.columns import FROM_REST, TOLERANCE
+from printhammer.chaos.bifurcation.carry import SAME
+from printhammer.chaos.bifurcation.columns import orbit_distance
+from printhammer.chaos.bifurcation.windows import MOST_UNDECIDED, Route, Window, cells
+from printhammer.chaos.strobe.train import Train, exponents_of
 from printhammer.chaos.strobe.verdict import SIGNIFICANT
-from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import PERIOD, RATE
-from printhammer.run.problem import check_tolerance
-from printhammer.run.regime import Regime
-from printhammer.run.start import initial_state
+from printhammer.results import Column, Result, column, coordinate, derived, part, scalar
+from printhammer.run.ensemble import MODE_NAMES
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy.typing as npt
-    import xarray as xr
 
-    from printhammer.chaos.bifurcation.windows import Route, Window
-    from printhammer.run.regime import Firing
+    from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Progress
 
-FIRINGS: Final = 300
-"""Firings of a train unless told otherwise."""
-
-TRANSIENT: Final = 100
-"""Of these, firings that are left out at the beginning."""
-
-REFINE: Final = 2
-"""Times that the steps between neighbours that differ are halved, unless told otherwise."""
-
-MOST_STATES: Final = 100_000_000
-"""Number of states above which a diagram is refused."""
-
-Direction = Literal["from rest", "up", "down", "both"]
-DIRECTIONS: Final = get_args(Direction)
+_BEFORE: Final = 100
+"""Firings before an exponent counts."""
 
 
-class InterruptedDiagram(KeyboardInterrupt):
-    """A diagram was interrupted.
+class Bifurcation(Result, rows="direction column"):
+    """States at the firings against a parameter, under one or two directions."""
 
-    Attributes
-    ----------
-    diagram : Bifurcation
-        What is done; the status of the others is "not run".
-    """
-
-    def __init__(self, diagram: Bifurcation) -> None:
-        super().__init__("interrupted")
-        self.diagram = diagram
-
-
-@dataclass(frozen=True)
-class Bifurcation:
-    """States at the firings against a parameter: D directions, C values, P points each.
-
-    Attributes
-    ----------
-    regime : Regime
-        Hammer, periodic drive and phase; the parameter has other values in each column.
-    parameter : str
-        What is changed, see `printhammer.run.regime.Regime.with_`.
-    values : array, shape (C,)
-        Its values, ascending, SI.
-    directions : tuple of str
-        Of "from rest", "up" and "down": how the state at the start came about.
-    firing : int array, shape (P,)
-        Numbers of the firings of the points; the first of a train is number 1.
-    x, v : array, shape (D, C, P)
-        Displacement, m, and velocity, m/s; NaN where a run did not get.
-    branch : int8 array, shape (D, C, P)
-        Code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where a run did not get.
-    status : str array, shape (D, C)
-        How the runs ended.
-    cycles : int array, shape (D, C)
-        Smallest number of firings, up to 64, after which the states repeat; 0 where there is none.
-    distances : array, shape (D, C)
-        Largest distance of states so many firings apart, in half-widths of the window; NaN where there is no
-        such number.
-    exponents, standard_errors : array, shape (D, C)
-        Largest exponent of the strobe map, per firing, of trains without a period; NaN where it was not
-        computed.
-    levels : int array, shape (C,)
-        0 for the values that were given, k for those put between them at the k-th refinement.
-    carried : int
-        Number of trains that were run again to close the joints of strands.
-    tolerance : float
-        Of the integration.
-    """
-
-    regime: Regime
-    parameter: str
-    values: FloatArray = field(repr=False)
-    directions: tuple[str, ...]
-    firing: npt.NDArray[np.int64] = field(repr=False)
-    x: FloatArray = field(repr=False)
-    v: FloatArray = field(repr=False)
-    branch: npt.NDArray[np.int8] = field(repr=False)
-    status: npt.NDArray[np.str_] = field(repr=False)
-    cycles: npt.NDArray[np.int64] = field(repr=False)
-    distances: FloatArray = field(repr=False)
-    exponents: FloatArray = field(repr=False)
-    standard_errors: FloatArray = field(repr=False)
-    levels: npt.NDArray[np.int64] = field(repr=False)
-    carried: int
-    tolerance: float
+    regime: Regime = part("hammer, periodic drive and phase; the parameter has other values in each column")
+    parameter: str = scalar("", "what is changed, see `printhammer.run.regime.Regime.with_`")
+    directions: tuple[str, ...] = coordinate(
+        "", "how the state was carried", "direction", more='"from rest", "up" or "down"', name="direction"
+    )
+    values: FloatArray = coordinate("SI", "value of the parameter", "column", more="ascending", name="value")
+    firing: npt.NDArray[np.int64] = coordinate(
+        "1", "number of the firing", "firing", more="the first of a train is number 1", dtype=np.int32
+    )
+    x: FloatArray = column("m", "displacement", "direction column firing", more="nan where a run did not get")
+    v: FloatArray = column("m/s", "velocity", "direction column firing", more="nan likewise")
+    branch: npt.NDArray[np.int8] = column(
+        "1",
+        "mode of motion",
+        "direction column firing",
+        more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where a run did not get",
+        codes=MODE_NAMES,
+    )
+    cycles: npt.NDArray[np.int64] = column(
+        "1",
+        "firings after which states repeat, 0 for none",
+        "direction column",
+        more="the smallest number, up to 64",
+        name="cycle",
+        dtype=np.int32,
+    )
+    distances: FloatArray = column(
+        "1",
+        "distance of states a period apart, half-widths of the window",
+        "direction column",
+        more="nan where there is no period",
+        name="distance",
+    )
+    exponents: FloatArray = column(
+        "1",
+        "largest exponent of the strobe map, per firing",
+        "direction column",
+        more="of trains without a period, nan where it was not computed",
+        name="exponent",
+        head="exponent per firing",
+    )
+    standard_errors: FloatArray = column(
+        "1",
+        "standard error of the exponent",
+        "direction column",
+        name="standard_error",
+        head="standard error",
+    )
+    status: npt.NDArray[np.str_] = column("", "how the run ended", "direction column")
+    levels: npt.NDArray[np.int64] = column(
+        "1",
+        "refinement, 0 for a given value",
+        "column",
+        more="k for those put between them at the k-th refinement",
+        name="level",
+        dtype=np.int32,
+    )
+    carried: int = scalar(
+        "1", "number of trains that were run again to close the joints of strands", name="trains_run_again"
+    )
+    tolerance: float = part("tolerance of the integration")
 
     @property
+    def title(self) -> str:
+        """One line that says what the diagram is."""
+        return f"bifurcation diagram of {self.regime.hammer.name} in {self.parameter}"
+
+    @property
+    @derived("1", "part of the period between a firing and its point")
     def phase(self) -> float:
         """Part of the period between a firing and its point."""
         return self.regime.phase
 
     @property
+    @derived("", "verdict", "direction column", name="verdict")
     def verdicts(self) -> npt.NDArray[np.str_]:
         """Verdicts, shape (D, C): "period-q", "strange" or "undecided": `printhammer.chaos.strobe.verdict`.
 
@@ -136,189 +120,167 @@ class Bifurcation:
         names[(self.cycles == 0) & (self.exponents > SIGNIFICANT * self.standard_errors)] = "strange"
         return names
 
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the diagram comes from; without a period where that is what is changed."""
+        known = super().provenance
+        return {key: known[key] for key in known if key != "period" or self.parameter not in (PERIOD, RATE)}
+
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return states over `direction`, `column` and `firing`, and of each train what it settles to."""
+        own = super().entries()
+        of = self.regime.quantity(self.parameter)
+        note = replace(own["value"][0], unit=of.si, meaning=of.meaning, head=self.parameter)
+        own["value"] = replace(note, attrs={"parameter": self.parameter}), self.values
+        return {"verdict": own.pop("verdict"), **own}
+
     def windows(self, direction: str | None = None) -> list[Window]:
         """Return the intervals of the parameter with one verdict, of one direction."""
-        from printhammer.chaos.bifurcation.windows import windows_of
-
         return windows_of(self, direction)
 
     def routes(self, direction: str | None = None) -> tuple[Route, Route]:
         """Return what comes before the first strange train, with the parameter rising and falling."""
-        from printhammer.chaos.bifurcation.windows import routes_of
-
         return routes_of(self, direction)
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the diagram as a Dataset over `direction`, `column` and `firing`."""
-        from printhammer.chaos.bifurcation.tables import bifurcation_dataset
 
-        return bifurcation_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the diagram; returns a matplotlib figure, see `printhammer.figures.chaos.bifurcation`."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.bifurcation").plot(self, **options)
+def window_of_exponent(points: int) -> tuple[int, int]:
+    """Return the first and last firing over which the exponent of a train with so many points is taken."""
+    return _BEFORE + 1, _BEFORE + points
 
 
-def bifurcation(
-    hammer: Hammer | Regime,
-    *,
-    periods: npt.ArrayLike | None = None,
-    rates: npt.ArrayLike | None = None,
-    parameter: str | None = None,
-    values: npt.ArrayLike | None = None,
-    firings: SupportsIndex = FIRINGS,
-    transient: SupportsIndex = TRANSIENT,
-    direction: Direction = "from rest",
-    state: tuple[float, float] | None = None,
-    refine: SupportsIndex = REFINE,
-    exponents: bool = False,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
-    **firing: Unpack[Firing],
-) -> Bifurcation:
-    """Compute a bifurcation diagram of a hammer under a periodic drive.
+def train_from(regime: Regime, state: tuple[float, float], points: int) -> Train:
+    """Return a train that goes on from a state at a firing, for its exponent."""
+    _first, last = window_of_exponent(points)
+    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
+    return Train(regime, regime.pulses(last + 2), state)
+
+
+def windows_of(diagram: Bifurcation, direction: str | None = None) -> list[Window]:
+    """Return the windows of a diagram, from the least value to the largest.
 
     Parameters
     ----------
-    hammer : Hammer or Regime
-        The hammer; or the hammer with all that `firing` says of it.
-    periods, rates : array, optional
-        Times between firings, s, or firings per second, Hz, ascending.
-    parameter, values : str and array, optional
-        Instead: the name of any constant, such as "backstop.damping" or "waveform.amplitude", and its
-        values, SI, ascending; see `printhammer.run.regime.Regime.with_`.
-    firings, transient : int, optional
-        Firings at each value, and how many of these are left out at the beginning.
+    diagram : Bifurcation
+        The diagram.
     direction : str, optional
-        "from rest": every train begins at rest, with nothing fired before. "up", "down": it begins where the
-        train at the value before, or after, ended, with the pulses before under way; the first begins at
-        rest. "both": up and down. See `printhammer.chaos.bifurcation.carry`.
-    state : tuple of float, optional
-        Displacement, m, and velocity, m/s, that takes the place of rest, with the pulses before under way.
-    refine : int, optional
-        How often the step between neighbours whose periods differ, or whose orbits lie apart, is halved.
-    exponents : bool, optional
-        Compute the exponents of trains without a period, which tell strange ones from undecided ones; takes
-        many times as long.
-    tolerance : float, optional
-        As for `printhammer.simulate`; with one for pictures, trains that settle slowly pass for undecided.
-    threads : int, optional
-        By default as many as there are cores; the diagram does not depend on it.
-    progress : callable, optional
-        Called now and then with the number of trains done and of all that are known of so far.
-    **firing
-        How the hammer is fired, as for `printhammer.Regime.of`; period or rate only with another parameter.
-
-    Returns
-    -------
-    Bifurcation
-        With a status for each train; a run that could not go on is no exception.
+        Which direction, where it has two; by default the first.
 
     Raises
     ------
     InputError
-        An argument is not what is described above; a value that the parameter cannot have; a hammer without
-        a rest state where no state is given.
-    InterruptedDiagram
-        A KeyboardInterrupt, with what was done.
+        The diagram has no such direction.
     """
-    name, grid, regime = _parameter(hammer, (periods, rates, parameter, values), firing)
-    count, skipped = read_count(firings, "firings"), _whole(transient, "transient")
-    if count - skipped < 2:
-        raise InputError(f"transient = {transient!r}, expected at least 2 fewer than the {count} firings")
-    if direction not in DIRECTIONS:
-        raise InputError(f"direction = {direction!r}, expected one of {', '.join(DIRECTIONS)}")
-    halvings = _whole(refine, "refine")
-    check_tolerance(tolerance)
-    ways = ("up", "down") if direction == "both" else (direction,)
-    if len(grid) * len(ways) * (count - skipped) > MOST_STATES:
-        raise InputError(f"{len(grid)} values, expected at most {MOST_STATES} states in a diagram")
-    begin = FROM_REST
-    if state is not None:
-        begin = (*initial_state(regime.hammer, state), -1.0, 0.0)
-    work = DiagramBuilder(regime, name, ways, (count, skipped, tolerance), begin, threads, progress)
-    try:
-        work.base(grid)
-        for level in range(1, halvings + 1):
-            work.refine(level)
-        if exponents:
-            work.measure()
-    except KeyboardInterrupt:
-        raise InterruptedDiagram(_result(work)) from None
-    return _result(work)
+    row = _row(diagram, direction)
+    return _grouped(diagram, row, range(len(diagram.values)))
 
 
-def _result(work: DiagramBuilder) -> Bifurcation:
-    """Return the diagram as far as it is."""
-    order = np.argsort(work.values, kind="stable")
-    rows = (len(work.ways) * order + np.arange(len(work.ways))[:, np.newaxis]).astype(np.int64)
-    table = work.table
-    firings, transient, tolerance = work.counts
-    return Bifurcation(
-        regime=work.regime,
-        parameter=work.name,
-        values=work.values[order],
-        directions=work.ways,
-        firing=np.arange(transient + 1, firings + 1),
-        x=table.columns.x[rows],
-        v=table.columns.v[rows],
-        branch=table.columns.branch[rows],
-        status=table.columns.status[rows],
-        cycles=table.cycles[rows],
-        distances=table.distances[rows],
-        exponents=work.exponents[rows],
-        standard_errors=work.errors[rows],
-        levels=work.levels[order],
-        carried=table.carried,
-        tolerance=tolerance,
-    )
-
-
-def _parameter(
-    hammer: Hammer | Regime,
-    given: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
-    firing: Firing,
-) -> tuple[str, FloatArray, Regime]:
-    """Return the name of the parameter, its values, and the regime in which it is changed."""
-    periods, rates, parameter, values = given
-    if sum(entry is not None for entry in (periods, rates, parameter)) != 1:
-        raise InputError("periods, rates and parameter: expected one of them")
-    if (parameter is None) != (values is None):
-        raise InputError("parameter and values: expected both of them, or neither")
-    name = parameter or (PERIOD if periods is not None else RATE)
-    grid = _ascending(values if values is not None else periods if periods is not None else rates, name)
-    if name in (PERIOD, RATE):
-        if firing.get("period") is not None or firing.get("rate") is not None:
-            raise InputError(f"period and rate: expected none of them beside the values of {name!r}")
-        if isinstance(hammer, Hammer) and firing.get("drive") is None:
-            first = float(grid[0])
-            firing = {**firing, "period": first} if name == PERIOD else {**firing, "rate": first}
-    regime = Regime.of(hammer, **firing)
-    regime.value(name)
-    return name, grid, regime
-
-
-def _ascending(values: npt.ArrayLike | None, name: str) -> FloatArray:
-    try:
-        found = np.atleast_1d(np.array(values, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected numbers in SI") from None
-    if found.ndim != 1 or found.size == 0 or not np.isfinite(found).all():
-        raise InputError(f"{name}: expected a list of at least one finite number in SI")
-    falling = np.flatnonzero(np.diff(found) <= 0.0)
-    if falling.size:
-        before, after = found[falling[0] : falling[0] + 2].tolist()
-        raise InputError(f"{name}: {after:.9g} follows {before:.9g}, expected ascending values")
+def _grouped(diagram: Bifurcation, row: int, order: Sequence[int]) -> list[Window]:
+    """Return the windows of neighbouring columns, which may ascend or descend."""
+    names, cycles = diagram.verdicts[row].tolist(), diagram.cycles[row].tolist()
+    widths = cells(diagram.values)
+    found = []
+    for name, group in itertools.groupby(order, key=lambda k: names[k]):
+        places = sorted(group)
+        first, last = places[0], places[-1]
+        found.append(
+            Window(
+                verdict=name,
+                period=int(cycles[first]),
+                low=float(diagram.values[first]),
+                high=float(diagram.values[last]),
+                width=float(widths[first : last + 1].sum()),
+                columns=len(places),
+            )
+        )
     return found
 
 
-def _whole(value: SupportsIndex, name: str) -> int:
-    try:
-        count = -1 if isinstance(value, bool) else value.__index__()
-    except AttributeError:
-        count = -1
-    if count < 0:
-        raise InputError(f"{name} = {value!r}, expected a whole number, not negative")
-    return count
+def routes_of(diagram: Bifurcation, direction: str | None = None) -> tuple[Route, Route]:
+    """Return the routes to the first strange train of a diagram, with rising and with falling values.
+
+    Of trains without a period whose exponent is not known it is computed here, from one end of the range on
+    up to the first strange one.
+
+    Parameters
+    ----------
+    diagram : Bifurcation
+        The diagram.
+    direction : str, optional
+        Which direction, where it has two; by default the first.
+
+    Raises
+    ------
+    InputError
+        The diagram has no such direction.
+    """
+    row = _row(diagram, direction)
+    names = diagram.verdicts[row].tolist()
+    ends = diagram.values.tolist()
+    known: dict[int, bool] = {}
+
+    def strange(k: int) -> bool:
+        if names[k] == "undecided" and k not in known:
+            known[k] = _is_strange(diagram, row, k)
+        return names[k] == "strange" or known.get(k, False)
+
+    def route(way: Literal["rising", "falling"], order: Sequence[int]) -> Route:
+        undecided = 0
+        first = None
+        for place, k in enumerate(order):
+            if strange(k):
+                first = place
+                break
+            undecided += names[k] == "undecided"
+            if undecided > MOST_UNDECIDED:
+                return Route(way, tuple(_grouped(diagram, row, order[:place])), None, False)
+        before = tuple(_grouped(diagram, row, order[:first]))
+        return Route(way, before, None if first is None else ends[order[first]], True)
+
+    columns = range(len(names))
+    return route("rising", columns), route("falling", columns[::-1])
+
+
+def _is_strange(diagram: Bifurcation, row: int, k: int) -> bool:
+    """Tell whether a train without a period is strange, by its exponent from its last point on."""
+    x, v = (float(states[row, k, -1]) for states in (diagram.x, diagram.v))
+    regime = diagram.regime.with_(diagram.parameter, float(diagram.values[k]))
+    front = regime.hammer.front
+    # Inside the pack, and between firings, the state that is kept is not all that a train goes on from.
+    if diagram.status[row, k] != "ok" or diagram.phase or (front is not None and x > front):
+        return False
+    points = diagram.x.shape[2]
+    (found,) = exponents_of(
+        [train_from(regime, (x, v), points)], window_of_exponent(points), diagram.tolerance, threads=1
+    )
+    return bool(found.ok and found.smooth and found.value > SIGNIFICANT * found.standard_error)
+
+
+def hysteresis(diagram: Bifurcation) -> npt.NDArray[np.bool_]:
+    """Return at which values the directions of a diagram lead to different attractors, shape (C,).
+
+    Periodic ones are different if their periods are, or if their orbits lie further apart than
+    `printhammer.chaos.bifurcation.carry.SAME`; trains without a period are only told from periodic ones. All
+    false where there is but one direction.
+    """
+    found = np.zeros(len(diagram.values), np.bool_)
+    if len(diagram.directions) < 2:
+        return found
+    half = diagram.regime.window.half_widths
+    for k, (one, other) in enumerate(diagram.cycles.T.tolist()):
+        if one != other:
+            found[k] = True
+        elif one:
+            orbits = [
+                np.column_stack([diagram.x[way, k, -one:], diagram.v[way, k, -one:]]) / half for way in (0, 1)
+            ]
+            found[k] = orbit_distance(*orbits) > SAME
+    return found
+
+
+def _row(diagram: Bifurcation, direction: str | None) -> int:
+    if direction is None:
+        return 0
+    if direction not in diagram.directions:
+        known = " and ".join(diagram.directions)
+        raise InputError(f"direction = {direction!r}, expected what the diagram has: {known}")
+    return diagram.directions.index(direction)

@@ -7,25 +7,14 @@ Between two neighbours there may be more than a diagram shows.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.builder import train_from, window_of_exponent
-from printhammer.chaos.bifurcation.carry import SAME
-from printhammer.chaos.bifurcation.columns import orbit_distance
-from printhammer.chaos.strobe.train import exponents_of
-from printhammer.chaos.strobe.verdict import SIGNIFICANT
-from printhammer.errors import InputError
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
-    from printhammer.chaos.bifurcation.diagram import Bifurcation
     from printhammer.support.arrays import FloatArray
 
 SERIES: Final = (2, 4, 8)
@@ -110,46 +99,6 @@ class Route:
         )
 
 
-def windows_of(diagram: Bifurcation, direction: str | None = None) -> list[Window]:
-    """Return the windows of a diagram, from the least value to the largest.
-
-    Parameters
-    ----------
-    diagram : Bifurcation
-        The diagram.
-    direction : str, optional
-        Which direction, where it has two; by default the first.
-
-    Raises
-    ------
-    InputError
-        The diagram has no such direction.
-    """
-    row = _row(diagram, direction)
-    return _grouped(diagram, row, range(len(diagram.values)))
-
-
-def _grouped(diagram: Bifurcation, row: int, order: Sequence[int]) -> list[Window]:
-    """Return the windows of neighbouring columns, which may ascend or descend."""
-    names, cycles = diagram.verdicts[row].tolist(), diagram.cycles[row].tolist()
-    widths = cells(diagram.values)
-    found = []
-    for name, group in itertools.groupby(order, key=lambda k: names[k]):
-        places = sorted(group)
-        first, last = places[0], places[-1]
-        found.append(
-            Window(
-                verdict=name,
-                period=int(cycles[first]),
-                low=float(diagram.values[first]),
-                high=float(diagram.values[last]),
-                width=float(widths[first : last + 1].sum()),
-                columns=len(places),
-            )
-        )
-    return found
-
-
 def cells(values: FloatArray) -> FloatArray:
     """Return for how wide an interval each of some ascending values stands."""
     if len(values) < 2:
@@ -166,94 +115,3 @@ def doublings(windows: Sequence[Window]) -> list[Window]:
     decided = [window for window in windows if window.verdict != "undecided"]
     threes = zip(decided, decided[1:], decided[2:], strict=False)
     return [three[0] for three in threes if tuple(window.period for window in three) == SERIES]
-
-
-def routes_of(diagram: Bifurcation, direction: str | None = None) -> tuple[Route, Route]:
-    """Return the routes to the first strange train of a diagram, with rising and with falling values.
-
-    Of trains without a period whose exponent is not known it is computed here, from one end of the range on
-    up to the first strange one.
-
-    Parameters
-    ----------
-    diagram : Bifurcation
-        The diagram.
-    direction : str, optional
-        Which direction, where it has two; by default the first.
-
-    Raises
-    ------
-    InputError
-        The diagram has no such direction.
-    """
-    row = _row(diagram, direction)
-    names = diagram.verdicts[row].tolist()
-    ends = diagram.values.tolist()
-    known: dict[int, bool] = {}
-
-    def strange(column: int) -> bool:
-        if names[column] == "undecided" and column not in known:
-            known[column] = _is_strange(diagram, row, column)
-        return names[column] == "strange" or known.get(column, False)
-
-    def route(way: Literal["rising", "falling"], order: Sequence[int]) -> Route:
-        undecided = 0
-        first = None
-        for place, column in enumerate(order):
-            if strange(column):
-                first = place
-                break
-            undecided += names[column] == "undecided"
-            if undecided > MOST_UNDECIDED:
-                return Route(way, tuple(_grouped(diagram, row, order[:place])), None, False)
-        before = tuple(_grouped(diagram, row, order[:first]))
-        return Route(way, before, None if first is None else ends[order[first]], True)
-
-    columns = range(len(names))
-    return route("rising", columns), route("falling", columns[::-1])
-
-
-def _is_strange(diagram: Bifurcation, row: int, column: int) -> bool:
-    """Tell whether a train without a period is strange, by its exponent from its last point on."""
-    x, v = (float(states[row, column, -1]) for states in (diagram.x, diagram.v))
-    regime = diagram.regime.with_(diagram.parameter, float(diagram.values[column]))
-    front = regime.hammer.front
-    # Inside the pack, and between firings, the state that is kept is not all that a train goes on from.
-    if diagram.status[row, column] != "ok" or diagram.phase or (front is not None and x > front):
-        return False
-    points = diagram.x.shape[2]
-    (found,) = exponents_of(
-        [train_from(regime, (x, v), points)], window_of_exponent(points), diagram.tolerance, threads=1
-    )
-    return bool(found.ok and found.smooth and found.value > SIGNIFICANT * found.standard_error)
-
-
-def hysteresis(diagram: Bifurcation) -> npt.NDArray[np.bool_]:
-    """Return at which values the directions of a diagram lead to different attractors, shape (C,).
-
-    Periodic ones are different if their periods are, or if their orbits lie further apart than
-    `printhammer.chaos.bifurcation.carry.SAME`; trains without a period are only told from periodic ones. All
-    false where there is but one direction.
-    """
-    found = np.zeros(len(diagram.values), np.bool_)
-    if len(diagram.directions) < 2:
-        return found
-    half = diagram.regime.window.half_widths
-    for k, (one, other) in enumerate(diagram.cycles.T.tolist()):
-        if one != other:
-            found[k] = True
-        elif one:
-            orbits = [
-                np.column_stack([diagram.x[way, k, -one:], diagram.v[way, k, -one:]]) / half for way in (0, 1)
-            ]
-            found[k] = orbit_distance(*orbits) > SAME
-    return found
-
-
-def _row(diagram: Bifurcation, direction: str | None) -> int:
-    if direction is None:
-        return 0
-    if direction not in diagram.directions:
-        known = " and ".join(diagram.directions)
-        raise InputError(f"direction = {direction!r}, expected what the diagram has: {known}")
-    return diagram.directions.index(direction)

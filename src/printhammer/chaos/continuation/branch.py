@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
 from printhammer.chaos.continuation.branch_points import BIRTH
+from printhammer.chaos.continuation.events import KINDS, stable_ranges
+from printhammer.chaos.orbits.search import orbit
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.results import Column, Result, column, derived, part, scalar
+from printhammer.results.declare import heading
+from printhammer.results.files import plain
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
     import numpy.typing as npt
-    import xarray as xr
+    import pandas as pd
 
     from printhammer.chaos.continuation.arclength import Curve, Stop
     from printhammer.chaos.continuation.events import BranchEvent
@@ -28,89 +34,100 @@ MOST: Final = 1000
 _DIGITS: Final = ".9g"
 
 
-@dataclass(frozen=True, eq=False)
-class Branch:
+def _of_events(name: str, unit: str, meaning: str, **more: Any) -> Column:
+    return Column(unit, meaning, ("event",), name=f"event_{name}", **more)
+
+
+EVENT_KIND: Final = _of_events("kind", "1", "what happens on the way", dtype=np.int32, codes=KINDS)
+EVENT_VALUE: Final = _of_events("value", "SI", "value of the constant")
+EVENT_AFTER: Final = _of_events("after", "1", "number of the orbit that it follows", dtype=np.int32)
+EVENT_LOCATED: Final = _of_events("located", "1", "whether it was located", dtype=np.int32)
+EVENT_TEXT: Final = _of_events("text", "", "what happens, in a few words")
+EVENT_BEFORE: Final = _of_events("contacts_before", "", "sequence of contacts before it")
+EVENT_BEYOND: Final = _of_events("contacts_after", "", "sequence of contacts after it")
+
+
+class Branch(Result):
     """A curve of periodic orbits along one constant.
 
-    Every array has one row for each of N orbits, in order along the curve; their values need not ascend.
-
-    Attributes
-    ----------
-    regime : Regime
-        Hammer and periodic drive at the start, and phase of the section.
-    parameter : str
-        The constant: "period", "rate", or the dotted key of one of the hammer, the waveform or the drive.
-    unit : str
-        Its SI unit.
-    bounds : tuple of float
-        Values between which the branch was followed.
-    firings : int
-        Number of firings after which the orbits repeat.
-    tolerance : float
-        Of the integration.
-    values : array, shape (N,)
-        Of the constant, SI.
-    x, v : array, shape (N, firings)
-        Displacement, m, and velocity, m/s, at the sections.
-    multipliers : complex array, shape (N, 2)
-        Of the whole period of the orbit, the larger absolute value first.
-    backstop_contacts, pack_contacts, printed, lost : int array, shape (N,)
-        Contacts in a period of the orbit; firings with and without a dot.
-    flight_time, impact_speed, peak_force : array, shape (N, firings)
-        Of the dot of each firing, s, m/s, N; NaN for a lost one.
-    coil_work, drive_work, pack_loss, backstop_loss : array, shape (N,)
-        Energies of a period of the orbit, J.
-    residual : array, shape (N,)
-        Distance of the state from itself after a period, in half-widths of the window.
-    contacts : tuple of str
-        Sequence of the contacts of each orbit, P for the pack and B for the backstop.
-    events : tuple of BranchEvent
-        Folds, period doublings, Neimark-Sacker points, branchings and grazings, in order along the curve.
-    stops : tuple of Stop
-        Why and where the branch ends before its first and after its last orbit. Reasons: "bound"; "closed";
-        "period doubling": the orbit is born there; "grazing" of a rigid backstop; "merged" with an orbit of
-        fewer firings; "no value": a run does not come through; "lost": Newton's method does not converge;
-        "length": the steps are used up.
-    curve : Curve
-        The same in the variables of `printhammer.chaos.continuation.arclength`.
+    Every array has one row for each orbit, in order along the curve; their values need not ascend. Reasons
+    to stop are "bound"; "closed"; "period doubling": the orbit is born there; "grazing" of a rigid backstop;
+    "merged" with an orbit of fewer firings; "no value": a run does not come through; "lost": Newton's method
+    does not converge; "length": the steps are used up.
     """
 
-    regime: Regime
-    parameter: str
-    unit: str
-    bounds: tuple[float, float]
-    firings: int
-    tolerance: float
-    values: FloatArray = field(repr=False)
-    x: FloatArray = field(repr=False)
-    v: FloatArray = field(repr=False)
-    multipliers: npt.NDArray[np.complex128] = field(repr=False)
-    backstop_contacts: npt.NDArray[np.int64] = field(repr=False)
-    pack_contacts: npt.NDArray[np.int64] = field(repr=False)
-    printed: npt.NDArray[np.int64] = field(repr=False)
-    lost: npt.NDArray[np.int64] = field(repr=False)
-    flight_time: FloatArray = field(repr=False)
-    impact_speed: FloatArray = field(repr=False)
-    peak_force: FloatArray = field(repr=False)
-    coil_work: FloatArray = field(repr=False)
-    drive_work: FloatArray = field(repr=False)
-    pack_loss: FloatArray = field(repr=False)
-    backstop_loss: FloatArray = field(repr=False)
-    residual: FloatArray = field(repr=False)
-    contacts: tuple[str, ...] = field(repr=False)
-    events: tuple[BranchEvent, ...] = field(repr=False)
-    stops: tuple[Stop, Stop] = field(repr=False)
-    curve: Curve = field(repr=False)
+    regime: Regime = part("hammer and periodic drive at the start, and phase of the section")
+    parameter: str = scalar(
+        "", 'the constant: "period", "rate", or the key of one of the hammer, the waveform or the drive'
+    )
+    unit: str = part("its SI unit")
+    bounds: tuple[float, float] = scalar("SI", "values between which the branch was followed")
+    firings: int = column("1", "firings after which the orbits repeat", "", dtype=np.int32)
+    tolerance: float = part("tolerance of the integration")
+    values: FloatArray = column("SI", "value of the constant", "orbit", name="value")
+    x: FloatArray = column("m", "displacement at the section", "orbit firing")
+    v: FloatArray = column("m/s", "velocity at the section", "orbit firing")
+    multipliers: npt.NDArray[np.complex128] = part(
+        "Floquet multipliers of the orbits, the larger absolute value first", more="shape (N, 2)", repr=False
+    )
+    backstop_contacts: npt.NDArray[np.int64] = column(
+        "1", "backstop contacts in a period of the orbit", "orbit", dtype=np.int32
+    )
+    pack_contacts: npt.NDArray[np.int64] = column(
+        "1", "pack contacts in a period of the orbit", "orbit", dtype=np.int32
+    )
+    printed: npt.NDArray[np.int64] = column(
+        "1", "firings of a period that make a dot", "orbit", dtype=np.int32
+    )
+    lost: npt.NDArray[np.int64] = column("1", "firings of a period that make no dot", "orbit", dtype=np.int32)
+    flight_time: FloatArray = column(
+        "s", "from the firing to the touch of the pack", "orbit firing", more="nan for a lost dot"
+    )
+    impact_speed: FloatArray = column(
+        "m/s", "velocity at the touch of the pack", "orbit firing", more="nan for a lost dot"
+    )
+    peak_force: FloatArray = column("N", "largest pack force", "orbit firing", more="nan for a lost dot")
+    coil_work: FloatArray = column("J", "work of the coil in a period of the orbit", "orbit")
+    drive_work: FloatArray = column("J", "work of a drive that is a force in a period of the orbit", "orbit")
+    pack_loss: FloatArray = column("J", "energy that the pack takes in a period of the orbit", "orbit")
+    backstop_loss: FloatArray = column(
+        "J", "energy that the backstop takes in a period of the orbit", "orbit"
+    )
+    residual: FloatArray = column(
+        "1", "distance from itself after a period, in half-widths of the window", "orbit"
+    )
+    contacts: tuple[str, ...] = part(
+        "sequence of the contacts of each orbit, P for the pack and B for the backstop", repr=False
+    )
+    events: tuple[BranchEvent, ...] = part(
+        "folds, period doublings, Neimark-Sacker points, branchings and grazings, in order along the curve",
+        repr=False,
+    )
+    stops: tuple[Stop, Stop] = part(
+        "why and where the branch ends before its first and after its last orbit",
+        repr=False,
+    )
+    follow_doubled: Callable[[BranchEvent, int, int | None], Branch] = part(
+        "follows the branch born at a period doubling, given the number of steps and of threads", repr=False
+    )
+    curve: Curve = part("the same in the variables of `printhammer.chaos.continuation.arclength`", repr=False)
+
+    @property
+    def title(self) -> str:
+        """One line that says what the branch is."""
+        return f"period-{self.firings} orbits of {self.regime.hammer.name} along {self.parameter}"
 
     def __len__(self) -> int:
         return len(self.values)
 
     @property
+    @derived("1", "part of the period between a firing and the section")
     def phase(self) -> float:
         """Part of the period between a firing and the section."""
         return self.regime.phase
 
     @property
+    @derived("1", "whether all small changes of the state die out", "orbit", dtype=np.int32)
     def stable(self) -> npt.NDArray[np.bool_]:
         """Whether all small changes of the state die out, shape (N,).
 
@@ -123,6 +140,7 @@ class Branch:
         return found
 
     @property
+    @derived("1", "whether the branch is a closed loop", kind="column", dtype=np.int32)
     def closed(self) -> bool:
         """Whether the branch is an island: a closed loop, joined to nothing; its ends are one orbit."""
         return self.curve.closed
@@ -130,9 +148,7 @@ class Branch:
     @property
     def stable_ranges(self) -> list[tuple[float, float]]:
         """Ranges of the constant over which the orbits are stable, ascending."""
-        from printhammer.chaos.continuation.events import stable_ranges
-
-        return stable_ranges(self)
+        return stable_ranges(self.values, self.stable, self.events)
 
     @property
     def message(self) -> str:
@@ -145,21 +161,39 @@ class Branch:
         first, last = (stop.sentence for stop in self.stops)
         return f"{what}; at its first orbit {first}; at its last orbit {last}"
 
-    @property
-    def provenance(self) -> dict[str, Any]:
-        """Where the branch comes from: fingerprints, versions, tolerance, and how it ends."""
-        from printhammer.chaos.orbits.tables import provenance_of
+    def notes(self) -> dict[str, Any]:
+        """Return how the branch ends, for the attributes of the Dataset."""
+        first, last = (stop.sentence for stop in self.stops)
+        stable = [list(pair) for pair in self.stable_ranges]
+        return {"first_end": first, "last_end": last, "stable_ranges": stable}
 
-        return {
-            **provenance_of(self.regime, self.tolerance),
-            "parameter": self.parameter,
-            "bounds": list(self.bounds),
-            "firings": self.firings,
-            "phase": self.phase,
-            "closed": "yes" if self.closed else "no",
-            "first_end": self.stops[0].sentence,
-            "last_end": self.stops[1].sentence,
-        }
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return orbits over `orbit`, `firing` and `multiplier`, and over `event` what happens on the way."""
+        own = super().entries()
+        own["value"] = replace(own["value"][0], unit=self.unit, meaning=self.parameter), self.values
+        for name in ("real", "imag"):
+            note = Column("1", f"{name} part of the multipliers", ("orbit", "multiplier"))
+            own[f"multiplier_{name}"] = (
+                replace(note, name=f"multiplier_{name}"),
+                getattr(self.multipliers, name),
+            )
+        # At least one: a dimension of length 0 has another meaning in the classic NetCDF format.
+        rows = self.events or (None,)
+        for note, missing, value in (
+            (EVENT_KIND, -1, lambda event: KINDS.index(event.kind)),
+            (replace(EVENT_VALUE, unit=self.unit, meaning=self.parameter), np.nan, lambda event: event.value),
+            (EVENT_AFTER, -1, lambda event: event.after),
+            (EVENT_LOCATED, -1, lambda event: event.sharp),
+            (EVENT_TEXT, "", lambda event: event.message),
+            (EVENT_BEFORE, "", lambda event: event.contacts[0]),
+            (EVENT_BEYOND, "", lambda event: event.contacts[1]),
+        ):
+            own[note.name] = note, np.array([missing if row is None else value(row) for row in rows])
+        return own
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each orbit and firing."""
+        return branches_table([self], self.attributes).drop(columns="branch")
 
     def orbit(self, number: int) -> Orbit:
         """Return all about one of the orbits, closed anew at its value of the constant.
@@ -169,8 +203,6 @@ class Branch:
         number : int
             Its place along the branch.
         """
-        from printhammer.chaos.orbits.search import orbit
-
         regime = self.regime.with_(self.parameter, float(self.values[number]))
         state = self.curve.nodes[number].state
         return orbit(regime, state, firings=self.firings, tolerance=self.tolerance)
@@ -196,18 +228,34 @@ class Branch:
         """
         if event.kind != "period doubling" or event not in self.events:
             raise InputError(f"event = {event.kind!r}, expected a period doubling of this branch")
-        from printhammer.chaos.continuation.tracer import Tracer
+        return self.follow_doubled(event, read_count(most, "most"), threads)
 
-        work = Tracer(self.regime, self.parameter, self.bounds, self.tolerance, threads)
-        return work.doubled(self.firings, event, read_count(most, "most"))
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the branch as a Dataset over `orbit`, with units and provenance in the attributes."""
-        from printhammer.chaos.continuation.tables import branch_dataset
+def branches_table(branches: Sequence[Branch], attributes: Mapping[str, Any]) -> pd.DataFrame:
+    """Return branches as a table, a row for each orbit and firing."""
+    import pandas as pd
 
-        return branch_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the branch against its constant; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.continuation").plot(self, **options)
+    tables = []
+    for number, branch in enumerate(branches):
+        count, firings = len(branch), branch.firings
+        entries = branch.entries()
+        columns: dict[str, Any] = {
+            "branch": np.full(count * firings, number),
+            "orbit": np.repeat(np.arange(count), firings),
+            "firing": np.tile(np.arange(firings), count),
+            heading(branch.parameter, branch.unit): np.repeat(branch.values, firings),
+        }
+        for name, (note, values) in entries.items():
+            if note.dims == ("orbit", "firing"):
+                columns[note.heading(name)] = values.reshape(-1)
+        for name, (note, values) in entries.items():
+            if note.dims == ("orbit",) and name != "value":
+                columns[note.heading(name)] = np.repeat(values, firings)
+        for j in range(2):
+            columns[f"multiplier_{j}_real"] = np.repeat(branch.multipliers[:, j].real, firings)
+            columns[f"multiplier_{j}_imag"] = np.repeat(branch.multipliers[:, j].imag, firings)
+        columns["contacts"] = np.repeat(np.array(branch.contacts, dtype=object), firings)
+        tables.append(pd.DataFrame(columns))
+    table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["branch", "orbit"])
+    table.attrs.update(plain(dict(attributes)))
+    return table

@@ -11,9 +11,10 @@ import numpy as np
 from printhammer.chaos.continuation.family import Passage
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy.typing as npt
 
-    from printhammer.chaos.continuation.branch import Branch
     from printhammer.chaos.continuation.branch_points import BranchPoint
     from printhammer.chaos.continuation.family import Surface, Touch
     from printhammer.support.arrays import FloatArray
@@ -65,7 +66,7 @@ class BranchEvent:
     point: BranchPoint = field(repr=False)
 
     @property
-    def told(self) -> str:
+    def message(self) -> str:
         """What happens, in a few words."""
         if self.kind != "grazing":
             return self.kind
@@ -127,11 +128,12 @@ def _parted(touches: list[Touch], length: float) -> bool:
     return bool(gaps) and min(gaps) < min(durations)
 
 
-def stable_ranges(branch: Branch) -> list[tuple[float, float]]:
+def stable_ranges(
+    along: FloatArray, stable: npt.NDArray[np.bool_], events: Sequence[BranchEvent]
+) -> list[tuple[float, float]]:
     """Return the ranges of the constant over which the orbits of a branch are stable, ascending."""
-    limits = [event for event in branch.events if event.kind != "grazing"]
-    values = [*branch.values.tolist()]
-    stable = branch.stable
+    limits = [event for event in events if event.kind != "grazing"]
+    values = along.tolist()
     found: list[tuple[float, float]] = []
     begin: float | None = None
     for i, value in enumerate(values):

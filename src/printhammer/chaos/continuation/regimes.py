@@ -8,27 +8,27 @@ between two folds and is joined to nothing, is a closed loop.
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
 from printhammer.chaos.continuation.arclength import Steps
-from printhammer.chaos.continuation.branch import MOST, Branch
+from printhammer.chaos.continuation.branch import MOST, Branch, branches_table
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.search import orbits
 from printhammer.chaos.strobe.map import MAP_TOLERANCE
 from printhammer.drive.input import period_of_rate, read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.names import RATE
+from printhammer.results import Column, Result, part
+from printhammer.results.stacking import stacked
 from printhammer.run.regime import Regime
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
-    import xarray as xr
+    import pandas as pd
 
     from printhammer.chaos.orbits.orbit import Orbit
     from printhammer.drive.base import Overlap
@@ -46,22 +46,23 @@ _SAME: Final = 1e-4
 """Distance, in half-widths of the window, within which an orbit lies on a branch."""
 
 
-@dataclass(frozen=True, eq=False)
-class Branches:
+class Branches(Result):
     """Branches of periodic orbits along the same constant.
 
     That an orbit lies on none of them does not prove that there is none.
-
-    Attributes
-    ----------
-    found : tuple of Branch
-        By number of firings, then in the order in which they were found.
-    refused : tuple of str
-        Why an orbit could not be followed, or a search found nothing, a sentence each.
     """
 
-    found: tuple[Branch, ...]
-    refused: tuple[str, ...] = field(default=())
+    found: tuple[Branch, ...] = part(
+        "the branches, by number of firings, then in the order in which they were found"
+    )
+    refused: tuple[str, ...] = part(
+        "why an orbit could not be followed, or a search found nothing, a sentence each", default=()
+    )
+
+    @property
+    def title(self) -> str:
+        """One line that says what the branches are."""
+        return f"branches of periodic orbits along {self.found[0].parameter if self.found else ''}"
 
     def __len__(self) -> int:
         return len(self.found)
@@ -89,16 +90,26 @@ class Branches:
         number = len(self.found)
         return f"{number} branch{'es' if number > 1 else ''}: {kinds}{closed}{missed}"
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the branches as a Dataset over `branch` and `orbit`, with units and provenance."""
-        from printhammer.chaos.continuation.tables import branches_dataset
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the first branch comes from."""
+        return self.found[0].provenance if self.found else super().provenance
 
-        return branches_dataset(self.found)
+    def notes(self) -> dict[str, Any]:
+        """Return what the branches are, and why they end, for the attributes of the Dataset."""
+        first = self.found[0] if self.found else None
+        names = ("parameter", "bounds", "phase")
+        ends = {f"branch_{i}": branch.message for i, branch in enumerate(self.found)}
+        stable = [[list(pair) for pair in branch.stable_ranges] for branch in self.found]
+        return {**{name: getattr(first, name, None) for name in names}, **ends, "stable_ranges": stable}
 
-    def plot(self, **options: Any) -> Any:
-        """Draw the branches against their constant; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.continuation").plot(self, **options)
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return the branches over `branch`, filled up with NaN or -1."""
+        return stacked(self.found, "branch", Branch)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each branch, orbit and firing."""
+        return branches_table(self.found, self.attributes)
 
 
 class InterruptedBranches(KeyboardInterrupt):
@@ -172,7 +183,7 @@ def regimes(
         raise InputError(f"rates = {rates!r}, expected the least and the largest rate") from None
     if not low < high:
         raise InputError(f"rates = {rates!r}, expected the least and the largest rate, ascending")
-    count, levels = read_count(seeds, "seeds"), _levels(doublings)
+    count, levels = read_count(seeds, "seeds"), read_count(doublings, "doublings", least=0)
     steps = Steps(most=read_count(most, "most"), precision=PRECISION)
     collected = _Collected((low, high), steps, tolerance, threads)
     many = read_count(longest, "longest")
@@ -213,16 +224,6 @@ def follow_doublings(
     return collected.result()
 
 
-def _levels(doublings: SupportsIndex) -> int:
-    try:
-        found = -1 if isinstance(doublings, bool) else doublings.__index__()
-    except AttributeError:
-        found = -1
-    if found < 0:
-        raise InputError(f"doublings = {doublings!r}, expected a whole number from 0 on")
-    return found
-
-
 class _Collected:
     """Branches found so far."""
 
@@ -252,32 +253,20 @@ class _Collected:
         while left:
             left = [orbit for orbit in left if not self.known(orbit)]
             now, left = left[:_TOGETHER], left[_TOGETHER:]
-            for orbit, branch in zip(now, self.followed(now), strict=True):
+            for orbit, branch in zip(now, mapped(self.followed, now, self.threads, length=1), strict=True):
                 if isinstance(branch, str):
                     self.refused.append(branch)
                 elif not self.known(orbit):
                     self.found.append(branch)
 
-    def followed(self, orbits: Sequence[Orbit]) -> list[Branch | str]:
-        """Return the branches through some orbits, or why there is none."""
-        results: dict[int, Branch | str] = {}
-
-        def work(begin: int, end: int) -> None:
-            for i in range(begin, end):
-                orbit = orbits[i]
-                bounds = read_bounds(orbit.regime, RATE, self.bounds)
-                try:
-                    branch = Tracer(orbit.regime, RATE, bounds, self.tolerance, 1).branch(
-                        np.array(orbit.section), orbit.firings, self.steps, None
-                    )
-                except InputError as error:
-                    told = f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
-                    results[i] = told
-                else:
-                    results[i] = branch
-
-        in_threads([work], [len(orbits)], thread_count(self.threads), lengths=[1])
-        return [results[i] for i in range(len(orbits))]
+    def followed(self, orbit: Orbit) -> Branch | str:
+        """Return the branch through an orbit, or why there is none."""
+        bounds = read_bounds(orbit.regime, RATE, self.bounds)
+        tracer = Tracer(orbit.regime, RATE, bounds, self.tolerance, 1)
+        try:
+            return tracer.branch(np.array(orbit.section), orbit.firings, self.steps, None)
+        except InputError as error:
+            return f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
 
     def known(self, orbit: Orbit) -> bool:
         """Return whether an orbit lies on a branch that was found."""

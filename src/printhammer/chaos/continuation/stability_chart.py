@@ -12,8 +12,7 @@ rest settles, on a grid; a stable orbit need not be what is reached from there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
@@ -28,13 +27,13 @@ from printhammer.chaos.strobe.train import Train
 from printhammer.chaos.strobe.verdict import period_of
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.results import Column, Result, column, derived, part, provenance, scalar
+from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.chaos.continuation.arclength import Curve, Stop
     from printhammer.chaos.continuation.events import BranchEvent
@@ -92,42 +91,34 @@ class LossCurve:
     stops: tuple[Stop, Stop]
 
 
-@dataclass(frozen=True, eq=False)
-class StabilityChart:
-    """Where in the plane of two constants an orbit is stable, and what ends it.
+class StabilityChart(Result):
+    """Where in the plane of two constants an orbit is stable, and what ends it."""
 
-    Attributes
-    ----------
-    regime : Regime
-        Hammer and periodic drive of the branch it came from.
-    names, units : tuple of str
-        The two constants and their SI units.
-    bounds : tuple of tuple of float
-        Their ranges.
-    firings : int
-        Number of firings after which the orbit repeats.
-    curves : tuple of LossCurve
-        On which it loses its stability.
-    grid : tuple of array
-        Values of the two constants, shapes (m,) and (n,), at which trains from rest were judged.
-    settled : int array, shape (n, m)
-        Number of firings after which the train from rest repeats; 0 where it does not within the firings
-        given to it, -1 where its run stopped.
-    refused : tuple of str
-        Why a curve could not be followed, a sentence each.
-    """
-
-    regime: Regime
-    names: tuple[str, str]
-    units: tuple[str, str]
-    bounds: tuple[tuple[float, float], tuple[float, float]]
-    firings: int
-    curves: tuple[LossCurve, ...] = field(repr=False)
-    grid: tuple[FloatArray, FloatArray] = field(repr=False)
-    settled: npt.NDArray[np.int64] = field(repr=False)
-    refused: tuple[str, ...] = ()
+    regime: Regime = part("hammer and periodic drive of the branch it came from")
+    names: tuple[str, str] = scalar("", "the two constants")
+    units: tuple[str, str] = scalar("", "their SI units")
+    bounds: tuple[tuple[float, float], tuple[float, float]] = scalar("SI", "their ranges")
+    firings: int = scalar("1", "number of firings after which the orbit repeats")
+    curves: tuple[LossCurve, ...] = part("on which it loses its stability", repr=False)
+    grid: tuple[FloatArray, FloatArray] = part(
+        "values of the two constants, shapes (m,) and (n,), at which trains from rest were judged", repr=False
+    )
+    settled: npt.NDArray[np.int64] = column(
+        "1",
+        "firings after which the train from rest repeats",
+        "value main",
+        more="0 where it does not within the firings given to it, -1 where its run stopped",
+        dtype=np.int32,
+    )
+    refused: tuple[str, ...] = part("why a curve could not be followed, a sentence each", default=())
 
     @property
+    def title(self) -> str:
+        """One line that says what the chart is."""
+        return f"stability of the period-{self.firings} orbit of {self.regime.hammer.name}"
+
+    @property
+    @derived("", "what was found")
     def message(self) -> str:
         """What was found, in one line."""
         kinds = [curve.kind for curve in self.curves]
@@ -139,51 +130,42 @@ class StabilityChart:
             f" from rest {100.0 * share:.0f} % of the grid settles to period {self.firings}"
         )
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return grid and curves as a Dataset, with units and provenance in the attributes."""
-        import xarray as xr
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the chart comes from; the tolerance is that of the trains from rest."""
+        regime, waveform = self.regime, self.regime.fired
+        return provenance(
+            hammer=regime.hammer,
+            waveform=waveform,
+            overlap=regime.overlap,
+            period=regime.period,
+            tolerance=_GRID_TOLERANCE,
+        )
 
-        from printhammer.chaos.orbits.tables import provenance_of
-
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return trains from rest over `value` and `main`, curves over `curve` and `point`."""
         # At least one of each: a dimension of length 0 has another meaning in the classic NetCDF format.
         most, count = max((len(curve.first) for curve in self.curves), default=1), max(len(self.curves), 1)
-        table = {name: np.full((count, most), np.nan) for name in ("first", "second")}
+        table = np.full((2, count, most), np.nan)
         limits = np.full((count, most), -1, np.int32)
-        kinds = list(_TESTS)
         codes = np.full(count, -1, np.int32)
-        codes[: len(self.curves)] = [kinds.index(curve.kind) for curve in self.curves]
+        codes[: len(self.curves)] = [list(_TESTS).index(curve.kind) for curve in self.curves]
         for i, curve in enumerate(self.curves):
-            table["first"][i, : len(curve.first)] = curve.first
-            table["second"][i, : len(curve.second)] = curve.second
+            table[0, i, : len(curve.first)] = curve.first
+            table[1, i, : len(curve.second)] = curve.second
             limits[i, : len(curve.limits)] = curve.limits
-        data: dict[str, Any] = {
-            "settled": (
-                ("value", "main"),
-                self.settled.astype(np.int32),
-                {"units": "1", "long_name": "firings after which the train from rest repeats"},
-            ),
-            "kind": (
-                "curve",
-                codes,
-                {"units": "1", "codes": ", ".join(f"{code} {kind}" for code, kind in enumerate(kinds))},
-            ),
-            "limits": (("curve", "point"), limits, {"units": "1", "long_name": "whether stability is lost"}),
-        }
-        for place, name in enumerate(("first", "second")):
-            attributes = {"units": self.units[place], "long_name": self.names[place]}
-            data[name] = (("curve", "point"), table[name], attributes)
-        coordinates = {
-            "main": ("main", self.grid[0], {"units": self.units[0], "long_name": self.names[0]}),
-            "value": ("value", self.grid[1], {"units": self.units[1], "long_name": self.names[1]}),
-        }
-        title = f"stability of the period-{self.firings} orbit of {self.regime.hammer.name}"
-        known = {"title": title, **provenance_of(self.regime, _GRID_TOLERANCE), "message": self.message}
-        return xr.Dataset(data, coords=coordinates, attrs=known)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the chart; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.stability_chart").plot(self, **options)
+        pair = ("curve", "point")
+        own = super().entries()
+        own["kind"] = (
+            Column("1", "how stability is lost", ("curve",), name="kind", codes=tuple(_TESTS)),
+            codes,
+        )
+        own["limits"] = Column("1", "whether stability is lost", pair, name="limits"), limits
+        for k, (name, axis) in enumerate((("first", "main"), ("second", "value"))):
+            own[name] = Column(self.units[k], self.names[k], pair, name=name), table[k]
+            note = Column(self.units[k], self.names[k], (axis,), "coordinate", name=axis)
+            own[axis] = note, self.grid[k]
+        return own
 
 
 def stability_chart(
@@ -290,15 +272,7 @@ class _Chart:
             left = [event for event in left if not any(self.on(curve, event) for curve in found)]
             # As many at once whatever the number of threads, so that the outcome is the same.
             now, left = left[:2], left[2:]
-            results: dict[int, LossCurve | str] = {}
-
-            def work(begin: int, end: int, now: list[BranchEvent] = now, results: Any = results) -> None:
-                for i in range(begin, end):
-                    results[i] = self.curve(now[i])
-
-            in_threads([work], [len(now)], threads, lengths=[1])
-            for i, event in enumerate(now):
-                curve = results[i]
+            for event, curve in zip(now, mapped(self.curve, now, threads, length=1), strict=True):
                 if isinstance(curve, str):
                     refused.append(curve)
                 elif not any(self.on(other, event) for other in found):

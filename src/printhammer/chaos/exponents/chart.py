@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
 
-from printhammer.chaos.exponents.lyapunov import FIRINGS, TRANSIENT, exponents_of_train
-from printhammer.chaos.strobe.points import transient_of
+from printhammer.chaos.exponents.lyapunov import EXPONENT, FIRINGS, PER_FIRING, TRANSIENT, exponents_of_train
 from printhammer.chaos.strobe.train import Train
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.results import Column, Result, column, coordinate, part, provenance, scalar
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import regimes_of
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
-    import xarray as xr
+    import pandas as pd
 
     from printhammer.chaos.exponents.lyapunov import Lyapunov
-    from printhammer.chaos.strobe.points import Strobe
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
@@ -35,56 +32,42 @@ if TYPE_CHECKING:
     from printhammer.support.threads import Progress
 
 
-@dataclass(frozen=True)
-class LyapunovChart:
-    """Lyapunov exponents against the period of the train; arrays of one row for each train.
+class LyapunovChart(Result, rows="period"):
+    """Lyapunov exponents against the period of the train; arrays of one row for each train."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer, the first one where there are several.
-    drive : Drive
-        The drive of the first train.
-    period : array, shape (m,)
-        Times between firings, s.
-    first, last : int
-        Firings between which growth counts.
-    tolerance : float
-        Tolerance of the integration.
-    exponents, standard_errors : array, shape (m, 2)
-        As for `Lyapunov`.
-    total, total_error, dimension, dimension_error : array, shape (m,)
-        As for `Lyapunov`.
-    k : array, shape (m,)
-        K of the 0-1 test; NaN where there are too few points.
-    verdict, zero_one : tuple of str
-        Verdicts on the points and of the 0-1 test.
-    growth : tuple of str
-        What the largest exponent alone says.
-    status : tuple of str
-        How the runs ended.
-    smooth : bool array, shape (m,)
-        As for `Lyapunov`.
-    """
+    hammer: Hammer = part("the hammer", more="the first one where there are several")
+    drive: Drive = part("the drive of the first train")
+    period: FloatArray = coordinate("s", "time between firings", "period")
+    first: int = scalar("1", "first of the firings between which growth counts")
+    last: int = scalar("1", "last of them")
+    tolerance: float = part("tolerance of the integration")
+    exponents: FloatArray = column(
+        PER_FIRING, "Lyapunov exponents", "period exponent", more="as for `Lyapunov`"
+    )
+    standard_errors: FloatArray = column(PER_FIRING, "standard errors", "period exponent")
+    total: FloatArray = column(PER_FIRING, "sum of the exponents", "period")
+    total_error: FloatArray = column(PER_FIRING, "its standard error", "period")
+    dimension: FloatArray = column("1", "Kaplan-Yorke dimension", "period")
+    dimension_error: FloatArray = column("1", "its standard error", "period")
+    k: FloatArray = column("1", "K of the 0-1 test", "period", more="nan where there are too few points")
+    verdict: tuple[str, ...] = column("", "verdict on the points", "period")
+    growth: tuple[str, ...] = column("", "what the largest exponent alone says", "period")
+    zero_one: tuple[str, ...] = column("", "verdict of the 0-1 test", "period")
+    status: tuple[str, ...] = column("", "how the run ended", "period")
+    smooth: npt.NDArray[np.bool_] = column(
+        "1", "whether the motion has a derivative", "period", dtype=np.int8
+    )
 
-    hammer: Hammer
-    drive: Drive
-    period: FloatArray
-    first: int
-    last: int
-    tolerance: float
-    exponents: FloatArray
-    standard_errors: FloatArray
-    total: FloatArray
-    total_error: FloatArray
-    dimension: FloatArray
-    dimension_error: FloatArray
-    k: FloatArray
-    verdict: tuple[str, ...]
-    zero_one: tuple[str, ...]
-    growth: tuple[str, ...]
-    status: tuple[str, ...]
-    smooth: npt.NDArray[np.bool_]
+    @property
+    def title(self) -> str:
+        """One line that says what the exponents are of."""
+        return f"Lyapunov exponents of {self.hammer.name}"
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the exponents come from: fingerprint, waveform, tolerance, versions."""
+        waveform, overlap = self.drive.waveform, self.drive.overlap
+        return provenance(hammer=self.hammer, waveform=waveform, overlap=overlap, tolerance=self.tolerance)
 
     @classmethod
     def of(cls, found: Sequence[Lyapunov]) -> LyapunovChart:
@@ -97,17 +80,21 @@ class LyapunovChart:
         """
         if not found:
             raise InputError("periods: expected at least one train")
-        return _chart(found[0].points, [_row(one) for one in found])
+        points = found[0].points
+        firings = int(points.firing[0]), int(points.firing[-1])
+        return _chart(points.hammer, points.drive, firings, points.tolerance, [_row(one) for one in found])
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the chart as a Dataset over `period`, with units and provenance in the attributes."""
-        from printhammer.chaos.exponents.tables import chart_dataset
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return all columns over `period`, and both exponents side by side."""
+        return {**super().entries(), "exponent": EXPONENT}
 
-        return chart_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw exponents and K against the period; returns a matplotlib figure."""
-        return import_module("printhammer.figures.chaos.lyapunov").plot_chart(self, **options)
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each train, the exponents side by side."""
+        table = super().to_dataframe()
+        for k in (1, 0):
+            table.insert(1, f"standard error {k + 1} [{PER_FIRING}]", self.standard_errors[:, k])
+            table.insert(1, f"exponent {k + 1} [{PER_FIRING}]", self.exponents[:, k])
+        return table
 
 
 def lyapunovs(
@@ -145,22 +132,13 @@ def lyapunovs(
     InputError
         As for `lyapunov`, or numbers of hammers and periods that do not fit together.
     """
-    counts = read_count(firings, "firings"), transient_of(transient)
+    counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
     trains = [Train.of(regime.at_firings, sum(counts) + 1) for regime in regimes]
     # Only a row is kept of each train, so that memory does not grow with their length.
-    rows: dict[int, dict[str, Any]] = {}
-    begun: dict[int, Strobe] = {}
-
-    def work(begin: int, end: int) -> None:
-        for i in range(begin, end):
-            found = exponents_of_train(trains[i], counts, tolerance)
-            rows[i] = _row(found)
-            if i == 0:
-                begun[0] = found.points
-
-    in_threads([work], [len(trains)], thread_count(threads), progress)
-    return _chart(begun[0], [rows[i] for i in range(len(trains))])
+    rows = mapped(lambda train: _row(exponents_of_train(train, counts, tolerance)), trains, threads, progress)
+    first = counts[1] + 1
+    return _chart(trains[0].hammer, trains[0].drive, (first, first + counts[0]), tolerance, rows)
 
 
 def _row(found: Lyapunov) -> dict[str, Any]:
@@ -182,17 +160,13 @@ def _row(found: Lyapunov) -> dict[str, Any]:
     }
 
 
-def _chart(points: Strobe, rows: list[dict[str, Any]]) -> LyapunovChart:
+def _chart(
+    hammer: Hammer, drive: Drive, firings: tuple[int, int], tolerance: float, rows: list[dict[str, Any]]
+) -> LyapunovChart:
     named = ("verdict", "zero_one", "growth", "status")
     columns: dict[str, Any] = {
         name: tuple(row[name] for row in rows) if name in named else np.array([row[name] for row in rows])
         for name in rows[0]
     }
-    return LyapunovChart(
-        hammer=points.hammer,
-        drive=points.drive,
-        first=int(points.firing[0]),
-        last=int(points.firing[-1]),
-        tolerance=points.tolerance,
-        **columns,
-    )
+    first, last = firings
+    return LyapunovChart(hammer=hammer, drive=drive, first=first, last=last, tolerance=tolerance, **columns)

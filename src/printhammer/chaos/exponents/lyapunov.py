@@ -1,4 +1,4 @@
-"""Lyapunov exponents of the strobe map: how fast neighbouring motions part, or come together.
+"""Lyapunov exponents of the stroboscopic map: how fast neighbouring motions part, or come together.
 
 From firing to firing the tangent flow (docs/tangent.md) stretches one direction of the plane of displacement
 and velocity and shrinks the other. The mean logarithms are the exponents lambda_1 >= lambda_2; their sum is
@@ -9,25 +9,24 @@ exponents of the flow in time are these over the period, and a zero for the dire
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from importlib import import_module
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
 from printhammer.chaos.exponents.zero_one import FEWEST, ZeroOne, zero_one
-from printhammer.chaos.strobe.points import strobe_of, transient_of
+from printhammer.chaos.strobe.points import strobe_of
 from printhammer.chaos.strobe.train import States, Train
 from printhammer.chaos.strobe.verdict import SIGNIFICANT, verdict
 from printhammer.derivatives.states import standard_error, strobe_exponent
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.results import Column, Result, derived, part, scalar
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.chaos.strobe.points import Strobe
     from printhammer.chaos.strobe.verdict import Verdict
@@ -42,49 +41,57 @@ FIRINGS: Final = 1000
 TRANSIENT: Final = 1000
 """Number of firings left out before them."""
 
+PER_FIRING: Final = "1/firing"
+"""Unit of exponents."""
+
+EXPONENT: Final = (
+    Column("1", "number of the exponent, largest first", ("exponent",), "coordinate", name="exponent"),
+    np.array([1, 2], np.int32),
+)
+"""Coordinate of both exponents."""
+
 _COUNTS: Final = 100
 _CYCLES: Final = 8
 """Number of cycles below which their scatter says nothing."""
 
 
-@dataclass(frozen=True)
-class Lyapunov:
-    """Lyapunov exponents of one train, and two opinions on what kind of motion it is.
+class Lyapunov(Result, rows="firing exponent"):
+    """Lyapunov exponents of one train, and two opinions on what kind of motion it is."""
 
-    Attributes
-    ----------
-    points : Strobe
-        The states at the firings, from the first to the last one between which growth counts, and the verdict
-        on them, which rests on recurrence and on the largest exponent.
-    exponents : array, shape (2,)
-        Exponents per firing, the largest one first; minus infinity where the motion forgets its past
-        altogether, NaN where the run did not get through.
-    standard_errors : array, shape (2,)
-        Of the exponents; infinite for fewer than eight firings.
-    total, total_error : float
-        Sum of the exponents, the mean logarithm of the determinant of the strobe map, with its standard
-        error.
-    dimension, dimension_error : float
-        Kaplan-Yorke dimension of the attractor of the strobe map, see `kaplan_yorke`; NaN where it is not
-        known.
-    factors : array, shape (n, 2)
-        Logarithms of the growth from each firing to the next.
-    smooth : bool
-        False where the motion passes a touch without velocity, where it has no derivative.
-    zero_one : ZeroOne or None
-        What the 0-1 test says of the points; None for fewer than 100 of them.
-    """
+    points: Strobe = part(
+        "the states at the firings between which growth counts, and the verdict on them",
+        more="it rests on recurrence and on the largest exponent",
+    )
+    exponents: FloatArray = scalar(
+        PER_FIRING,
+        "Lyapunov exponents, the largest one first",
+        more="minus infinity where the motion forgets its past, nan where the run did not get through",
+    )
+    standard_errors: FloatArray = scalar(
+        PER_FIRING, "standard errors of the exponents", more="infinite for fewer than eight firings"
+    )
+    total: float = scalar(
+        PER_FIRING,
+        "sum of the exponents",
+        more="the mean logarithm of the determinant of the map",
+    )
+    total_error: float = scalar(PER_FIRING, "its standard error")
+    dimension: float = scalar(
+        "1", "Kaplan-Yorke dimension of the attractor", more="nan where it is not known, see `kaplan_yorke`"
+    )
+    dimension_error: float = scalar("1", "its standard error")
+    factors: FloatArray = part(
+        "logarithms of the growth from each firing to the next", more="shape (n, 2)", repr=False
+    )
+    smooth: bool = scalar("1", "False where the motion passes a touch without velocity, without a derivative")
+    zero_one: ZeroOne | None = part(
+        "what the 0-1 test says of the points", more="None for fewer than 100 of them", repr=False
+    )
 
-    points: Strobe
-    exponents: FloatArray
-    standard_errors: FloatArray
-    total: float
-    total_error: float
-    dimension: float
-    dimension_error: float
-    factors: FloatArray = field(repr=False)
-    smooth: bool
-    zero_one: ZeroOne | None = field(repr=False)
+    @property
+    def title(self) -> str:
+        """One line that says what the exponents are of."""
+        return f"Lyapunov exponents of {self.hammer.name}, fired every {self.period:.9g} s"
 
     @property
     def hammer(self) -> Hammer:
@@ -114,6 +121,7 @@ class Lyapunov:
         return self.points.verdict
 
     @property
+    @derived("1/s", "exponents per second", name="exponents_per_second")
     def per_second(self) -> FloatArray:
         """The exponents per second, 1/s, shape (2,)."""
         return self.exponents / self.period
@@ -124,6 +132,7 @@ class Lyapunov:
         return cycle_of(self.verdict.period, len(self.factors))
 
     @property
+    @derived("", "what the largest exponent alone says")
     def growth(self) -> str:
         """What the largest exponent alone says: "chaotic", "regular", or "undecided" within three errors."""
         return _growth(float(self.exponents[0]), float(self.standard_errors[0]), self.smooth)
@@ -172,16 +181,40 @@ class Lyapunov:
         errors = [[standard_error(whole[:cycles, k]) for k in (0, 1)] for cycles in some]
         return q * some, means, np.array(errors).reshape(-1, 2)
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return growth and states over `firing`, running estimates over `count`."""
-        from printhammer.chaos.exponents.tables import lyapunov_dataset
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the points come from."""
+        return self.points.provenance
 
-        return lyapunov_dataset(self)
+    def notes(self) -> dict[str, Any]:
+        """Return the verdicts on the points, for the attributes of the Dataset."""
+        second = {} if self.zero_one is None else {"k": self.zero_one.k, "zero_one": self.zero_one.verdict}
+        return {**second, "phase": self.points.phase, **self.points.notes()}
 
-    def plot(self, **options: Any) -> Any:
-        """Draw the running estimates with their errors; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.lyapunov").plot(self, **options)
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return growth and states over `firing`, running estimates over `count`.
+
+        The first firing has no growth, NaN.
+        """
+        counts, means, errors = self.running()
+        pair, per = ("count", "exponent"), PER_FIRING
+        numbers = Column("1", "number of firings averaged over", ("count",), "coordinate", dtype=np.int32)
+        growth = Column("1", "logarithm of the growth since the firing before", ("firing", "exponent"))
+        own = self.points.entries()
+        return {
+            "factor": (
+                replace(growth, name="factor"),
+                np.concatenate([np.full((1, 2), np.nan), self.factors]),
+            ),
+            **{name: own[name] for name in ("x", "v", "firing")},
+            "running": (Column(per, "running estimate", pair, name="running"), means),
+            "running_error": (
+                Column(per, "standard error of the running estimate", pair, name="running_error"),
+                errors,
+            ),
+            "count": (replace(numbers, name="count"), counts),
+            "exponent": EXPONENT,
+        }
 
 
 def lyapunov(
@@ -227,7 +260,7 @@ def lyapunov(
     InputError
         An argument is not what is described above, or the hammer has no waveform or no rest state.
     """
-    counts = read_count(firings, "firings"), transient_of(transient)
+    counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     train = Train.of(Regime.of(hammer, **firing).at_firings, sum(counts) + 1, state)
     return exponents_of_train(train, counts, tolerance)
 

@@ -9,9 +9,7 @@ J. Kurths, Phys. Rep. 438 (2007) 237, section 3.5.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Final, SupportsIndex
 
 import numpy as np
 
@@ -19,10 +17,10 @@ from printhammer.chaos.strobe.points import Strobe, points_of
 from printhammer.chaos.strobe.verdict import AGREEMENT
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.results import Result, column, scalar
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
@@ -39,51 +37,42 @@ SHORTEST: Final = 2
 _ROWS: Final = 256
 
 
-@dataclass(frozen=True)
-class Recurrence:
-    """A recurrence plot and what is counted in it.
+class Recurrence(Result):
+    """A recurrence plot and what is counted in it."""
 
-    Attributes
-    ----------
-    matrix : bool array, shape (n, n)
-        Whether two states lie within the threshold of each other.
-    threshold : float
-        Largest distance of states that count as the same, in units of the scales.
-    theiler : int
-        States less than so many places apart are not counted: 1 leaves out the main diagonal alone.
-    shortest : int
-        Points from which on a row of them is a line.
-    rate : float
-        Part of the counted pairs that recur.
-    determinism : float
-        Part of the recurring pairs that lie on diagonal lines; NaN where nothing recurs.
-    mean_diagonal : float
-        Mean length of the diagonal lines; NaN where there are none.
-    longest_diagonal : int
-        Length of the longest diagonal line, 0 where there is none; the main diagonal does not count. Its
-        inverse is the divergence.
-    entropy : float
-        Entropy of the lengths of the diagonal lines, nat.
-    laminarity : float
-        Part of the points that lie on vertical lines, the main diagonal among them.
-    trapping : float
-        Mean length of the vertical lines; NaN where there are none.
-    longest_vertical : int
-        Length of the longest vertical line, 0 where there is none.
-    """
+    matrix: npt.NDArray[np.bool_] = column(
+        "1", "whether two states lie within the threshold of each other", "i j", name="recurs", dtype=np.int8
+    )
+    threshold: float = scalar(
+        "1", "largest distance of states that count as the same", more="in units of the scales"
+    )
+    theiler: int = scalar(
+        "1",
+        "states less than so many places apart are not counted",
+        more="1 leaves out the main diagonal alone",
+    )
+    shortest: int = scalar("1", "points from which on a row of them is a line")
+    rate: float = scalar("1", "part of the counted pairs that recur")
+    determinism: float = scalar(
+        "1", "part of the recurring pairs that lie on diagonal lines", more="nan where nothing recurs"
+    )
+    mean_diagonal: float = scalar("1", "mean length of the diagonal lines", more="nan where there are none")
+    longest_diagonal: int = scalar(
+        "1",
+        "length of the longest diagonal line, 0 where there is none",
+        more="the main diagonal does not count; the inverse is the divergence",
+    )
+    entropy: float = scalar("nat", "entropy of the lengths of the diagonal lines")
+    laminarity: float = scalar(
+        "1", "part of the points that lie on vertical lines", more="the main diagonal among them"
+    )
+    trapping: float = scalar("1", "mean length of the vertical lines", more="nan where there are none")
+    longest_vertical: int = scalar("1", "length of the longest vertical line, 0 where there is none")
 
-    matrix: npt.NDArray[np.bool_] = field(repr=False)
-    threshold: float
-    theiler: int
-    shortest: int
-    rate: float
-    determinism: float
-    mean_diagonal: float
-    longest_diagonal: int
-    entropy: float
-    laminarity: float
-    trapping: float
-    longest_vertical: int
+    @property
+    def title(self) -> str:
+        """One line that says what this is."""
+        return "recurrence plot"
 
     @property
     def quantities(self) -> dict[str, float]:
@@ -93,25 +82,6 @@ class Recurrence:
             *("laminarity", "trapping", "longest_vertical"),
         )
         return {name: getattr(self, name) for name in names}
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the matrix over `i` and `j`, the quantities in the attributes."""
-        import xarray as xr
-
-        meaning = {"units": "1", "long_name": "whether two states lie within the threshold of each other"}
-        attrs = {
-            "title": "recurrence plot",
-            "threshold": self.threshold,
-            "theiler": self.theiler,
-            "shortest": self.shortest,
-            **self.quantities,
-        }
-        return xr.Dataset({"recurs": (("i", "j"), self.matrix.astype(np.int8), meaning)}, attrs=attrs)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the plot with its quantities; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.recurrence").plot(self, **options)
 
 
 def recurrence(

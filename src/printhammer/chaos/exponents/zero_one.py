@@ -16,8 +16,6 @@ regular one walks away too.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
@@ -26,10 +24,10 @@ from printhammer.chaos.strobe.points import Strobe, points_of
 from printhammer.chaos.strobe.verdict import AGREEMENT
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.results import Column, Result, column, coordinate, part, scalar
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing, Regime
@@ -70,53 +68,42 @@ _TOGETHER: Final = 1 << 20
 """Complex numbers that are worked on together."""
 
 
-@dataclass(frozen=True)
-class ZeroOne:
-    """What the 0-1 test says of a series.
+class ZeroOne(Result):
+    """What the 0-1 test says of a series."""
 
-    Attributes
-    ----------
-    k : float
-        Median of the correlations: near 0 for a regular series, near 1 for a chaotic one; NaN where the
-        series has gaps.
-    verdict : str
-        "regular" up to 0.2, "chaotic" from 0.8 on, else "undecided".
-    reason : str
-        Why the verdict is "undecided"; else empty.
-    length : int
-        Length of the series.
-    cycle : int
-        Number q after which the series most nearly repeats itself; the mean of each q-th number was taken
-        out.
-    resolution : float
-        Amplitude up to which changes of the series count as none, in its own unit.
-    seed : int
-        Seed of the angles.
-    angles : array, shape (m,)
-        The angles c, rad.
-    correlations : array, shape (m,)
-        K_c at each of them.
-    shown : int
-        Place of the angle whose correlation is the median; that which `displacement`, `p` and `q` are for.
-    displacement : array, shape (length // 10,)
-        Mean square displacement, corrected, after 1, 2, ... steps.
-    p, q : array, shape (length,)
-        The path in the plane.
-    """
+    k: float = scalar(
+        "1",
+        "median of the correlations",
+        more="near 0 for a regular series, near 1 for a chaotic one, nan where the series has gaps",
+    )
+    verdict: str = scalar("", '"regular" up to 0.2, "chaotic" from 0.8 on, else "undecided"')
+    reason: str = scalar("", 'why the verdict is "undecided"', more="else empty")
+    length: int = scalar("1", "length of the series")
+    cycle: int = scalar(
+        "1",
+        "number q after which the series most nearly repeats itself",
+        more="the mean of each q-th number was taken out",
+    )
+    resolution: float = scalar(
+        "1", "amplitude up to which changes of the series count as none", more="in its own unit"
+    )
+    seed: int = scalar("1", "seed of the angles")
+    angles: FloatArray = coordinate("rad", "angle c", "angle", name="angle")
+    correlations: FloatArray = column("1", "correlation K_c", "angle", name="correlation")
+    shown: int = part("place of the angle whose correlation is the median", repr=False)
+    displacement: FloatArray = column(
+        "unit of the series squared",
+        "mean square displacement, corrected",
+        "step",
+        more="after 1, 2, ... steps at the angle that is shown",
+    )
+    p: FloatArray = column("unit of the series", "path, first coordinate", "number", more="likewise")
+    q: FloatArray = column("unit of the series", "path, second coordinate", "number", more="likewise")
 
-    k: float
-    verdict: str
-    reason: str
-    length: int
-    cycle: int
-    resolution: float
-    seed: int
-    angles: FloatArray = field(repr=False)
-    correlations: FloatArray = field(repr=False)
-    shown: int = field(repr=False)
-    displacement: FloatArray = field(repr=False)
-    p: FloatArray = field(repr=False)
-    q: FloatArray = field(repr=False)
+    @property
+    def title(self) -> str:
+        """One line that says what this is."""
+        return "0-1 test for chaos"
 
     @property
     def phrase(self) -> str:
@@ -125,41 +112,20 @@ class ZeroOne:
         k = round(self.k, 3) + 0.0
         return f"K = {k:.3f}, median of {len(self.angles)} angles over {self.length} numbers"
 
-    def to_dataset(self) -> xr.Dataset:
+    def notes(self) -> dict[str, Any]:
+        """Return the angle that is shown, for the attributes of the Dataset."""
+        return {"shown_angle": float(self.angles[self.shown])}
+
+    def entries(self) -> dict[str, tuple[Column, Any]]:
         """Return correlations over `angle`, displacements over `step` and the path over `number`."""
-        import xarray as xr
-
-        data = {
-            "correlation": ("angle", self.correlations, {"units": "1", "long_name": "correlation K_c"}),
-            "displacement": (
-                "step",
-                self.displacement,
-                {"units": "unit of the series squared", "long_name": "mean square displacement, corrected"},
-            ),
-            "p": ("number", self.p, {"units": "unit of the series", "long_name": "path, first coordinate"}),
-            "q": ("number", self.q, {"units": "unit of the series", "long_name": "path, second coordinate"}),
+        places = {"step": ("number of steps", len(self.displacement)), "number": ("place", self.length)}
+        return super().entries() | {
+            name: (
+                Column("1", meaning, (name,), "coordinate", name=name),
+                np.arange(1, count + 1, dtype=np.int32),
+            )
+            for name, (meaning, count) in places.items()
         }
-        coords = {
-            "angle": ("angle", self.angles, {"units": "rad", "long_name": "angle c"}),
-            "step": ("step", np.arange(1, len(self.displacement) + 1, dtype=np.int32)),
-            "number": ("number", np.arange(1, self.length + 1, dtype=np.int32)),
-        }
-        attrs = {
-            "title": "0-1 test for chaos",
-            "k": self.k,
-            "verdict": self.verdict,
-            "reason": self.reason,
-            "cycle": self.cycle,
-            "resolution": self.resolution,
-            "seed": self.seed,
-            "shown_angle": float(self.angles[self.shown]),
-        }
-        return xr.Dataset(data, coords=coords, attrs=attrs)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw path, mean square displacement and correlations; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.lyapunov").plot_zero_one(self, **options)
 
 
 def zero_one(
@@ -232,10 +198,20 @@ def zero_one(
     length = numbers.size
     if stopped:
         unknown = np.full(length, np.nan)
-        none = np.full(many, np.nan)
         return ZeroOne(
-            *(math.nan, "undecided", stopped, length, 1, least, seed, chosen, none, 0),
-            *(unknown[: length // _CUT], unknown, unknown),
+            k=math.nan,
+            verdict="undecided",
+            reason=stopped,
+            length=length,
+            cycle=1,
+            resolution=least,
+            seed=seed,
+            angles=chosen,
+            correlations=np.full(many, np.nan),
+            shown=0,
+            displacement=unknown[: length // _CUT],
+            p=unknown,
+            q=unknown,
         )
     cycle, rest = without_cycle(numbers, least)
     found = np.concatenate(

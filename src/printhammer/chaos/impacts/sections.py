@@ -1,4 +1,4 @@
-"""Impact maps: the state at each touch of the backstop or of the pack.
+"""Impact maps: Poincaré sections at the touches of the backstop or of the pack.
 
 At a touch the displacement is that of the surface. What decides all that follows is the velocity and the time
 since the last firing; from touch to touch these two are an iterated map, as the strobe is from firing to
@@ -7,27 +7,24 @@ firing, only that here the armature tells when to look.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, Unpack, get_args
+from typing import TYPE_CHECKING, Final, Literal, SupportsIndex, Unpack, get_args
 
 import numpy as np
 
-from printhammer.chaos.strobe.points import transient_of
 from printhammer.chaos.strobe.train import Train
 from printhammer.drive.input import MOST_PULSES, read_count
 from printhammer.errors import InputError
+from printhammer.results import Result, column, derived, part, scalar
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.regime import Regime, regimes_of
 from printhammer.run.start import initial_state
 from printhammer.run.touches import touches_of
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
@@ -46,53 +43,47 @@ TOUCHES: Final = 1000
 _FIRINGS_A_TOUCH: Final = 10
 
 
-@dataclass(frozen=True)
-class Section:
-    """States of a hammer at the touches of a surface.
+class Section(Result):
+    """States of a hammer at the touches of a surface."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    drive : Drive
-        The drive.
-    period : float
-        Time between firings, s.
-    surface : str
-        "pack" or "backstop".
-    first, last : int
-        Firings between which touches were looked for; the very first one is number 1.
-    t, v : array, shape (n,)
-        Time, s, and velocity, m/s, at each touch.
-    firing : int array, shape (n,)
-        Number of the latest firing at or before the touch.
-    since : array, shape (n,)
-        Time from that firing to the touch, s.
-    t_out, v_out : array, shape (n,)
-        Time, s, and velocity, m/s, at leaving; NaN where the contact is open at the end of the run.
-    wanted : int
-        Number of touches asked for; there are fewer where the surface is not touched often enough.
-    status : str
-        How the run ended.
-    tolerance : float
-        Tolerance of the integration.
-    """
+    hammer: Hammer = part("the hammer")
+    drive: Drive = part("the drive")
+    period: float = scalar("s", "time between firings")
+    surface: Surface = scalar("", '"pack" or "backstop"')
+    first: int = scalar(
+        "1",
+        "first of the firings between which touches were looked for",
+        more="the very first one is number 1",
+    )
+    last: int = scalar("1", "last of them")
+    t: FloatArray = column("s", "time of touch", "touch")
+    v: FloatArray = column("m/s", "velocity at touch", "touch")
+    firing: npt.NDArray[np.int64] = column(
+        "1", "number of the latest firing", "touch", more="at or before the touch", dtype=np.int32
+    )
+    since: FloatArray = column("s", "time since the last firing", "touch")
+    t_out: FloatArray = column(
+        "s", "time of leaving", "touch", more="nan where the contact is open at the end of the run"
+    )
+    v_out: FloatArray = column("m/s", "velocity at leaving", "touch", more="nan likewise")
+    wanted: int = scalar(
+        "1",
+        "number of touches asked for",
+        more="fewer where the surface is not touched often enough",
+    )
+    status: str = part("how the run ended")
+    tolerance: float = part("tolerance of the integration")
 
-    hammer: Hammer
-    drive: Drive
-    period: float
-    surface: Surface
-    first: int
-    last: int
-    t: FloatArray = field(repr=False)
-    v: FloatArray = field(repr=False)
-    firing: npt.NDArray[np.int64] = field(repr=False)
-    since: FloatArray = field(repr=False)
-    t_out: FloatArray = field(repr=False)
-    v_out: FloatArray = field(repr=False)
-    wanted: int
-    status: str
-    tolerance: float
+    @property
+    def title(self) -> str:
+        """One line that says what the touches are."""
+        return f"touches of the {self.surface} by {self.hammer.name}, fired every {self.period:.9g} s"
+
+    @property
+    @derived("1", "number of the touch", "touch", kind="coordinate", dtype=np.int32)
+    def touch(self) -> npt.NDArray[np.int64]:
+        """Numbers of the touches, from 1 on."""
+        return np.arange(1, len(self.t) + 1)
 
     @property
     def ok(self) -> bool:
@@ -115,56 +106,6 @@ class Section:
             f"{len(self.t)} of {self.wanted} touches of the {self.surface} from firing {self.first} to"
             f" {self.last}{why}"
         )
-
-    @property
-    def provenance(self) -> dict[str, Any]:
-        """Where the touches come from: fingerprints, versions, tolerance."""
-        import numba
-
-        from printhammer import __version__
-
-        return {
-            "hammer": self.hammer.name,
-            "hammer_fingerprint": self.hammer.fingerprint,
-            "drive": repr(self.drive),
-            "drive_fingerprint": self.drive.fingerprint,
-            "period": self.period,
-            "surface": self.surface,
-            "first": self.first,
-            "last": self.last,
-            "wanted": self.wanted,
-            "status": self.status,
-            "tolerance": repr(self.tolerance),
-            "printhammer": __version__,
-            "numpy": np.__version__,
-            "numba": numba.__version__,
-        }
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the touches as a Dataset over `touch`, with units and provenance in the attributes."""
-        import xarray as xr
-
-        meanings = {
-            "t": ("s", "time of touch"),
-            "v": ("m/s", "velocity at touch"),
-            "since": ("s", "time since the last firing"),
-            "t_out": ("s", "time of leaving"),
-            "v_out": ("m/s", "velocity at leaving"),
-        }
-        data: dict[str, Any] = {
-            name: ("touch", getattr(self, name), {"units": unit, "long_name": meaning})
-            for name, (unit, meaning) in meanings.items()
-        }
-        number = {"units": "1", "long_name": "number of the latest firing"}
-        data["firing"] = ("touch", self.firing.astype(np.int32), number)
-        coords = {"touch": ("touch", np.arange(1, len(self.t) + 1, dtype=np.int32))}
-        title = f"touches of the {self.surface} by {self.hammer.name}, fired every {self.period:.9g} s"
-        return xr.Dataset(data, coords=coords, attrs={"title": title, **self.provenance})
-
-    def plot(self, **options: Any) -> Any:
-        """Draw velocity against time since the last firing; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.sections").plot(self, **options)
 
 
 def section(
@@ -257,21 +198,14 @@ def sections(
     check_tolerance(tolerance)
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
     trains = [Train.of(regime, counts[1] + counts[2]) for regime in regimes]
-    found: dict[int, Section] = {}
-
-    def work(begin: int, end: int) -> None:
-        for i in range(begin, end):
-            found[i] = _section(trains[i], surface, counts, tolerance)
-
-    in_threads([work], [len(trains)], thread_count(threads), progress)
-    return [found[i] for i in range(len(trains))]
+    return mapped(lambda train: _section(train, surface, counts, tolerance), trains, threads, progress)
 
 
 def _counts(
     touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
 ) -> tuple[int, int, int]:
     """Return the numbers of touches, of firings left out, and of firings after which to give up."""
-    wanted, skipped = read_count(touches, "touches"), transient_of(transient)
+    wanted, skipped = read_count(touches, "touches"), read_count(transient, "transient", least=0)
     room = MOST_PULSES - skipped - 1
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
     if not 1 <= limit <= room:

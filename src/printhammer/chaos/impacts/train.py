@@ -9,8 +9,6 @@ Analysis of Series of Events, 1966, chapters 4 and 5).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
@@ -19,11 +17,11 @@ from printhammer.chaos.impacts.sections import Section, section
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.results import Column, Result, column, derived, part, provenance, scalar
 from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
@@ -39,49 +37,49 @@ _SAME: Final = 1e-9
 """Part of an interval up to which differences count as none."""
 
 
-@dataclass(frozen=True)
-class ImpactTrain:
-    """Intervals between impacts, and what they tell.
+class ImpactTrain(Result):
+    """Intervals between impacts, and what they tell."""
 
-    Attributes
-    ----------
-    times : array, shape (n + 1,)
-        Times of the impacts, s.
-    intervals : array, shape (n,)
-        Times between successive ones, s.
-    mean, deviation : float
-        Mean and standard deviation of the intervals, s.
-    variation : float
-        Coefficient of variation, deviation over mean: 0 for a clock, 1 for a Poisson process.
-    edges : array, shape (m + 1,)
-        Edges of the bins of the histogram, s.
-    counts : int array, shape (m,)
-        Intervals in each bin.
-    autocorrelation : array, shape (l + 1,)
-        Of the intervals, at the lags 0, 1, ... l; NaN where all intervals are the same.
-    window : float
-        Length of the windows in which impacts are counted, s.
-    windows : int
-        Number of windows; they follow each other from half a mean interval before the first impact on.
-    fano : float
-        Variance over mean of the numbers of impacts in the windows: 1 for a Poisson process; NaN for fewer
-        than two windows.
-    source : Section or None
-        Where the times come from.
-    """
+    times: FloatArray = column("s", "time of the impact", "impact", name="t")
+    intervals: FloatArray = part("times between successive impacts, s", more="one fewer", repr=False)
+    mean: float = scalar("s", "mean of the intervals")
+    deviation: float = scalar("s", "standard deviation of the intervals")
+    variation: float = scalar(
+        "1",
+        "coefficient of variation, deviation over mean",
+        more="0 for a clock, 1 for a Poisson process",
+    )
+    edges: FloatArray = part("edges of the bins of the histogram, s", more="one more than bins", repr=False)
+    counts: npt.NDArray[np.int64] = column("1", "intervals in the bin", "bin", name="count", dtype=np.int32)
+    autocorrelation: FloatArray = column(
+        "1",
+        "autocorrelation of the intervals",
+        "lag",
+        more="from lag 0 on; nan where all intervals are the same",
+    )
+    window: float = scalar("s", "length of the windows in which impacts are counted")
+    windows: int = scalar(
+        "1",
+        "number of windows",
+        more="they follow each other from half a mean interval before the first impact on",
+    )
+    fano: float = scalar(
+        "1",
+        "variance over mean of the numbers of impacts in the windows",
+        more="1 for a Poisson process, nan for fewer than two windows",
+    )
+    source: Section | None = part("where the times come from", repr=False)
 
-    times: FloatArray = field(repr=False)
-    intervals: FloatArray = field(repr=False)
-    mean: float
-    deviation: float
-    variation: float
-    edges: FloatArray = field(repr=False)
-    counts: npt.NDArray[np.int64] = field(repr=False)
-    autocorrelation: FloatArray = field(repr=False)
-    window: float
-    windows: int
-    fano: float
-    source: Section | None = field(repr=False)
+    @property
+    def title(self) -> str:
+        """One line that says what this is."""
+        return "impact train"
+
+    @property
+    @derived("s", "time since the impact before", "impact")
+    def interval(self) -> FloatArray:
+        """The intervals, NaN before the first."""
+        return np.concatenate([[np.nan], self.intervals])
 
     @property
     def hammer(self) -> Hammer | None:
@@ -93,43 +91,32 @@ class ImpactTrain:
         """What the autocorrelation of n independent intervals exceeds once in twenty lags, 1.96/sqrt(n)."""
         return 1.96 / math.sqrt(len(self.intervals))
 
-    def to_dataset(self) -> xr.Dataset:
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the times come from."""
+        return provenance() if self.source is None else self.source.provenance
+
+    def notes(self) -> dict[str, Any]:
+        """Return which touches were looked for, for the attributes of the Dataset."""
+        return {name: getattr(self.source, name, None) for name in ("surface", "first", "last", "wanted")}
+
+    def entries(self) -> dict[str, tuple[Column, Any]]:
         """Return times over `impact`, histogram over `bin` and autocorrelation over `lag`."""
-        import xarray as xr
-
-        after = np.concatenate([[np.nan], self.intervals])
-        data = {
-            "t": ("impact", self.times, {"units": "s", "long_name": "time of the impact"}),
-            "interval": ("impact", after, {"units": "s", "long_name": "time since the impact before"}),
-            "count": (
-                "bin",
-                self.counts.astype(np.int32),
-                {"units": "1", "long_name": "intervals in the bin"},
+        places = {
+            "impact": (
+                "1",
+                "number of the impact",
+                "impact",
+                np.arange(1, len(self.times) + 1, dtype=np.int32),
             ),
-            "autocorrelation": (
-                "lag",
-                self.autocorrelation,
-                {"units": "1", "long_name": "autocorrelation of the intervals"},
-            ),
+            "lower_edge": ("s", "lower edge of the bin", "bin", self.edges[:-1]),
+            "upper_edge": ("s", "upper edge of the bin", "bin", self.edges[1:]),
+            "lag": ("1", "lag", "lag", np.arange(len(self.autocorrelation), dtype=np.int32)),
         }
-        coords = {
-            "impact": ("impact", np.arange(1, len(self.times) + 1, dtype=np.int32)),
-            "lower_edge": ("bin", self.edges[:-1], {"units": "s", "long_name": "lower edge of the bin"}),
-            "upper_edge": ("bin", self.edges[1:], {"units": "s", "long_name": "upper edge of the bin"}),
-            "lag": ("lag", np.arange(len(self.autocorrelation), dtype=np.int32)),
+        return super().entries() | {
+            name: (Column(unit, meaning, (dim,), "coordinate", name=name), values)
+            for name, (unit, meaning, dim, values) in places.items()
         }
-        names = ("mean", "deviation", "variation", "window", "windows", "fano")
-        attrs = {
-            "title": "impact train",
-            **{name: getattr(self, name) for name in names},
-            **({} if self.source is None else self.source.provenance),
-        }
-        return xr.Dataset(data, coords=coords, attrs=attrs)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw histogram, return map and autocorrelation of the intervals; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.impact_train").plot(self, **options)
 
 
 def impact_train(

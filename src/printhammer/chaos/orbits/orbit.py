@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from importlib import import_module
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.chaos.strobe.map import margin_of
 from printhammer.derivatives.states import follow
+from printhammer.results import Column, Result, column, derived, part
+from printhammer.results.files import plain
+from printhammer.results.result import named_codes
+from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping, Sequence
 
     import numpy.typing as npt
-    import xarray as xr
+    import pandas as pd
 
     from printhammer.chaos.orbits.newton import Closing
     from printhammer.run.contacts import Contact, Dot
@@ -40,65 +43,88 @@ CLOSES: Final = 1e-6
 multiplier if that is more than 1, with which an orbit counts as one."""
 
 _OK: Final = "ok"
+_KIND: Final = Column(
+    "1", "what becomes of small changes of the state", (), name="kind", dtype=np.int32, codes=KINDS
+)
+_ENERGIES: Final = {
+    "coil_work": "work of the coil in a period of the orbit",
+    "drive_work": "work of a drive that is a force in a period of the orbit",
+    "pack_loss": "energy that the pack takes in a period of the orbit",
+    "backstop_loss": "energy that the backstop takes in a period of the orbit",
+}
+_SECTION: Final = (
+    ("section_x", "m", "displacement at the section"),
+    ("section_v", "m/s", "velocity at the section"),
+)
 _POINTS: Final = 2001
 
 
-@dataclass(frozen=True, eq=False)
-class Orbit:
+class Orbit(Result):
     """A periodic motion of a hammer under a periodic drive.
 
-    Attributes
-    ----------
-    regime : Regime
-        Hammer and periodic drive, and phase of the section at which the orbit was found.
-    firings : int
-        Number of firings after which the motion repeats, and no smaller number.
-    x, v : array, shape (firings,)
-        Displacement, m, and velocity, m/s, at the firings.
-    branch : int array, shape (firings,)
-        Code of the mode of motion there, a place in `printhammer.run.ensemble.MODE_NAMES`.
-    memory : array, shape (firings,)
-        Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0.
-    section : array, shape (2,)
-        Displacement, m, and velocity, m/s, there.
-    multipliers : complex array, shape (2,)
-        Eigenvalues of the derivative of the state after a period of the orbit with respect to that before
-        it, the larger absolute value first. NaN where the motion has no derivative.
-    smooth : bool
-        False where the motion passes a touch without velocity.
-    residual : float
-        Distance of the state from itself after one period, re-integrated as a whole, in half-widths of the
-        window.
-    contacts : tuple of Contact
-        All contacts that begin in one period of the orbit; times from its first firing on.
-    dots : tuple of Dot
-        What each firing did on the paper, times from the first firing on; empty under an endless force.
-    energy : Ledger
-        Energies of one period of the orbit, J.
-    margin : float
-        Signed nearness of a grazing, see `printhammer.chaos.strobe.map.Image`.
-    tolerance : float
-        Of the integration.
-    status : str
-        "ok", or why there is no such orbit: all numbers are NaN then.
+    Its Floquet multipliers are the eigenvalues of the monodromy matrix, the derivative of the state after a
+    period of the orbit with respect to that before it.
     """
 
-    regime: Regime
-    firings: int
-    x: FloatArray
-    v: FloatArray
-    branch: npt.NDArray[np.int64] = field(repr=False)
-    memory: FloatArray = field(repr=False)
-    section: FloatArray = field(repr=False)
-    multipliers: npt.NDArray[np.complex128]
-    smooth: bool
-    residual: float
-    contacts: tuple[Contact, ...] = field(repr=False)
-    dots: tuple[Dot, ...] = field(repr=False)
-    energy: Ledger | None = field(repr=False)
-    margin: float
-    tolerance: float
-    status: str
+    regime: Regime = part("hammer, periodic drive, and phase of the section at which the orbit was found")
+    firings: int = column(
+        "1", "firings after which the motion repeats", "", more="and no smaller number", dtype=np.int32
+    )
+    x: FloatArray = column("m", "displacement at the firing", "firing")
+    v: FloatArray = column("m/s", "velocity at the firing", "firing")
+    branch: npt.NDArray[np.int64] = column(
+        "1",
+        "mode of motion at the firing",
+        "firing",
+        more="a place in `printhammer.run.ensemble.MODE_NAMES`",
+        dtype=np.int32,
+        codes=MODE_NAMES,
+    )
+    memory: FloatArray = column(
+        "m", "latest local maximum inside the pack", "firing", more="0 but on the unloading branch"
+    )
+    section: FloatArray = part(
+        "displacement, m, and velocity, m/s, at the section", more="shape (2,)", repr=False
+    )
+    multipliers: npt.NDArray[np.complex128] = part(
+        "Floquet multipliers, the larger absolute value first",
+        more="shape (2,); nan where the motion has no derivative",
+    )
+    smooth: bool = column(
+        "1",
+        "whether the motion has a derivative",
+        "",
+        more="not where it passes a touch without velocity",
+        dtype=np.int32,
+    )
+    residual: float = column(
+        "1",
+        "distance from itself after a period, in half-widths of the window",
+        "",
+        more="re-integrated whole",
+    )
+    contacts: tuple[Contact, ...] = part(
+        "all contacts that begin in a period of the orbit, times from its first firing on", repr=False
+    )
+    dots: tuple[Dot, ...] = part(
+        "what each firing did on the paper, times from the first firing on",
+        more="empty under an endless force",
+        repr=False,
+    )
+    energy: Ledger | None = part("energies of a period of the orbit, J", repr=False)
+    margin: float = column(
+        "1",
+        "signed nearness of a grazing, in units of the way from backstop to pack",
+        "",
+        more="see `printhammer.chaos.strobe.map.Image`",
+    )
+    tolerance: float = part("tolerance of the integration")
+    status: str = part('"ok", or why there is no such orbit', more="all numbers are nan then")
+
+    @property
+    def title(self) -> str:
+        """One line that says what the orbit is."""
+        return f"{self.name} of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     @property
     def ok(self) -> bool:
@@ -106,11 +132,13 @@ class Orbit:
         return self.status == _OK
 
     @property
+    @derived("1", "part of the drive's period from the first firing to the section", kind="column")
     def phase(self) -> float:
         """Part of the period of the drive from the first of the firings to the section."""
         return self.regime.phase
 
     @property
+    @derived("s", "time after which the motion repeats", kind="column")
     def period(self) -> float:
         """Time after which the motion repeats, s."""
         return self.firings * self.regime.period
@@ -133,31 +161,37 @@ class Orbit:
         return self.kind == STABLE
 
     @property
+    @derived("1", "backstop contacts in a period of the orbit", kind="column", dtype=np.int32)
     def backstop_contacts(self) -> int:
         """Number of backstop contacts in a period of the orbit."""
         return sum(contact.surface == "backstop" for contact in self.contacts)
 
     @property
+    @derived("1", "pack contacts in a period of the orbit", kind="column", dtype=np.int32)
     def pack_contacts(self) -> int:
         """Number of pack contacts in a period of the orbit."""
         return sum(contact.surface == "pack" for contact in self.contacts)
 
     @property
+    @derived("1", "dots that the firings of a period make", kind="column", dtype=np.int32)
     def printed(self) -> int:
         """Number of dots that the firings of a period make."""
         return sum(dot.struck for dot in self.dots)
 
     @property
+    @derived("1", "firings of a period that make no dot", kind="column", dtype=np.int32)
     def lost(self) -> int:
         """Number of firings of a period that make no dot."""
         return len(self.dots) - self.printed
 
     @property
+    @derived("s", "from the firing to the touch of the pack", "firing", name="flight_time")
     def flight_times(self) -> FloatArray:
         """Time from each firing to its dot, s; NaN for a lost one."""
         return _numbers(dot.flight_time for dot in self.dots)
 
     @property
+    @derived("N", "largest pack force of the dot", "firing", name="peak_force")
     def peak_forces(self) -> FloatArray:
         """Largest pack force of each dot, N; NaN for a lost one."""
         return _numbers(dot.peak_force for dot in self.dots)
@@ -169,10 +203,33 @@ class Orbit:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the orbit comes from: fingerprints, versions, tolerance."""
-        from printhammer.chaos.orbits.tables import provenance_of
+        """Where the orbit comes from: fingerprint, drive, tolerance, versions."""
+        return {**super().provenance, "period": self.regime.period}
 
-        return {**provenance_of(self.regime, self.tolerance), "status": self.status}
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return states over `firing`, multipliers over `multiplier`, and numbers of the whole orbit."""
+        own = super().entries()
+        # Under an endless force there are no dots, and yet firings.
+        for name in ("flight_time", "peak_force"):
+            note, values = own[name]
+            own[name] = note, values if len(values) else np.full(self.firings, np.nan)
+        own["kind"] = _KIND, KINDS.index(self.kind)
+        for name, meaning in _ENERGIES.items():
+            value = math.nan if self.energy is None else float(getattr(self.energy, name))
+            own[name] = Column("J", meaning, (), name=name), value
+        for place, (name, unit, meaning) in enumerate(_SECTION):
+            own[name] = Column(unit, meaning, (), name=name), float(self.section[place])
+        for name in ("real", "imag"):
+            note = Column("1", f"{name} part of the multipliers", ("multiplier",), name=f"multiplier_{name}")
+            own[note.name] = note, getattr(self.multipliers, name)
+        for name, count in (("firing", self.firings), ("multiplier", 2)):
+            note = Column("1", f"number of the {name}", (name,), "coordinate", name=name, dtype=np.int32)
+            own[name] = note, np.arange(count)
+        return own
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each firing, with what is known of the whole orbit in each."""
+        return orbits_table([self], self.attributes)
 
     def motion(self) -> Motion:
         """Return one period of the orbit, re-integrated from its section.
@@ -187,17 +244,6 @@ class Orbit:
         if not self.ok:
             raise ValueError(f"there is no such orbit: {self.status}")
         return _Run(self.regime, self.section, self.firings, self.tolerance).motion
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the orbit as a Dataset over its firings, with units and provenance in the attributes."""
-        from printhammer.chaos.orbits.tables import orbit_dataset
-
-        return orbit_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the orbit in the plane of displacement and velocity and against time; a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.orbits").plot_orbit(self, **options)
 
 
 def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orbit:
@@ -363,3 +409,28 @@ def _earlier(contact: Contact, back: float, firing: int | None) -> Contact:
 
 def _numbers(values: Iterable[float | None]) -> FloatArray:
     return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def orbits_table(found: Sequence[Orbit], attributes: Mapping[str, Any]) -> pd.DataFrame:
+    """Return orbits as a table, a row for each firing of each."""
+    import pandas as pd
+
+    tables = []
+    for number, orbit in enumerate(found):
+        columns: dict[str, Any] = {"orbit": np.full(orbit.firings, number)}
+        entries = orbit.entries()
+        for name, (note, value) in entries.items():
+            if not note.dims:
+                named = note.codes[value] if note.codes else note.dtype(value) if note.dtype else value
+                columns[note.heading(name)] = np.full(orbit.firings, named)
+        for k, multiplier in enumerate(orbit.multipliers.tolist()):
+            columns[f"multiplier_real {k + 1}"] = np.full(orbit.firings, multiplier.real)
+            columns[f"multiplier_imag {k + 1}"] = np.full(orbit.firings, multiplier.imag)
+        columns["firing"] = entries["firing"][1]
+        for name, (note, values) in entries.items():
+            if note.dims == ("firing",) and note.kind == "column":
+                columns[note.heading(name)] = named_codes(values, note)
+        tables.append(pd.DataFrame(columns))
+    table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["orbit", "firing"])
+    table.attrs.update(plain(dict(attributes)))
+    return table

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field, replace
-from importlib import import_module
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
@@ -12,19 +11,21 @@ import numpy as np
 from printhammer.chaos.orbits.guesses import PHASES, close_returns, first_state, joined, record, spread
 from printhammer.chaos.orbits.maps import ExactMaps, FastMaps
 from printhammer.chaos.orbits.newton import Closing, close_orbits
-from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, no_orbit, orbit_of
-from printhammer.chaos.strobe.map import MAP_TOLERANCE
+from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, no_orbit, orbit_of, orbits_table
+from printhammer.chaos.strobe.map import MAP_TOLERANCE, read_state
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.results import Column, Result, part, scalar
+from printhammer.results.stacking import stacked
 from printhammer.run.problem import TOLERANCE, check_tolerance
 from printhammer.run.regime import Regime
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     import numpy.typing as npt
-    import xarray as xr
+    import pandas as pd
 
     from printhammer.chaos.orbits.guesses import Guess, Records
     from printhammer.hammer.hammer import Hammer
@@ -49,40 +50,25 @@ _EXACT: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 8}
 _LONE: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 60}
 
 
-@dataclass(frozen=True)
-class Orbits:
+class Orbits(Result):
     """The periodic orbits that a search has found, and what became of the search.
 
     That an orbit is not among them does not prove that there is none.
-
-    Attributes
-    ----------
-    regime : Regime
-        Hammer and periodic drive.
-    found : tuple of Orbit
-        By number of firings; stable ones first.
-    longest : int
-        Largest number of firings that was looked for.
-    starts : int
-        Number of motions in which close returns were looked for.
-    guesses : tuple of int
-        Number of guesses for orbits of 1, 2, ... firings.
-    repeats : int
-        How many guesses led to an orbit that another one led to as well, or to one of fewer firings.
-    failures : mapping of str to int
-        How many guesses led nowhere, by reason.
-    tolerance : float
-        Of the integration.
     """
 
-    regime: Regime
-    found: tuple[Orbit, ...]
-    longest: int
-    starts: int
-    guesses: tuple[int, ...]
-    repeats: int
-    failures: Mapping[str, int] = field(default_factory=dict)
-    tolerance: float = MAP_TOLERANCE
+    regime: Regime = part("hammer and periodic drive")
+    found: tuple[Orbit, ...] = part("the orbits, by number of firings, stable ones first")
+    longest: int = scalar("1", "largest number of firings that was looked for")
+    starts: int = scalar("1", "number of motions in which close returns were looked for")
+    guesses: tuple[int, ...] = scalar("1", "number of guesses for orbits of 1, 2, ... firings")
+    repeats: int = scalar("1", "how many guesses led to an orbit of another one, or to one of fewer firings")
+    failures: Mapping[str, int] = part("how many guesses led nowhere, by reason")
+    tolerance: float = part("tolerance of the integration")
+
+    @property
+    def title(self) -> str:
+        """One line that says what the orbits are."""
+        return f"periodic orbits of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     def __len__(self) -> int:
         return len(self.found)
@@ -116,31 +102,22 @@ class Orbits:
         ends += [f"{number}: {reason}" for reason, number in sorted(self.failures.items())]
         return f"{head}{f' ({what})' if what else ''}; {tried}{': ' if ends else ''}{'; '.join(ends)}"
 
-    @property
-    def provenance(self) -> dict[str, Any]:
-        """Where the orbits come from: fingerprints, versions, tolerance, and the search."""
-        from printhammer.chaos.orbits.tables import provenance_of
+    def notes(self) -> dict[str, Any]:
+        """Return what became of the search, for the attributes of the Dataset."""
+        ends = "; ".join(f"{number}: {reason}" for reason, number in sorted(self.failures.items()))
+        return {"failures": ends, "search": self.message}
 
-        return {
-            **provenance_of(self.regime, self.tolerance),
-            "longest": self.longest,
-            "starts": self.starts,
-            "guesses": list(self.guesses),
-            "repeats": self.repeats,
-            "failures": "; ".join(f"{number}: {reason}" for reason, number in sorted(self.failures.items())),
-            "search": self.message,
-        }
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return what is known of the orbits over `orbit`, `firing` and `multiplier`.
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the orbits as a Dataset over `orbit` and `firing`, with units and provenance."""
-        from printhammer.chaos.orbits.tables import orbits_dataset
+        Beyond the last firing of an orbit numbers are NaN, and the mode is -1.
+        """
+        number = Column("1", "number of the orbit", ("orbit",), "coordinate", name="orbit", dtype=np.int32)
+        return {"orbit": (number, np.arange(len(self.found))), **stacked(self.found, "orbit", Orbit)}
 
-        return orbits_dataset(self)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the orbits in the plane of displacement and velocity; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.chaos.orbits").plot(self, **options)
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each firing of each orbit."""
+        return orbits_table(self.found, self.attributes)
 
 
 def orbits(
@@ -240,11 +217,7 @@ def orbit(
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     check_tolerance(tolerance)
-    found = np.asarray(state, dtype=np.float64)
-    if found.shape != (2,) or not np.isfinite(found).all():
-        raise InputError(
-            f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
-        )
+    found = read_state(state)
     if count > MOST_FIRINGS:
         raise InputError(f"firings = {count}, expected at most {MOST_FIRINGS}")
     scales = regime.window.half_widths
@@ -321,14 +294,14 @@ class _Search:
         found = self._described(closed)
         self._tell(1)
         return Orbits(
-            self.regime,
-            tuple(found),
-            self.longest,
-            len(begun),
-            tuple(self.tried),
-            self.repeats,
-            dict(self.failures),
-            self.tolerance,
+            regime=self.regime,
+            found=tuple(found),
+            longest=self.longest,
+            starts=len(begun),
+            guesses=tuple(self.tried),
+            repeats=self.repeats,
+            failures=dict(self.failures),
+            tolerance=self.tolerance,
         )
 
     def _tell(self, more: int) -> None:
@@ -372,22 +345,14 @@ class _Search:
 
     def _described(self, closed: Sequence[tuple[Regime, Closing]]) -> list[Orbit]:
         """Return all about the orbits, without those that were found at another section too."""
-        every: dict[int, Orbit] = {}
-
-        def work(begin: int, end: int) -> None:
-            for i in range(begin, end):
-                regime, closing = closed[i]
-                every[i] = orbit_of(regime, closing, self.tolerance)
-
-        in_threads([work], [len(closed)], self.threads)
         found: list[Orbit] = []
-        for i in range(len(closed)):
-            if not every[i].ok:
-                self.failures[every[i].status] += 1
-            elif any(self._same(every[i], other) for other in found):
+        for one in mapped(lambda pair: orbit_of(*pair, self.tolerance), closed, self.threads):
+            if not one.ok:
+                self.failures[one.status] += 1
+            elif any(self._same(one, other) for other in found):
                 self.repeats += 1
             else:
-                found.append(every[i])
+                found.append(one)
         return sorted(found, key=lambda orbit: (orbit.firings, KINDS.index(orbit.kind), *orbit.x, *orbit.v))
 
     def _same(self, one: Orbit, other: Orbit) -> bool:

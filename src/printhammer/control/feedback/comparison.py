@@ -8,8 +8,7 @@ of eight slots; so does the open loop, and both fire two pulses at all distances
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -26,6 +25,8 @@ from printhammer.printing.dots.slots import slots_of
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
+from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.declare import Column
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.simulate import simulate
 
@@ -33,13 +34,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.control.feedback.driver import Driver
     from printhammer.drive.sequence import PulseSequence
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
     from printhammer.printing.dots.strategy import Strategy
+    from printhammer.results.result import Entries
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
 
@@ -49,6 +50,7 @@ BURST: Final = "11101101"
 MOST_GAPS: Final = 500
 """Number of gaps above which a double-pulse test is refused."""
 
+# First and last gap of the double-pulse test, in flight times of the single pulse, and their number
 _GAPS: Final = (1.5, 6.0, 46)
 
 
@@ -92,7 +94,7 @@ class FeedbackStrategy:
 
 
 @dataclass(frozen=True)
-class Seen:
+class ObservedRun:
     """One run of the closed loop, and what the controller saw of it.
 
     Attributes
@@ -114,82 +116,72 @@ class Seen:
     due: FloatArray = field(repr=False)
 
 
-@dataclass(frozen=True)
-class Feedback:
-    """Strategies side by side, feedback the last of them.
+_DOTS: Final = "strategy pattern dot"
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The nominal hammer, for which the controller is made.
-    driven : Hammer
-        The hammer that is driven.
-    driver : Driver
-        Of the coil, with feedback.
-    sensor : PositionSensor
-        What the controller sees.
-    limits : Limits
-        How far dots may be off.
-    single : Nominal
-        The single-pulse dot of the nominal hammer, by which all are judged.
-    rate : float
-        Slots per second, Hz.
-    strategies : tuple of str
-        Names of the ways to drive, (S,).
-    passed : bool array, shape (S, P)
-        Whether a pattern is printed within limits.
-    force : array, shape (S, P, 8)
-        Force less that of the single pulse, in parts of it; NaN where no dot is wanted or it is lost.
-    arrival : array, shape (S, P, 8)
-        Touch less slot time and flight time of the single pulse, s; NaN likewise.
-    lost, extra_contacts : int array, shape (S,)
-        Number of lost dots and of extra contacts.
-    peak_current : array, shape (S,)
-        Largest absolute value of any drive, A.
-    gaps : array, shape (G,)
-        Times between the two slots of the double-pulse test, s.
-    gap_force, gap_arrival : array, shape (S, G)
-        Deviations of the second dot: of the force in parts, of the arrival, s; NaN for a lost one.
-    seen : Seen
-        One run with feedback.
-    tolerance : float
-        Of the integration.
-    """
 
-    hammer: Hammer
-    driven: Hammer
-    driver: Driver
-    sensor: PositionSensor
-    limits: Limits
-    single: Nominal
-    rate: float
-    strategies: tuple[str, ...]
-    passed: npt.NDArray[np.bool_] = field(repr=False)
-    force: FloatArray = field(repr=False)
-    arrival: FloatArray = field(repr=False)
-    lost: npt.NDArray[np.int64]
-    extra_contacts: npt.NDArray[np.int64]
-    peak_current: FloatArray
-    gaps: FloatArray = field(repr=False)
-    gap_force: FloatArray = field(repr=False)
-    gap_arrival: FloatArray = field(repr=False)
-    seen: Seen = field(repr=False)
-    tolerance: float
+class Feedback(Result, rows=_DOTS):
+    """Strategies side by side, feedback the last of them."""
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return all deviations as a Dataset, with units and provenance in the attributes."""
-        from printhammer.control.feedback.tables import feedback_dataset
+    hammer: Hammer = part("the nominal hammer, for which the controller is made")
+    driven: Hammer = part("the hammer that is driven")
+    driver: Driver = part("driver of the coil, with feedback")
+    sensor: PositionSensor = part("what the controller sees")
+    limits: Limits = part("how far dots may be off")
+    single: Nominal = part("the single-pulse dot of the nominal hammer, by which all are judged")
+    rate: float = scalar("Hz", "slots per second")
+    strategies: tuple[str, ...] = coordinate("", "name of the way to drive", "strategy", name="strategy")
+    passed: npt.NDArray[np.bool_] = column(
+        "1", "whether all dots are within limits", "strategy pattern", dtype=np.int8
+    )
+    force: FloatArray = column(
+        "1",
+        "force less that of the single pulse, in parts of it",
+        _DOTS,
+        more="nan where no dot is wanted or it is lost",
+    )
+    arrival: FloatArray = column(
+        "s", "arrival less slot time and single-pulse flight time", _DOTS, more="nan likewise"
+    )
+    lost: npt.NDArray[np.int64] = column("1", "lost dots", "strategy", dtype=np.int32)
+    extra_contacts: npt.NDArray[np.int64] = column("1", "extra contacts", "strategy", dtype=np.int32)
+    peak_current: FloatArray = column("A", "largest absolute value of the current", "strategy")
+    gaps: FloatArray = coordinate("s", "time between two slots", "gap", name="gap")
+    gap_force: FloatArray = column("1", "likewise of the second of two dots", "strategy gap")
+    gap_arrival: FloatArray = column("s", "likewise of the second of two dots", "strategy gap")
+    run: ObservedRun = part("one run with feedback")
+    tolerance: float = part("error allowed in one step")
 
-        return feedback_dataset(self)
+    @property
+    def title(self) -> str:
+        """What is driven."""
+        return f"feedback on {self.hammer.name}"
 
-    def plot(self, **options: Any) -> Any:
-        """Draw the comparison; returns a matplotlib figure, see `printhammer.figures.control.feedback`."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.control.feedback").plot(self, **options)
+    def entries(self) -> Entries:
+        """Return the columns, and what the sensor showed in the run."""
+        samples = {
+            "sample_time": (Column("s", "time of a sample in the run shown", ("sample",)), self.run.times),
+            "shown": (Column("m", "what the sensor showed", ("sample",)), self.run.shown),
+        }
+        named = {name: (replace(note, name=name), values) for name, (note, values) in samples.items()}
+        return {**super().entries(), **named}
+
+    def notes(self) -> dict[str, Any]:
+        """Return driver, sensor, limits, and what the run shows."""
+        return {
+            "driven_fingerprint": self.driven.fingerprint,
+            "largest_current": self.driver.current,
+            "edge": self.driver.edge,
+            **{f"sensor_{name}": value for name, value in asdict(self.sensor).items()},
+            "force_limit": self.limits.force,
+            "arrival_limit": self.limits.arrival,
+            "extra_contacts_limit": self.limits.extra_contacts,
+            "pattern_shown": self.run.pattern,
+            "drive_fingerprint_shown": self.run.motion.drive.fingerprint,
+        }
 
     def plot_run(self, **options: Any) -> Any:
         """Draw the run with what the controller saw; returns a matplotlib figure."""
-        return import_module("printhammer.figures.control.feedback_run").plot(self, **options)
+        return self.plot(picture="run", **options)
 
 
 def feedback(
@@ -272,40 +264,40 @@ def feedback(
         single=single,
         rate=speed,
         strategies=tuple(name_of(way) for way in every),
-        passed=np.array([one.passed for one in judged]),
-        force=np.array([one.force_deviation for one in judged]),
-        arrival=np.array([one.arrival_deviation for one in judged]),
-        lost=np.array([int(one.lost.sum()) for one in judged]),
-        extra_contacts=np.array([int(one.extra_contacts.sum()) for one in judged]),
+        passed=np.array([judgement.passed for judgement in judged]),
+        force=np.array([judgement.force_deviation for judgement in judged]),
+        arrival=np.array([judgement.arrival_deviation for judgement in judged]),
+        lost=np.array([int(judgement.lost.sum()) for judgement in judged]),
+        extra_contacts=np.array([int(judgement.extra_contacts.sum()) for judgement in judged]),
         peak_current=np.array([max(drive.peak for drive in trial.drives) for trial in trials]),
         gaps=between,
         gap_force=np.array([double.judgement.force_deviation[:, 1] for double in doubles]),
         gap_arrival=np.array([double.judgement.arrival_deviation[:, 1] for double in doubles]),
-        seen=_seen(real, controller, seeing, speed, tolerance, threads),
+        run=_observed(real, controller, seeing, speed, tolerance, threads),
         tolerance=read_number(tolerance, "1", "tolerance"),
     )
 
 
-def _checked_gaps(given: npt.ArrayLike) -> FloatArray:
-    gaps = np.asarray(given, dtype=np.float64)
+def _checked_gaps(asked: npt.ArrayLike) -> FloatArray:
+    gaps = np.asarray(asked, dtype=np.float64)
     if gaps.ndim != 1 or not 0 < gaps.size <= MOST_GAPS or not (np.isfinite(gaps) & (gaps > 0.0)).all():
-        raise InputError(f"gaps = {given!r}, expected 1 to {MOST_GAPS} positive times, s")
+        raise InputError(f"gaps = {asked!r}, expected 1 to {MOST_GAPS} positive times, s")
     return gaps
 
 
-def _seen(
+def _observed(
     hammer: Hammer,
     controller: Controller,
     sensor: PositionSensor,
     rate: float,
     tolerance: float,
     threads: int | None,
-) -> Seen:
+) -> ObservedRun:
     slots = slots_of([mark == "1" for mark in BURST])
     loop = closed_loops(hammer, controller, sensor, [slots], rate, tolerance=tolerance, threads=threads)[0]
     drive = loop.drive(controller.driver.edge)
     duration = max(float(loop.due[-1]), float(drive.times[-1])) + 0.5 * WAIT
-    return Seen(
+    return ObservedRun(
         pattern=BURST,
         motion=simulate(hammer, drive, duration=duration, tolerance=tolerance),
         times=np.concatenate([times for times, _shown in loop.seen]),

@@ -6,10 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from printhammer.drive.input import read_positive
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.waveforms.shapes import Switched
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from printhammer.hammer.hammer import Hammer
 
 LARGEST_CURRENT: Final = 2.0
@@ -40,6 +44,43 @@ class Driver:
     def __post_init__(self) -> None:
         read_positive(self.current, "A", "current of the driver")
         read_positive(self.edge, "s", "edge of the driver")
+
+    def switched(self, at: Sequence[float], levels: Sequence[float], initial: float = 0.0) -> Switched:
+        """Return the current that goes to some levels, A, at some times, s."""
+        return Switched(at=tuple(at), levels=tuple(levels), edge=self.edge, initial=initial)
+
+    def push(self, width: float) -> Switched:
+        """Return a push of some width, s, with the largest current."""
+        return self.switched((0.0, width), (self.current, 0.0))
+
+    def drive(self, pulses: Sequence[Switched], at: Sequence[float] = (0.0,)) -> BoundedSequence:
+        """Return pulses of this driver, fired at some times, s."""
+        return BoundedSequence(pulses, at, self.current)
+
+
+class BoundedSequence(PulseSequence):
+    """Pulses of a driver; its bound is taken for the largest of them, so that this need not be sought.
+
+    Parameters
+    ----------
+    waveforms : sequence of Switched
+        What each firing does.
+    at : sequence of float
+        Firing times, s.
+    bound : float
+        Largest current of the driver, A.
+    """
+
+    bounded = True
+
+    def __init__(self, waveforms: Sequence[Switched], at: Sequence[float], bound: float) -> None:
+        super().__init__(waveforms, at=at)
+        self._bound = bound
+
+    @property
+    def largest_pulse(self) -> float:
+        """The bound, A."""
+        return self._bound
 
 
 def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | None = None) -> Driver:

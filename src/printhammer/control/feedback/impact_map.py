@@ -1,10 +1,10 @@
-"""From one touch of the pack to the next: what a hammer does when its coil is switched in a certain way.
+"""The map from one touch of the pack to the next: where each way to switch the coil leads (a Poincaré map).
 
 At the touch the armature has a speed, and the coil is either on already (the armature is *pushed*) or off (it
 flies *freely*: it was released before impact). The coil is then held at the push current until `release`, at
 the return current until `fire`, and at the push current again: up to the next touch and beyond, or for some
 width after which the armature flies freely. Which force this prints, and when and how fast the next touch
-comes, has nothing to do with the rate of printing: one table holds for all rates.
+comes, has nothing to do with the rate of printing: one map holds for all rates.
 """
 
 from __future__ import annotations
@@ -14,22 +14,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.feedback.bounded import BoundedSequence
-from printhammer.drive.waveforms.shapes import Switched
-from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
-
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.control.feedback.driver import Driver
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
+    from printhammer.control.feedback.interpolation import IntArray
+    from printhammer.control.feedback.plant import Plant
+    from printhammer.drive.waveforms.shapes import Switched
     from printhammer.support.arrays import FloatArray
 
-    IntArray = npt.NDArray[np.int64]
-
 AHEAD: Final = 1e-6
-"""Time before the touch at which the runs of a table begin, s."""
+"""Time before the touch at which the runs of a map begin, s."""
 
 PUSHED, FREE = 0, 1
 """Kinds of touches."""
@@ -37,103 +30,42 @@ PUSHED, FREE = 0, 1
 ALWAYS: Final = 2e-3
 """Width of a push that is still on at the next touch, s."""
 
-FORCES: Final = 3
-"""Number of forces for which ways are computed; only the return currents vary more slowly over the ways."""
-
+# Speeds of the touches, in parts of that of the single pulse
 _PUSHED_SPEEDS: Final = np.linspace(0.3, 1.1, 17)
 _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)
-_RETURNS: Final = (0.0, -0.4, -1.0)
-_FORCES: Final = (0.95, 1.0, 1.05)
+_RETURNS: Final = (0.0, -0.4, -1.0)  # Return currents, in parts of the largest one
+
+FORCES: Final = (0.95, 1.0, 1.05)
+"""Forces for which ways are computed, in parts of that of the single pulse; only the return currents vary
+more slowly over the ways."""
+
+# Widths of the pushes that end before the touch, in parts of that of the launch
 _WIDTHS: Final = (0.85, 1.0, 1.2)
-_LAST_RELEASE: Final = 0.85
-_RELEASES: Final = 29
+# Times of releases, and of throws before and after the bounce, in flight times of the single pulse
+_RELEASES: Final = np.linspace(0.0, 0.85, 29)
 _EARLY: Final = np.linspace(0.14, 1.07, 38)
 _LATE: Final = np.linspace(1.1, 2.9, 48)
-_WAIT: Final = 1.7
+_WATCHED, _WAIT = 3.0, 1.7  # Length of the runs for forces, and of the others after the throw, likewise
+# Time after which next to nothing is left of a change of the current, in time constants of the driver
 _FADED: Final = 2.5
-_LARGEST_FORCE: Final = 1.15
-
-
-@dataclass(frozen=True)
-class SwingTable:
-    """What becomes of the ways to switch the coil from one touch to the next.
-
-    The touches at which a row begins are numbered (T,), the ways to go on (A,).
-
-    Attributes
-    ----------
-    kind : int array, shape (T,)
-        `PUSHED` or `FREE`.
-    speed : array, shape (T,)
-        Of the touch, m/s; evenly spaced within a kind.
-    back : array, shape (A,)
-        Return current, A.
-    fire : array, shape (A,)
-        Time after the touch at which the next push begins, s.
-    width : array, shape (A,)
-        Of that push, s; `ALWAYS` for one up to the next touch.
-    release : array, shape (T, A)
-        Time after the touch at which the push ends, s.
-    force : array, shape (T, A)
-        Peak force in parts of the single-pulse force; NaN where this way leads nowhere.
-    next_touch : array, shape (T, A)
-        Time of the next touch after this one, s; NaN likewise.
-    next_speed : array, shape (T, A)
-        Its speed, m/s; NaN likewise.
-    next_kind : int array, shape (A,)
-        `PUSHED` or `FREE`.
-    leaves : array, shape (T, A)
-        Time after the touch at which the armature leaves the pack, s.
-    force_map : ForceMap
-        Peak force by release.
-    driver : Driver
-        Of the coil.
-    stroke : float
-        Way from backstop to pack, m.
-    """
-
-    kind: IntArray
-    speed: FloatArray
-    back: FloatArray
-    fire: FloatArray
-    width: FloatArray
-    release: FloatArray
-    force: FloatArray
-    next_touch: FloatArray
-    next_speed: FloatArray
-    next_kind: IntArray
-    leaves: FloatArray
-    force_map: ForceMap
-    driver: Driver
-    stroke: float
+_LARGEST_FORCE: Final = 1.15  # Force above which a way leads nowhere, in parts of that of the single pulse
 
 
 @dataclass(frozen=True)
 class ForceMap:
-    """Peak force by touch, return current and release.
+    """Peak force by touch (T,), return current (B,) and release (R,)."""
 
-    Attributes
-    ----------
-    kind : int array, shape (T,)
-        `PUSHED` or `FREE`.
-    speed : array, shape (T,)
-        Of the touch, m/s.
-    back : array, shape (B,)
-        Return currents, A.
-    release : array, shape (R,)
-        Time after the touch at which the push ends, s.
-    force : array, shape (T, B, R)
-        In parts of the single-pulse force.
-    front : float
-        Front of the pack, m.
-    """
+    kind: IntArray  # `PUSHED` or `FREE`, (T,)
+    speed: FloatArray  # Of the touch, m/s; evenly spaced within a kind, (T,)
+    back: FloatArray  # Return currents, A, (B,)
+    release: FloatArray  # Time after the touch at which the push ends, s, (R,)
+    force: FloatArray  # In parts of the single-pulse force, (T, B, R)
+    front: float  # Front of the pack, m
 
-    kind: IntArray
-    speed: FloatArray
-    back: FloatArray
-    release: FloatArray
-    force: FloatArray
-    front: float
+    @property
+    def off(self) -> int:
+        """Number of the return current that is none."""
+        return int(np.argmin(np.abs(self.back)))
 
     def release_for(self, force: float) -> FloatArray:
         """Return the release that gives a force, shape (T, B), s; NaN where the push is too weak for it.
@@ -152,113 +84,94 @@ class ForceMap:
         number = int(np.argmin(np.abs(self.back - back)))
         return float(np.interp(release, self.release, self.force[row, number]))
 
+    def state(self, row: int) -> tuple[float, float]:
+        """Return displacement, m, and speed, m/s, just before a touch."""
+        speed = float(self.speed[row])
+        return self.front - AHEAD * speed, speed
 
-def touches(single: Nominal) -> tuple[IntArray, FloatArray]:
-    """Return kinds and speeds, m/s, of the touches from which tables begin."""
+
+@dataclass(frozen=True)
+class ImpactMap:
+    """Where the ways to switch the coil (A,) lead from the touches of a force map (T,)."""
+
+    back: FloatArray  # Return current, A, (A,)
+    fire: FloatArray  # Time after the touch at which the next push begins, s, (A,)
+    width: FloatArray  # Of that push, s; `ALWAYS` for one up to the next touch, (A,)
+    release: FloatArray  # Time after the touch at which the push ends, s, (T, A)
+    # Peak force in parts of the single-pulse force; NaN where this way leads nowhere, (T, A)
+    force: FloatArray
+    # Time of the next touch after this one, s, and its speed, m/s; NaN likewise, (T, A)
+    next_touch: FloatArray
+    next_speed: FloatArray
+    next_kind: IntArray  # `PUSHED` or `FREE`, (A,)
+    leaves: FloatArray  # Time after the touch at which the armature leaves the pack, s, (T, A)
+    # Of the touches, as in the force map, (T,)
+    kind: IntArray
+    speed: FloatArray
+    forces: ForceMap  # Peak force by release
+    driver: Driver  # Of the coil
+
+
+def force_map(plant: Plant) -> ForceMap:
+    """Compute the peak force for all touches, return currents and releases."""
+    single, driver = plant.single, plant.driver
     kinds = np.repeat([PUSHED, FREE], [len(_PUSHED_SPEEDS), len(_FREE_SPEEDS)])
-    return kinds, np.concatenate([_PUSHED_SPEEDS, _FREE_SPEEDS]) * single.impact_speed
+    speeds = np.concatenate([_PUSHED_SPEEDS, _FREE_SPEEDS]) * single.impact_speed
+    releases, back = _RELEASES * single.flight_time, np.array(_RETURNS) * driver.current
+    force = np.empty((len(kinds), len(back), len(releases)))
+    found = ForceMap(kinds, speeds, back, releases, force, plant.front)
+    keys = [
+        (row, release, level)
+        for row in range(len(kinds))
+        for level in back.tolist()
+        for release in releases.tolist()
+    ]
+    force[:] = released_forces(plant, found, keys).reshape(force.shape)
+    return found
 
 
-def force_map(hammer: Hammer, driver: Driver, single: Nominal, *, threads: int | None = None) -> ForceMap:
-    """Compute the peak force for all touches, return currents and releases.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    driver : Driver
-        Of its coil.
-    single : Nominal
-        Its single-pulse dot.
-    threads : int, optional
-        By default as many as there are cores.
-    """
-    kinds, speeds = touches(single)
-    assert hammer.front is not None
-    front = hammer.front
-    releases = np.linspace(0.0, _LAST_RELEASE, _RELEASES) * single.flight_time
-    back = np.array(_RETURNS) * driver.current
-    long = 3.0 * single.flight_time
-    drives, states = [], []
-    for kind, speed in zip(kinds.tolist(), speeds.tolist(), strict=True):
-        for level in back.tolist():
-            for release in releases.tolist():
-                drives.append(
-                    BoundedSequence([first_pulse(kind, release, level, long, driver)], [0.0], driver.current)
-                )
-                states.append((front - AHEAD * speed, speed))
-    result = Ensemble(hammer, drives, long, states=np.array(states), tolerance=DISPLAY_TOLERANCE).run(
-        dots=True, threads=threads
-    )
-    assert result.dots is not None
-    force = np.where(result.ok, result.dots.peak_force[:, 0], np.nan) / single.force
-    shape = len(kinds), len(back), len(releases)
-    return ForceMap(kinds, speeds, back, releases, force.reshape(shape), front)
+def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float, float]]) -> FloatArray:
+    """Return the forces of touches by row, release, s, and return current, A; NaN for a run that failed."""
+    long = _WATCHED * plant.single.flight_time
+    drives = [
+        plant.driver.drive([first_pulse(int(forces.kind[row]), release, back, long, plant.driver)])
+        for row, release, back in keys
+    ]
+    ok, dots, _ = plant.run(drives, long, [forces.state(row) for row, _release, _back in keys])
+    return np.where(ok, dots.peak_force[:, 0], np.nan) / plant.single.force
 
 
-def swing_table(
-    hammer: Hammer,
-    driver: Driver,
-    single: Nominal,
-    forces: ForceMap,
-    launched: float,
-    *,
-    threads: int | None = None,
-) -> SwingTable:
-    """Compute where all ways to switch the coil lead.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    driver : Driver
-        Of its coil.
-    single : Nominal
-        Its single-pulse dot.
-    forces : ForceMap
-        Its forces.
-    launched : float
-        Width of the push by which it is launched from rest, s.
-    threads : int, optional
-        By default as many as there are cores.
-    """
+def impact_map(plant: Plant, forces: ForceMap, launched: float) -> ImpactMap:
+    """Compute where all ways to switch the coil lead; `launched` is the width of the push from rest, s."""
+    single, driver = plant.single, plant.driver
     scale = single.flight_time
     fires = np.concatenate([_EARLY, _LATE]) * scale
     widths = np.array([ALWAYS, *(width * launched for width in _WIDTHS)])
-    shape = len(forces.back), len(_FORCES), len(fires), len(widths)
+    shape = len(forces.back), len(FORCES), len(fires), len(widths)
     back, _, fire, width = (
-        axis.ravel() for axis in np.meshgrid(forces.back, _FORCES, fires, widths, indexing="ij")
+        axis.ravel() for axis in np.meshgrid(forces.back, FORCES, fires, widths, indexing="ij")
     )
-    release = np.stack([forces.release_for(share) for share in _FORCES], axis=2)
+    release = np.stack([forces.release_for(share) for share in FORCES], axis=2)
     every = np.broadcast_to(release[..., np.newaxis, np.newaxis], (len(forces.kind), *shape))
     every = every.reshape(len(forces.kind), -1)
     possible = (fire > every + 2.0 * AHEAD) & ((width == ALWAYS) | (fire > _EARLY[-1] * scale))
     rows, ways = np.nonzero(possible)
-    pushes = {
-        number: Switched(at=(0.0, number), levels=(driver.current, 0.0), edge=driver.edge)
-        for number in widths.tolist()
-    }
+    pushes = {number: driver.push(number) for number in widths.tolist()}
     drives, firsts = [], {}
     for row, way in zip(rows.tolist(), ways.tolist(), strict=True):
         key = row, float(every[row, way]), float(back[way]), float(fire[way])
         if key not in firsts:
             firsts[key] = first_pulse(int(forces.kind[row]), *key[1:], driver)
-        both = [firsts[key], pushes[float(width[way])]]
-        drives.append(BoundedSequence(both, [0.0, key[3] + AHEAD], driver.current))
+        drives.append(driver.drive([firsts[key], pushes[float(width[way])]], [0.0, key[3] + AHEAD]))
     speed = forces.speed[rows]
     states = np.stack([forces.front - AHEAD * speed, speed], axis=1)
-    ends = fire[ways] + _WAIT * scale
-    result = Ensemble(hammer, drives, ends, states=states, tolerance=DISPLAY_TOLERANCE).run(
-        dots=True, threads=threads
-    )
-    dots = result.dots
-    assert dots is not None
+    ok, dots, _ = plant.run(drives, fire[ways] + _WAIT * scale, states)
     flight = dots.flight_time[:, 1]
     pushed = width[ways] == ALWAYS
     with np.errstate(invalid="ignore"):
         # Free means that next to nothing is left of the current at the touch, pushed that all of it is there.
         settled = np.where(pushed, flight, flight - width[ways]) > _FADED * driver.edge
-        good = result.ok & dots.struck[:, 0] & dots.struck[:, 1] & (dots.extra_contacts[:, 0] == 0) & settled
+        good = ok & dots.struck[:, 0] & dots.struck[:, 1] & (dots.extra_contacts[:, 0] == 0) & settled
         good &= dots.peak_force[:, 0] < _LARGEST_FORCE * single.force
 
     def spread(values: FloatArray) -> FloatArray:
@@ -266,9 +179,7 @@ def swing_table(
         whole[rows[good], ways[good]] = values[good]
         return whole
 
-    return SwingTable(
-        kind=forces.kind,
-        speed=forces.speed,
+    return ImpactMap(
         back=back,
         fire=fire,
         width=width,
@@ -278,9 +189,10 @@ def swing_table(
         next_speed=spread(dots.impact_speed[:, 1]),
         next_kind=np.where(width == ALWAYS, PUSHED, FREE),
         leaves=spread(dots.contact_time[:, 0]),
-        force_map=forces,
+        kind=forces.kind,
+        speed=forces.speed,
+        forces=forces,
         driver=driver,
-        stroke=forces.front - hammer.origin,
     )
 
 
@@ -290,9 +202,5 @@ def first_pulse(kind: int, release: float, back: float, fire: float, driver: Dri
     if release > 0.0:
         at.append(AHEAD)
         levels.append(driver.current)
-    return Switched(
-        at=(*at, AHEAD + release, AHEAD + fire),
-        levels=(*levels, back, 0.0),
-        edge=driver.edge,
-        initial=levels[0],
-    )
+    at += [AHEAD + release, AHEAD + fire]
+    return driver.switched(at, [*levels, back, 0.0], levels[0])

@@ -18,10 +18,12 @@ from scipy.ndimage import maximum_filter1d
 
 from printhammer.control.feedback.fronts import MIDDLE, OFFSETS, between_fronts
 from printhammer.control.feedback.impact_map import FORCES
+from printhammer.control.feedback.interpolation import bilinear, blend, place_of
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.fronts import Fronts
-    from printhammer.control.feedback.impact_map import IntArray, SwingTable
+    from printhammer.control.feedback.impact_map import ImpactMap
+    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.printing.dots.limits import Limits
     from printhammer.support.arrays import FloatArray
 
@@ -31,19 +33,20 @@ NEVER: Final = 50.0
 KNOWN: Final = 0.01
 """Standard deviation of the front, in parts of the way to the pack, above which it counts as not known."""
 
-_DISCOUNT: Final = 0.9
-_ROUNDS: Final = 8
-_LATENESS: Final = np.linspace(-0.9, 0.9, 13)
-_SPEED_DOUBT: Final = 0.04
+_DISCOUNT: Final = 0.9  # Discount of the costs of each further dot
+_ROUNDS: Final = 8  # Number of dots before a rest from which on more make no difference
+_LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, in parts of the limit
+_SPEED_DOUBT: Final = 0.04  # Standard deviation of the speed of a touch, m/s
+# Slope of the next touch over the speed where there is no other touch to take it from, s / (m/s)
 _STEEPEST: Final = 2e-3
-_NEAR: Final = 2
-_FAST: Final = 0.3
-_STEEP: Final = 8.0
-_EFFORT: Final = 0.1
+_NEAR: Final = 2  # Number of speeds to either side over which a way counts as steep
+_FAST: Final = 0.3  # Speed that is left after a landing, m/s, of cost 1
+_STEEP: Final = 8.0  # By how much more a deviation on its limit costs than its square
+_EFFORT: Final = 0.1  # Cost of the largest current over a whole period
 
 
-class Done(NamedTuple):
-    """What has been done after some touches (M,).
+class Committed(NamedTuple):
+    """What has been done after some touches (M,) and cannot be undone.
 
     Return current, A; force that was printed, in parts of the single-pulse force; time after the touch, s.
     """
@@ -75,7 +78,7 @@ class Policy:
         self._late = _LATENESS * limits.arrival
         self._rows = [np.flatnonzero(table.kind == kind) for kind in range(int(table.kind.max()) + 1)]
         self._doubt = self._doubts()
-        self._known = [np.flatnonzero(np.isfinite(row)) for row in table.next_touch]
+        self._ways = [np.flatnonzero(np.isfinite(row)) for row in table.next_touch]
         self._efforts = self.effort(table.release) + self._doubt
         self._costs = [self._resting()]
 
@@ -103,12 +106,8 @@ class Policy:
             if not inside.any():
                 continue
             off = lates[inside]
-            i, p = _place(speeds[inside], nodes)
-            j, q = _place(np.clip(off, -end, end), self._late)
-            own = costs[rows]
-            found[inside] = (1.0 - p) * ((1.0 - q) * own[i, j] + q * own[i, j + 1]) + p * (
-                (1.0 - q) * own[i + 1, j] + q * own[i + 1, j + 1]
-            )
+            places = place_of(speeds[inside], nodes), place_of(np.clip(off, -end, end), self._late)
+            found[inside] = bilinear(costs[rows], *places[0], *places[1])
             # Too late is worse the later it is, so that lost time is made up for.
             found[inside] += NEVER * np.maximum(np.abs(off) - end, 0.0) / self.limits.arrival
         return found
@@ -122,7 +121,7 @@ class Policy:
         after: IntArray,
         front: FloatArray,
         front_error: FloatArray,
-        done: Done | None = None,
+        done: Committed | None = None,
     ) -> tuple[IntArray, FloatArray, Choice]:
         """Return number and cost of the best way for some touches (M,), and where each leads.
 
@@ -137,7 +136,7 @@ class Policy:
         front, front_error : array, shape (M,)
             By how much the front of the pack lies farther away, and how well this is known, in parts of the
             way from backstop to pack.
-        done : Done, optional
+        done : Committed, optional
             What has been done by then, where the throw alone is to be decided.
         """
         choice = Choice(self.fronts, kind, speed, front)
@@ -186,20 +185,13 @@ class Policy:
 
     def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
         """Return what it costs some touches that the front of the pack is known only so well, (M, A)."""
-        fronts = self.fronts
-        below, share = choice.below[rows], choice.share[rows, np.newaxis]
-
-        def of(values: FloatArray) -> FloatArray:
-            found: FloatArray = (1.0 - share) * values[below] + share * values[below + 1]
-            return found
-
-        weaker = error[:, np.newaxis] * of(fronts.front_force)
+        weaker = error[:, np.newaxis] * choice.by_speed(self.fronts.front_force)[rows]
         force = choice.force[rows]
         zero = np.zeros(1)
         both = 0.5 * (self.dot_cost(force + weaker, zero) + self.dot_cost(force - weaker, zero))
-        ends = fronts.tables[0].next_touch, fronts.tables[-1].next_touch
-        slope = np.nan_to_num((ends[1] - ends[0]) / (OFFSETS[-1] - OFFSETS[0]))
-        late = error[:, np.newaxis] * of(slope) / self.limits.arrival
+        near, far = (self.fronts.maps[end].next_touch for end in (0, -1))
+        slope = np.nan_to_num((far - near) / (OFFSETS[-1] - OFFSETS[0]))
+        late = error[:, np.newaxis] * choice.by_speed(slope)[rows] / self.limits.arrival
         return both - self.dot_cost(force, zero) + np.square(late)
 
     def costs(self, number: int) -> FloatArray:
@@ -218,7 +210,7 @@ class Policy:
         table = self.table
         late = self._late[:, np.newaxis]
         new = np.full_like(costs, NEVER)
-        for row, ways in enumerate(self._known):
+        for row, ways in enumerate(self._ways):
             if not ways.size:
                 continue
             later = late + table.next_touch[row, ways] - self.period
@@ -231,7 +223,7 @@ class Policy:
 
 
 class Choice:
-    """Where all ways lead from touches (M,) whose speed and front lie between those of the tables."""
+    """Where all ways lead from touches (M,) whose speed and front lie between those of the maps."""
 
     def __init__(self, fronts: Fronts, kind: IntArray, speed: FloatArray, front: FloatArray) -> None:
         self._fronts = fronts
@@ -244,78 +236,50 @@ class Choice:
     def settle(self, force: FloatArray) -> None:
         """Replace where the ways lead by where they do after dots (M,) of some force, in parts.
 
-        What belongs to the middle one of the forces of the tables is shifted; the others lead nowhere.
+        What belongs to the middle one of the forces of the maps is shifted; the others lead nowhere.
         """
-        table = self._fronts.table
-        shape = len(self.below), len(np.unique(table.back)), FORCES, -1
+        middle = len(FORCES) // 2
+        shape = len(self.below), len(np.unique(self._fronts.table.back)), len(FORCES), -1
         own = self.force.reshape(shape)
         apart = own[:, :, -1] - own[:, :, 0]
-        away = force[:, np.newaxis, np.newaxis] - own[:, :, FORCES // 2]
+        away = force[:, np.newaxis, np.newaxis] - own[:, :, middle]
         for name in ("next_touch", "next_speed"):
             values = getattr(self, name).reshape(shape)
             change = values[:, :, -1] - values[:, :, 0]
             # Where no push is needed the forces are the same, and so is all that follows.
             shift = np.divide(change, apart, out=np.zeros_like(change), where=apart != 0.0) * away
             settled = np.full_like(values, np.nan)
-            settled[:, :, FORCES // 2] = values[:, :, FORCES // 2] + np.nan_to_num(shift)
+            settled[:, :, middle] = values[:, :, middle] + np.nan_to_num(shift)
             setattr(self, name, settled.reshape(self.force.shape))
 
-    def by_speed(self, values: FloatArray) -> FloatArray:
-        """Interpolate an array (T, A) of the nominal hammer to (M, A)."""
-        share = self.share[:, np.newaxis]
-        found: FloatArray = (1.0 - share) * values[self.below] + share * values[self.below + 1]
-        return found
+    def by_speed(self, values: FloatArray, way: IntArray | None = None) -> FloatArray:
+        """Interpolate an array (T, A) of the nominal hammer to (M, A), or to (M,) for one way each."""
+        every: Any = slice(None) if way is None else way
+        share = self.share[:, np.newaxis] if way is None else self.share
+        return blend(values[self.below, every], values[self.below + 1, every], share)
 
-    def of_way(self, values: FloatArray, way: IntArray) -> FloatArray:
-        """Interpolate an array (T, A) of the nominal hammer for one way each, to (M,)."""
-        found: FloatArray = (1.0 - self.share) * values[self.below, way] + self.share * values[
-            self.below + 1, way
-        ]
-        return found
-
-    def of(self, name: str) -> FloatArray:
-        """Interpolate arrays (T, A) of all tables to (M, A)."""
-        tables = [getattr(table, name) for table in self._fronts.tables]
-        found = np.empty((len(self.below), tables[MIDDLE].shape[1]))
+    def of(self, name: str, way: IntArray | None = None) -> FloatArray:
+        """Interpolate arrays (T, A) of all maps to (M, A), or to (M,) for one way each."""
+        tables = [getattr(table, name) for table in self._fronts.maps]
+        shape = (len(self.below), tables[MIDDLE].shape[1]) if way is None else (len(self.below),)
+        found = np.empty(shape)
         for number, (near, far) in enumerate(itertools.pairwise(tables)):
             rows = np.flatnonzero(self.nearer == number)
-            if rows.size:
-                found[rows] = self._blend(near, far, rows, slice(None))
-        return found
-
-    def at(self, name: str, way: IntArray) -> FloatArray:
-        """Interpolate arrays (T, A) of all tables for one way each, to (M,)."""
-        tables = [getattr(table, name) for table in self._fronts.tables]
-        found = np.empty(len(self.below))
-        for number, (near, far) in enumerate(itertools.pairwise(tables)):
-            rows = np.flatnonzero(self.nearer == number)
-            if rows.size:
-                found[rows] = self._blend(near, far, rows, way[rows])
-        return found
-
-    def _blend(self, near: FloatArray, far: FloatArray, rows: IntArray, way: Any) -> FloatArray:
-        below, share, farther = self.below[rows], self.share[rows], self.farther[rows]
-        if isinstance(way, slice):
-            share, farther = share[:, np.newaxis], farther[:, np.newaxis]
-        low = (1.0 - share) * near[below, way] + share * near[below + 1, way]
-        high = (1.0 - share) * far[below, way] + share * far[below + 1, way]
-        found: FloatArray = (1.0 - farther) * low + farther * high
+            own: Any = slice(None) if way is None else way[rows]
+            below, share, farther = self.below[rows], self.share[rows], self.farther[rows]
+            if way is None:
+                share, farther = share[:, np.newaxis], farther[:, np.newaxis]
+            low, high = (blend(table[below, own], table[below + 1, own], share) for table in (near, far))
+            found[rows] = blend(low, high, farther)
         return found
 
 
-def between(table: SwingTable, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the row of the table below some touches (M,), and the share of the one above."""
+def between(table: ImpactMap, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the row of the map below some touches (M,), and the share of the one above."""
     below, share = np.zeros(len(kind), np.int64), np.zeros(len(kind))
     for number in range(int(table.kind.max()) + 1):
         rows = np.flatnonzero(table.kind == number)
-        own = kind == number
-        i, p = _place(np.clip(speed[own], table.speed[rows[0]], table.speed[rows[-1]]), table.speed[rows])
+        own, nodes = kind == number, table.speed[rows]
+        i, p = place_of(np.clip(speed[own], nodes[0], nodes[-1]), nodes)
         below[own], share[own] = rows[0] + i, p
     return below, share
-
-
-def _place(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the node below each value, and the share of the one above; nodes are evenly spaced."""
-    place = (values - nodes[0]) / (nodes[1] - nodes[0])
-    below = np.clip(place.astype(np.int64), 0, len(nodes) - 2)
-    return below, place - below

@@ -1,4 +1,4 @@
-"""Back to rest after a dot: the push that prints it, and the brake pulse by which the armature lands softly.
+"""Soft landing after a dot: the push that prints it, and the brake pulse by which the armature comes to rest.
 
 On its way back the armature is slowed down by the bucking current, as in the quenched response of Fig. 6 of
 F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), so that it meets the backstop with
@@ -12,91 +12,58 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.feedback.bounded import BoundedSequence
 from printhammer.control.feedback.impact_map import AHEAD, PUSHED
-from printhammer.drive.waveforms.shapes import Switched
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 
 if TYPE_CHECKING:
-    from printhammer.control.feedback.driver import Driver
-    from printhammer.control.feedback.impact_map import ForceMap, IntArray
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
+    from printhammer.control.feedback.impact_map import ForceMap
+    from printhammer.control.feedback.interpolation import IntArray
+    from printhammer.control.feedback.plant import Plant
     from printhammer.support.arrays import FloatArray
 
+# Beginnings and widths of the brake pulses of the first grid, in flight times of the single pulse
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
 _WIDTHS: Final = np.linspace(0.1, 0.75, 20)
+# Finer grids about the best, and their half widths, likewise: each covers a step of the one before
 _NEAR: Final = np.linspace(-1.0, 1.0, 7)
 _FINER: Final = (0.034, 0.01, 0.003)
+# Time in which a distance from rest would be covered, by which it counts as a speed, likewise
 _FALL: Final = 1.0 / 3.0
+# Times after the touch at which the armature is to be at rest, likewise
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
-_SETTLED: Final = 0.65
+_SETTLED: Final = 0.65  # Time after the brake pulse from which on it counts as at rest, likewise
 
 
 @dataclass(frozen=True)
 class Landing:
-    """The best way to land, for each of the touches of a table (T,).
+    """The best way to land, for each of the touches of a map (T,); NaN where the force cannot be had."""
 
-    Attributes
-    ----------
-    release : array, shape (T,)
-        Time after the touch at which the push ends, s; NaN where the force cannot be had.
-    force : array, shape (T,)
-        Force in parts of the single-pulse force; NaN likewise.
-    brake : array, shape (T,)
-        Time after the touch at which the brake pulse begins, s; NaN likewise.
-    width : array, shape (T,)
-        Of the brake pulse, s; NaN likewise.
-    left : array, shape (T,)
-        Largest speed that is left, m/s; a distance from rest counts as the speed with which it is covered in
-        a third of the flight time of a single pulse. NaN likewise.
-    settled : float
-        Time after the touch from which on the armature counts as at rest, s.
-    """
-
-    release: FloatArray
-    force: FloatArray
+    release: FloatArray  # Time after the touch at which the push ends, s, (T,)
+    force: FloatArray  # Force in parts of the single-pulse force, (T,)
+    # Time after the touch at which the brake pulse begins, and its width, s, (T,)
     brake: FloatArray
     width: FloatArray
+    # Largest speed that is left, m/s; a distance from rest counts as the speed with which it is covered
+    # in a third of the flight time of a single pulse, (T,)
     left: FloatArray
-    settled: float
+    settled: float  # Time after the touch from which on the armature counts as at rest, s
 
 
-def landing(
-    hammer: Hammer, driver: Driver, single: Nominal, forces: ForceMap, *, threads: int | None = None
-) -> Landing:
-    """Find the brake pulses that leave least of the motion: on a grid, and on finer ones about the best.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    driver : Driver
-        Of its coil.
-    single : Nominal
-        Its single-pulse dot.
-    forces : ForceMap
-        Its forces.
-    threads : int, optional
-        By default as many as there are cores.
-    """
-    scale = single.flight_time
-    off = int(np.argmin(np.abs(forces.back)))
-    release = forces.release_for(1.0)[:, off]
+def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
+    """Find the brake pulses that leave least of the motion: on a grid, and on finer ones about the best."""
+    scale = plant.single.flight_time
+    release = forces.release_for(1.0)[:, forces.off]
     force = np.full(len(release), np.nan)
     rows = np.flatnonzero(~np.isnan(release))
     for row in rows.tolist():
-        force[row] = np.interp(release[row], forces.release, forces.force[row, off])
+        force[row] = np.interp(release[row], forces.release, forces.force[row, forces.off])
     grid = np.stack([axis.ravel() for axis in np.meshgrid(_STARTS, _WIDTHS, indexing="ij")], axis=1)
     near = np.stack([axis.ravel() for axis in np.meshgrid(_NEAR, _NEAR, indexing="ij")], axis=1)
     tried = np.broadcast_to(grid, (len(rows), *grid.shape))
     best = np.full((len(release), 2), np.nan)
     left = np.full(len(release), np.nan)
     for finer in (*_FINER, None):
-        remains = _left(
-            hammer, driver, scale, forces, release, rows, np.maximum(tried * scale, AHEAD), threads
-        )
+        remains = _left(plant, forces, release, rows, np.maximum(tried * scale, AHEAD))
         way = np.argmin(remains, axis=1)
         best[rows] = tried[np.arange(len(rows)), way]
         left[rows] = remains[np.arange(len(rows)), way]
@@ -108,40 +75,23 @@ def landing(
 
 
 def _left(
-    hammer: Hammer,
-    driver: Driver,
-    scale: float,
-    forces: ForceMap,
-    release: FloatArray,
-    rows: IntArray,
-    tried: FloatArray,
-    threads: int | None,
+    plant: Plant, forces: ForceMap, release: FloatArray, rows: IntArray, tried: FloatArray
 ) -> FloatArray:
     """Return what is left of the motion after brake pulses (rows, pulses, begin and width), m/s."""
+    driver, scale = plant.driver, plant.single.flight_time
     drives, states = [], []
     for row, pulses in zip(rows.tolist(), tried, strict=True):
         initial = driver.current if forces.kind[row] == PUSHED else 0.0
         levels = (initial, driver.current if release[row] > 0.0 else 0.0, 0.0, driver.current, 0.0)
         released = AHEAD + max(float(release[row]), AHEAD)
-        state = float(forces.front - AHEAD * forces.speed[row]), float(forces.speed[row])
         for begin, width in pulses.tolist():
             brake = max(AHEAD + begin, released + AHEAD)
-            pulse = Switched(
-                at=(0.0, AHEAD, released, brake, brake + width),
-                levels=levels,
-                edge=driver.edge,
-                initial=initial,
-            )
-            drives.append(BoundedSequence([pulse], [0.0], driver.current))
-            states.append(state)
+            at = (0.0, AHEAD, released, brake, brake + width)
+            drives.append(driver.drive([driver.switched(at, levels, initial)]))
+            states.append(forces.state(row))
     watched = AHEAD + _WATCHED * scale
-    result = Ensemble(
-        hammer, drives, float(watched[-1]), states=np.array(states), tolerance=DISPLAY_TOLERANCE
-    ).run(dots=True, strobes=[watched] * len(drives), threads=threads)
-    assert result.dots is not None
-    assert result.strobes is not None
-    good = result.ok & (result.dots.extra_contacts[:, 0] == 0)
+    ok, dots, strobes = plant.run(drives, float(watched[-1]), states, [watched] * len(drives))
     # An armature that hovers between backstop and pack is slow too, but not at rest.
-    away = np.abs(result.strobes.x - rest_state(hammer)) / (_FALL * scale)
-    found = np.maximum(np.abs(result.strobes.v), away).max(axis=1)
-    return np.where(good, found, np.inf).reshape(tried.shape[:2])
+    away = np.abs(strobes.x - rest_state(plant.hammer)) / (_FALL * scale)
+    found = np.maximum(np.abs(strobes.v), away).max(axis=1)
+    return np.where(ok & (dots.extra_contacts[:, 0] == 0), found, np.inf).reshape(tried.shape[:2])

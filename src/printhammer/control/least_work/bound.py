@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import FloatArray
 
-_POINTS: Final = 4001
-_CURRENTS: Final = 17
-_SPEEDS: Final = 32
-_STROBES: Final = 4001
+_POINTS: Final = 4001  # Places at which energies and forces are summed up
+_CURRENTS: Final = 17  # Currents among which the strongest is sought
+_SPEEDS: Final = 32  # Speeds with which an armature is thrown at the backstop
+_STROBES: Final = 4001  # Instants at which it is looked at
 
 
 @dataclass(frozen=True)

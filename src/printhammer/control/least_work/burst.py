@@ -13,9 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
 from functools import cached_property
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
@@ -23,28 +21,37 @@ import numpy as np
 from printhammer.control.least_work.bound import Bound, bound
 from printhammer.control.least_work.coil_force import CoilForce
 from printhammer.control.least_work.pulses import PulsePlan
-from printhammer.control.least_work.search import Task, landing_current, printing_current
-from printhammer.control.least_work.slot import SlotState
+from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
+from printhammer.control.least_work.slot import Task
+from printhammer.control.least_work.supply import supply_check
 from printhammer.drive.input import read_count, read_number, read_positive
-from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of, rate_of
+from printhammer.results import Result, part, scalar
+from printhammer.results.declare import Column
+from printhammer.results.files import frame, plain
+from printhammer.results.provenance import provenance
+from printhammer.run.coil_work import coil_power
 from printhammer.run.ledger import stored_energy
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import CYCLE, simulate
+from printhammer.units import from_si
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import numpy.typing as npt
-    import xarray as xr
+    import pandas as pd
 
     from printhammer.control.least_work.supply import SupplyCheck
+    from printhammer.drive.sequence import PulseSequence
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.nominal import Nominal
+    from printhammer.results.result import Entries
     from printhammer.run.coil_work import CoilWork
     from printhammer.run.contacts import Contact
     from printhammer.run.ledger import Ledger
@@ -59,6 +66,7 @@ SPACING: Final = 0.6
 indents the pack; a period holds a whole number of them."""
 
 MOST_DOTS: Final = 1000
+"""Number of dots above which a burst is refused."""
 
 Least = Literal["positive work", "heat"]
 LEASTS: Final = get_args(Least)
@@ -71,12 +79,10 @@ Shape = Literal["free", "pulses"]
 SHAPES: Final = get_args(Shape)
 """What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths."""
 
+# End of a slot after its touch, in parts of the time in which a single pulse indents the pack
 _PAST_PEAK: Final = 1.2
-_SPARE: Final = 5e-4
-_LEAD: Final = 2.0
-_LANDING: Final = 5.0
-_FEWEST, _MOST = 8, 96
-_OVERLAP: Final = 0.01
+_SPARE: Final = 5e-4  # Part of the force by which a dot is planned to be harder than asked for
+# Energy in motion below which a hammer counts as at rest, in parts of what a dot costs the pack
 _SETTLED: Final = 1e-2
 
 
@@ -84,57 +90,36 @@ class NoBurstError(PrinthammerError):
     """No current within the bounds was found that prints the burst."""
 
 
-@dataclass(frozen=True)
-class LeastWork:
+class LeastWork(Result, rows="node"):
     """A burst that prints adequate dots with least work, rest to rest.
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    drive : PulseSequence
-        The current that was found, fired slot by slot.
-    motion : Motion
-        The whole burst under that drive, at the tolerance of the ledger, until it has settled out.
-    rate : float
-        Dots per second, Hz.
-    count : int
-        Number of dots asked for.
-    force : float
-        Least force asked for, in parts of that of the single pulse.
-    largest, slew : float
-        Bounds on the current, A, and on its slope, A/s, of either sign.
-    least : str
-        What was made least, see `LEASTS`.
-    shape : str
-        What the current was allowed to be, see `SHAPES`; of pulses `slew` is no bound.
-    slots : array, shape (count,)
-        Times at which the dots were to touch, s.
-    single : Nominal
-        The dot of the single pulse.
-    single_work : CoilWork
-        What the coil does for one single pulse, rest to rest.
-    bound : Bound
-        Least positive work whatever the current.
-    tolerance : float
-        Of the integration.
+    The Dataset has motion and power over time and the contacts with the pack, the table the nodes of the
+    current. As CSV that is a sampled waveform (`printhammer.drive.waveforms.shapes.Sampled`): fired once, it
+    does what the drive of the burst does.
     """
 
-    hammer: Hammer
-    drive: PulseSequence = field(repr=False)
-    motion: Motion = field(repr=False)
-    rate: float
-    count: int
-    force: float
-    largest: float
-    slew: float
-    least: Least
-    shape: Shape
-    slots: FloatArray = field(repr=False)
-    single: Nominal = field(repr=False)
-    single_work: CoilWork = field(repr=False)
-    bound: Bound
-    tolerance: float
+    hammer: Hammer = part("the hammer")
+    drive: PulseSequence = part("the current that was found, fired slot by slot", repr=False)
+    motion: Motion = part(
+        "the whole burst under that drive, at the tolerance of the ledger, until it has settled out",
+        repr=False,
+    )
+    rate: float = scalar("Hz", "dots per second")
+    count: int = part("number of dots asked for")
+    force: float = scalar(
+        "1", "least force asked for, in parts of that of the single pulse", name="least_force"
+    )
+    largest: float = scalar("A", "bound on the current, of either sign", name="largest_current")
+    slew: float = scalar(
+        "A/s", "bound on its slope, of either sign", name="largest_slew", more="of pulses it is no bound"
+    )
+    least: Least = scalar("", "what was made least", more="see `LEASTS`")
+    shape: Shape = scalar("", "what the current was allowed to be", more="see `SHAPES`")
+    slots: FloatArray = part("times at which the dots were to touch, s", repr=False)
+    single: Nominal = part("the dot of the single pulse", repr=False)
+    single_work: CoilWork = part("what the coil does for one single pulse, rest to rest", repr=False)
+    bound: Bound = part("least positive work whatever the current")
+    tolerance: float = part("error allowed in one step of the search")
 
     @property
     def nodes(self) -> tuple[list[float], list[float]]:
@@ -225,20 +210,82 @@ class LeastWork:
 
     def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
         """Run the same drive with every current larger or smaller by given parts of it."""
-        from printhammer.control.least_work.supply import supply_check
+        return supply_check(
+            self.hammer,
+            self.drive,
+            self.motion.end,
+            self.slots,
+            rate=self.rate,
+            single=self.single.force,
+            least=self.force,
+            changes=changes,
+        )
 
-        return supply_check(self, changes)
+    @property
+    def title(self) -> str:
+        """What the burst is of."""
+        return f"burst of least work of {self.hammer.name}"
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return motion and current over time, dots over their number; provenance in the attributes."""
-        from printhammer.control.least_work.tables import least_work_dataset
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """The hammer, the drive that was found, and how its run ended."""
+        return provenance(
+            hammer=self.hammer, drive=self.drive, tolerance=self.tolerance, status=self.motion.status
+        )
 
-        return least_work_dataset(self)
+    def notes(self) -> dict[str, Any]:
+        """Return works and ledger."""
+        work, ledger = self.work, self.ledger
+        return {
+            "adequate_dots": self.adequate,
+            "net_work": work.net,
+            "positive_work": work.positive,
+            "squared_current": work.squared_current,
+            "bound_of_positive_work": self.bound.burst(self.count),
+            "pack_loss_of_all": ledger.pack_loss,
+            "backstop_loss": ledger.backstop_loss,
+            "ledger_residual": ledger.residual,
+            "ledger_throughput": ledger.throughput,
+            "rest_time": self.rest_time,
+            "heat": work.heat,
+        }
 
-    def plot(self, **options: Any) -> Any:
-        """Draw motion, current, power and ledger; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.control.energy").plot(self, **options)
+    def entries(self) -> Entries:
+        """Return motion, current and power of the coil over time, and the contacts with the pack."""
+        motion, dots = self.motion, self.contacts
+        power = coil_power(self.hammer, motion.x, motion.v, motion.force["magnet"])
+        forces = [np.nan if dot.peak_force is None else dot.peak_force for dot in dots]
+        arrays: list[tuple[str, str, str, str, Any]] = [
+            ("x", "time", "m", "displacement", motion.x),
+            ("v", "time", "m/s", "velocity", motion.v),
+            ("current", "time", "A", "coil current", motion.current),
+            ("power", "time", "W", "power of the coil", power),
+            ("touch", "dot", "s", "touch of the pack", [dot.t_in for dot in dots]),
+            ("force", "dot", "N", "largest pack force", forces),
+            ("pack_loss", "dot", "J", "energy that the pack absorbed", [dot.loss for dot in dots]),
+            ("time", "time", "s", "time", motion.t),
+            ("dot", "dot", "1", "number of the dot", np.arange(1, len(dots) + 1, dtype=np.int32)),
+        ]
+        return {
+            name: (
+                Column(unit, meaning, (dim,), "coordinate" if name == dim else "column", name=name),
+                np.asarray(values),
+            )
+            for name, dim, unit, meaning, values in arrays
+        }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the nodes of the current.
+
+        Raises
+        ------
+        InputError
+            As for `nodes`.
+        """
+        times, values = self.nodes
+        micros = [from_si(time, "s", "us") for time in times]
+        columns = {"time [us]": (("node",), micros), "current [A]": (("node",), values)}
+        return frame(columns, ("node",), plain(self.attributes))
 
 
 def least_work(
@@ -309,9 +356,9 @@ def least_work(
     if shape not in SHAPES:
         raise InputError(f"shape = {shape!r}, expected one of {', '.join(SHAPES)}")
     apart = None if spacing is None else read_positive(spacing, "s", "spacing")
-    for part in ("magnet", "spring", "backstop", "pack"):
-        if getattr(hammer, part) is None:
-            raise InputError(f"{hammer.path}: the hammer has no {part}, expected one with all parts")
+    for role in ("magnet", "spring", "backstop", "pack"):
+        if getattr(hammer, role) is None:
+            raise InputError(f"{hammer.path}: the hammer has no {role}, expected one with all parts")
     waveform = pulse_of(hammer)
     if waveform.quantity != "current":
         raise InputError(f"{hammer.path}: the waveform is a force, expected a current, which does work")
@@ -333,15 +380,16 @@ def least_work(
     task = Task(
         hammer, CoilForce(hammer, top), top, steepest, wanted, limits.loading, least == "heat", tolerance
     )
-    indenting = _loading_time(alone)
+    touch = next(contact for contact in alone.contacts if contact.surface == "pack")
+    indenting = touch.t_peak - touch.t_in
     apart = SPACING * indenting if apart is None else apart
     past, flight = _PAST_PEAK * indenting, single.flight_time
-    plan: _Plan | PulsePlan
+    plan: NodePlan | PulsePlan
     if shape == "free":
-        plan = _Plan(task, period, past, apart, flight)
+        plan = NodePlan(task, period, past, apart, flight)
     else:
-        lead = max(period, _LEAD * flight + past)
-        plan = PulsePlan(task, waveform, period, past, lead, _LANDING * flight, rest_state(hammer))
+        lead = max(period, LEAD * flight + past)
+        plan = PulsePlan(task, waveform, period, past, lead, LANDING * flight, rest_state(hammer))
     what = f"current of at most {top:g} A and {steepest:.4g} A/s was found that prints"
     if shape == "pulses":
         what = f"pulses of at most {top:g} A were found that print"
@@ -389,55 +437,3 @@ def steepest_rise(waveform: Waveform) -> float:
     step = 1e-6 * float(np.diff(edges).min())
     slopes = (np.abs(waveform.value(fine + step)) - np.abs(waveform.value(fine))) / step
     return float(slopes.max())
-
-
-def _loading_time(motion: Motion) -> float:
-    first = next(contact for contact in motion.contacts if contact.surface == "pack")
-    return first.t_peak - first.t_in
-
-
-class _Plan:
-    """The currents found so far, and the state in which they leave the armature."""
-
-    def __init__(self, task: Task, period: float, past: float, spacing: float, flight: float) -> None:
-        self._task = task
-        self._past = past
-        self._nodes = min(max(round(period / spacing), _FEWEST), _MOST)
-        self._step = period / self._nodes
-        self._lead = max(self._nodes, math.ceil((_LEAD * flight + past) / self._step))
-        self._landing = max(_FEWEST, math.ceil(_LANDING * flight / self._step))
-        self._state = SlotState(rest_state(task.hammer), 0.0, -1, 0.0, 0.0)
-        self._currents: list[FloatArray] = []
-        self.touches: list[float] = []
-
-    def add_dot(self) -> bool:
-        """Plan one more dot; False where no current was found."""
-        nodes = self._nodes if self._currents else self._lead
-        duration = nodes * self._step
-        before = self._currents[-1] if len(self._currents) > 1 else None
-        found = printing_current(self._task, self._state, duration, duration - self._past, nodes, before)
-        if found is None:
-            return False
-        self._state = self._task.end(self._state, found, duration)
-        self._currents.append(found)
-        self.touches.append(sum(c.size for c in self._currents) * self._step - self._past)
-        return True
-
-    def land(self) -> None:
-        """Plan the landing."""
-        found = landing_current(self._task, self._state, self._landing * self._step, self._landing)
-        self._currents.append(found)
-
-    def drive(self) -> PulseSequence:
-        """Return the whole current, fired slot by slot; the last one ends with the landing."""
-        *slots, last, landing = self._currents
-        waveforms, times, begin, node = [], [], 0.0, 0
-        for current in (*slots, np.concatenate([last, landing])):
-            # Each lasts a little longer than its slot and is cut off, so that no rounding leaves a gap.
-            values = np.concatenate([[begin], current, current[-1:]])
-            offsets = np.append(np.arange(current.size + 1), current.size + _OVERLAP) * self._step
-            waveforms.append(Sampled.from_samples(offsets, values, interpolation="linear"))
-            times.append(node * self._step)
-            node += current.size
-            begin = float(current[-1])
-        return PulseSequence(waveforms, times, overlap="replace")

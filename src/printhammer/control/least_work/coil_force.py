@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-_PLACES: Final = 161
-_CURRENTS: Final = 33
-_BEHIND: Final = 0.2
+_PLACES, _CURRENTS = 161, 33  # Numbers of nodes of the surface
+_BEHIND: Final = 0.2  # How far it reaches behind the backstop, in parts of the stroke
 
 
 class CoilForce:

@@ -7,11 +7,22 @@ do this. Pulses do not overlap: the next is not fired before the current of the 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.least_work.slot import SlotState
+from printhammer.control.least_work.descent import (
+    ARRIVAL,
+    FORCE,
+    LOST,
+    MISSED,
+    SLACK,
+    best_of,
+    descend,
+    spread,
+)
+from printhammer.control.least_work.slot import SlotState, end_of
+from printhammer.control.widths import of_width, widest
 from printhammer.drive.sequence import PulseSequence
 from printhammer.errors import InputError
 from printhammer.run.ensemble import Ensemble
@@ -19,26 +30,22 @@ from printhammer.run.ensemble import Ensemble
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.control.least_work.search import Task
+    from printhammer.control.least_work.slot import Task
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.support.arrays import FloatArray
 
 GONE: Final = 1e-2
 """The current of a pulse has gone where less than this part of its peak is left."""
 
-_PER_SLOT: Final = 2
-_TRIED: Final = 1024
-_TRIES: Final = 4
-_MOST_TRIES: Final = 10
-_ROUNDS: Final = 40
-_ENDS_AT: Final = 1e-5
-_DIFFERENCE: Final = 1e-5
-_SHORTEST: Final = 0.02
-_SAMPLES: Final = 301
-_ARRIVAL: Final = 20e-6
-_FORCE: Final = 0.05
-_LOST: Final = 25.0
-_MISSED, _SLACK = 0.05, 8e-3
+_PER_SLOT: Final = 2  # Number of pulses of a slot
+_TRIED: Final = 1024  # Number of times and widths from the best of which a search begins
+_TRIES, _MOST_TRIES = 4, 10  # Number of searches, and while nothing is found
+_ROUNDS: Final = 40  # Steps of a search
+_SHORTEST: Final = 0.02  # Least width, in parts of the largest one
+_SAMPLES: Final = 301  # Instants of a slot at which the power is looked at
+_HALVINGS: Final = 60  # Halvings of an interval of widths: more than a double has bits to tell them apart
+_NONE: Final = 1e-9  # Part of a slot below which a width is none
+_WRONG: Final = 10.0  # Cost of a contact too many, or a run that failed, in parts of the loading work
 
 
 class PulsePlan:
@@ -76,8 +83,8 @@ class PulsePlan:
             raise InputError(f"{task.hammer.path}: a {waveform.shape} waveform has no width to be sought")
         self._task, self._waveform = task, waveform
         self._period, self._past, self._lead, self._landing = period, past, lead, landing
-        self._widest = widest(waveform, task.largest / (1.0 + GONE), period)
-        if self._widest <= 0.0:
+        self._widest = widest(waveform, task.largest / (1.0 + GONE), 0.0, period, _HALVINGS)
+        if self._widest <= _NONE * period:
             raise InputError(f"{task.hammer.path}: no width keeps the waveform below {task.largest:g} A")
         self._state = SlotState(rest, 0.0, -1, 0.0, 0.0)
         self._begin = 0.0
@@ -93,20 +100,18 @@ class PulsePlan:
             return self._measured(rows, duration, arrival)
 
         # From rest there is nothing to brake.
-        tried = _spread(2 * (_PER_SLOT if self.touches else 1))
-        found = measured(tried)
-        badness = found[0] + np.abs(found[1]) + np.abs(found[2])
-        best: tuple[float, FloatArray] | None = None
-        for number, row in enumerate(np.argsort(badness, kind="stable")[:_MOST_TRIES]):
-            if number >= _TRIES and best is not None:
-                break
+        tried = spread(2 * (_PER_SLOT if self.touches else 1), _TRIED)
+
+        def attempt(row: int) -> tuple[float, FloatArray] | None:
             place = _descend(measured, tried[row], conditions=True)
             cost, missed, above = measured(place[np.newaxis])[:, 0].tolist()
-            if abs(missed) < _MISSED and above > -_SLACK and (best is None or cost < best[0]):
-                best = cost, place
+            return (cost, place) if abs(missed) < MISSED and above > -SLACK else None
+
+        cost, missed, above = measured(tried)
+        best = best_of(cost + np.abs(missed) + np.abs(above), attempt, _TRIES, _MOST_TRIES)
         if best is None:
             return False
-        self._keep(best[1], duration, arrival)
+        self._keep(best, duration, arrival)
         self.touches.append(self._begin - self._past)
         return True
 
@@ -116,7 +121,7 @@ class PulsePlan:
         def measured(rows: FloatArray) -> FloatArray:
             return self._measured(rows, self._landing, self._landing)
 
-        tried = _spread(2 * _PER_SLOT)
+        tried = spread(2 * _PER_SLOT, _TRIED)
         order = np.argsort(measured(tried)[0], kind="stable")
         places = [_descend(measured, tried[row], conditions=False) for row in order[:_TRIES]]
         costs = measured(np.array(places))[0]
@@ -127,9 +132,7 @@ class PulsePlan:
         return self._drive(self._fired)
 
     def _drive(self, fired: list[tuple[float, float]]) -> PulseSequence:
-        kind: Any = type(self._waveform)
-        constants = self._waveform.model_dump()
-        waveforms = [kind(**{**constants, "width": width}) for _time, width in fired]
+        waveforms = [of_width(self._waveform, width) for _time, width in fired]
         return PulseSequence(waveforms, [time for time, _width in fired])
 
     def _pulses(self, row: FloatArray, arrival: float) -> list[tuple[float, float]]:
@@ -172,87 +175,35 @@ class PulsePlan:
         touched = np.where(late, dots.fired_at + dots.flight_time, np.inf).min(axis=1)
         force = np.where(late, dots.peak_force, 0.0).max(axis=1, initial=0.0)
         contacts = (late * (1 + dots.extra_contacts)).sum(axis=1)
-        missed = np.where(np.isfinite(touched), (touched - begin - arrival) / _ARRIVAL, _LOST)
+        missed = np.where(np.isfinite(touched), (touched - begin - arrival) / ARRIVAL, LOST)
         spent = np.trapezoid(np.maximum(power, 0.0), grid, axis=1)
         if task.heat:
             spent = task.loading * np.trapezoid(current**2, grid, axis=1) / (task.largest**2 * duration)
         wanted = 1 if arrival < duration else 0
         # A pulse that is not over when the dot touches would be one for the next slot.
         over = np.array([sum(self._pulses(row, arrival)[-1]) for row in rows]) - begin - arrival
-        odd = 10.0 * ((contacts > wanted).astype(float) + ~result.ok) + np.maximum(over, 0.0) / _ARRIVAL
+        odd = _WRONG * ((contacts > wanted).astype(float) + ~result.ok) + np.maximum(over, 0.0) / ARRIVAL
         cost = (spent + np.trapezoid(power, grid, axis=1)) / task.loading + odd
-        spare = (force / task.force - 1.0) / _FORCE
-        return np.asarray(np.nan_to_num(np.stack([cost, missed, spare]), nan=_LOST))
+        spare = (force / task.force - 1.0) / FORCE
+        return np.asarray(np.nan_to_num(np.stack([cost, missed, spare]), nan=LOST))
 
     def _keep(self, row: FloatArray, duration: float, arrival: float) -> None:
         self._fired += self._pulses(row, arrival)
         end = self._begin + duration
-        result = Ensemble(
+        ensemble = Ensemble(
             self._task.hammer,
             self._drive(self._fired),
             end,
             states=[self._state.row],
             starts=self._begin,
             tolerance=self._task.tolerance,
-        ).run(strobes=[[end]], threads=1, engine="plain")
-        found = result.strobes
-        assert found is not None
-        x, v, memory = (float(column[0, 0]) for column in (found.x, found.v, found.memory))
-        self._state = SlotState(x, v, int(found.branch[0, 0]), memory, 0.0)
+        )
+        self._state = end_of(ensemble, end, 0.0)
         self._begin = end
-
-
-def widest(waveform: Waveform, largest: float, longest: float) -> float:
-    """Return the largest width, s, with which a pulse stays below a current, A; 0 where none does."""
-
-    def peak(width: float) -> float:
-        kind: Any = type(waveform)
-        return float(kind(**{**waveform.model_dump(), "width": width}).peak)
-
-    low, high = 0.0, longest
-    if peak(high) <= largest:
-        return high
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if peak(middle) <= largest else (low, middle)
-    return low if low > 1e-9 * longest else 0.0
 
 
 def _descend(
     measured: Callable[[FloatArray], FloatArray], start: FloatArray, *, conditions: bool
 ) -> FloatArray:
-    from scipy import optimize
-
-    known: dict[bytes, tuple[FloatArray, FloatArray]] = {}
-
-    def values(place: FloatArray) -> tuple[FloatArray, FloatArray]:
-        key = place.tobytes()
-        if key not in known:
-            known.clear()
-            side = np.where(place < 0.5, _DIFFERENCE, -_DIFFERENCE)
-            rows = np.concatenate([place[np.newaxis], place + np.diag(side)])
-            found = measured(rows)
-            known[key] = found[:, 0], (found[:, 1:] - found[:, :1]) / side
-        return known[key]
-
-    asked = [
-        {"type": "eq", "fun": lambda y: values(y)[0][1], "jac": lambda y: values(y)[1][1]},
-        {"type": "ineq", "fun": lambda y: values(y)[0][2], "jac": lambda y: values(y)[1][2]},
-    ]
-    minimize: Any = optimize.minimize
-    found = minimize(
-        lambda y: values(y)[0][0],
-        start,
-        jac=lambda y: values(y)[1][0],
-        bounds=[(0.0, 1.0)] * start.size,
-        method="SLSQP",
-        options={"maxiter": _ROUNDS, "ftol": _ENDS_AT},
-        constraints=asked if conditions else [],
-    )
-    return np.clip(np.asarray(found.x, dtype=np.float64), 0.0, 1.0)
-
-
-def _spread(dimensions: int) -> FloatArray:
-    from scipy.stats import qmc
-
-    return np.asarray(qmc.Sobol(dimensions, scramble=False).random(_TRIED))
+    place, _cost = descend(measured, start, (0.0, 1.0), _ROUNDS, conditions=conditions, inward=True)
+    return np.clip(place, 0.0, 1.0)

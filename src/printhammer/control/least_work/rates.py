@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,12 +9,12 @@ import numpy as np
 from printhammer.control.least_work.burst import NoBurstError, least_work
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import rate_of
+from printhammer.results import Result, column, coordinate, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     import numpy.typing as npt
-    import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
@@ -25,70 +23,25 @@ FOUND = "ok"
 NOT_FOUND = "no current found"
 
 
-@dataclass(frozen=True)
-class LeastWorkRates:
-    """Bursts of least work at several rates: arrays of shape (n,), NaN where no current was found.
+class LeastWorkRates(Result):
+    """Bursts of least work at several rates; nan where no current was found."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    rates : array
-        Dots per second, Hz.
-    count : int
-        Number of dots of each burst.
-    net_ratio, positive_ratio, bound_ratio : array
-        As those of `LeastWork`.
-    squared_current : array
-        Integral of the squared current over the burst, A^2 s.
-    adequate : int array
-        Number of adequate dots.
-    status : str array
-        "ok", or "no current found", which is no proof that there is none.
-    """
+    hammer: Hammer = part("the hammer")
+    rates: FloatArray = coordinate("Hz", "dots per second", "rate", name="rate")
+    count: int = scalar("1", "number of dots of each burst", name="dots")
+    net_ratio: FloatArray = column("1", "net work of the coil over what the pack absorbs", "rate")
+    positive_ratio: FloatArray = column("1", "positive work over what the pack absorbs", "rate")
+    bound_ratio: FloatArray = column("1", "least positive work of any current, likewise", "rate")
+    squared_current: FloatArray = column("A^2 s", "integral of the squared current", "rate")
+    adequate: npt.NDArray[np.int64] = column("1", "number of adequate dots", "rate")
+    status: npt.NDArray[np.str_] = column(
+        "", "whether a current was found", "rate", more="no current found is no proof that there is none"
+    )
 
-    hammer: Hammer
-    rates: FloatArray
-    count: int
-    net_ratio: FloatArray = field(repr=False)
-    positive_ratio: FloatArray = field(repr=False)
-    bound_ratio: FloatArray = field(repr=False)
-    squared_current: FloatArray = field(repr=False)
-    adequate: npt.NDArray[np.int64] = field(repr=False)
-    status: npt.NDArray[np.str_] = field(repr=False)
-
-    def to_dataset(self) -> xr.Dataset:
-        """Return the works as a Dataset over `rate` [Hz], with units and provenance in the attributes."""
-        import xarray as xr
-
-        from printhammer import __version__
-
-        def entry(values: Any, unit: str, meaning: str) -> Any:
-            return "rate", values, {"units": unit, "long_name": meaning}
-
-        data = {
-            "net_ratio": entry(self.net_ratio, "1", "net work of the coil over what the pack absorbs"),
-            "positive_ratio": entry(self.positive_ratio, "1", "positive work over what the pack absorbs"),
-            "bound_ratio": entry(self.bound_ratio, "1", "least positive work of any current, likewise"),
-            "squared_current": entry(self.squared_current, "A^2 s", "integral of the squared current"),
-            "adequate": entry(self.adequate, "1", "number of adequate dots"),
-            "status": entry(self.status, "1", "whether a current was found"),
-        }
-        attributes = {
-            "title": f"bursts of least work of {self.hammer.name}",
-            "hammer": self.hammer.name,
-            "hammer_fingerprint": self.hammer.fingerprint,
-            "dots": self.count,
-            "printhammer": __version__,
-            "numpy": np.__version__,
-        }
-        rate = {"rate": entry(self.rates, "Hz", "dots per second")}
-        return xr.Dataset(data, coords=rate, attrs=attributes)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the works against the rate; returns a matplotlib figure."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.control.energy_rates").plot(self, **options)
+    @property
+    def title(self) -> str:
+        """What the bursts are of."""
+        return f"bursts of least work of {self.hammer.name}"
 
 
 def least_work_rates(

@@ -1,96 +1,109 @@
 """The current of one slot whose dot costs least work, and the current that lands the armature softly.
 
-Sequential quadratic programming (SLSQP: D. Kraft, DFVLR-FB 88-28 (1988)) over the currents at the nodes. Each
-step of it takes its derivatives from differences, all runs of which are one ensemble. It starts from the best
-of a few hundred simple profiles (brake, wait, throw), or from what did for the slot before.
+The currents at the nodes are sought by sequential quadratic programming. It starts from the best of a few
+hundred simple profiles (brake, wait, throw), or from what did for the slot before.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+import math
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.least_work.slot import outcomes, slot_end
+from printhammer.control.least_work.descent import (
+    ARRIVAL,
+    FORCE,
+    LOST,
+    MISSED,
+    SLACK,
+    best_of,
+    descend,
+    spread,
+)
+from printhammer.control.least_work.slot import RELOADING, SlotState, node_times
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.waveforms.shapes import Sampled
+from printhammer.hammer.equilibrium import rest_state
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.control.least_work.coil_force import CoilForce
-    from printhammer.control.least_work.slot import Outcomes, SlotState
-    from printhammer.hammer.hammer import Hammer
+    from printhammer.control.least_work.slot import Outcomes, Task
     from printhammer.support.arrays import FloatArray
 
-_DIFFERENCE: Final = 1e-5
-_ARRIVAL: Final = 20e-6
-_FORCE: Final = 0.05
-_RELOADING: Final = 1e-6
-_LAGS: Final = 1e-3
-_SLACK: Final = 8e-3
-_LOST: Final = 25.0
-_WRONG: Final = 10.0
-_PROFILES: Final = 512
-_TRIES: Final = 3
-_MOST_TRIES: Final = 12
-_ROUNDS: Final = 30
-_ROUNDS_AGAIN: Final = 20
-_ENDS_AT: Final = 1e-5
-_SMOOTHING: Final = 1e-3
-_SEARCH_TOLERANCE: Final = 5e-7
+LEAD: Final = 2.0
+"""Length of the first slot, from rest to the touch, in flight times of the single pulse."""
+
+LANDING: Final = 5.0
+"""Length of the landing, in flight times of the single pulse."""
+
+_FEWEST, _MOST = 8, 96  # Least and largest number of nodes of a slot
+# Part of a step by which the current of a slot lasts longer than the slot, which cuts it off
+_OVERLAP: Final = 0.01
+_LAGS: Final = 1e-3  # Lag in the pack up to which a current does, in `RELOADING`
+_WRONG: Final = 10.0  # Cost of a contact too many, or a run that failed, in parts of the loading work
+_PROFILES: Final = 512  # Number of profiles
+_TRIES, _MOST_TRIES = 3, 12  # Number of profiles from which a search begins, and while none is found
+_ROUNDS, _ROUNDS_AGAIN = 30, 20  # Steps of a search from a profile, and from what did for the slot before
+_SEARCH_TOLERANCE: Final = 5e-7  # Tolerance with which profiles are compared
+_INSIDE: Final = 1.0 - 1e-9  # A hair inside a bound, which rounding would exceed
 
 
-@dataclass(frozen=True)
-class Task:
-    """What the slots of a burst have in common.
+class NodePlan:
+    """The currents found so far, straight from node to node, and how they leave the armature.
 
-    Attributes
+    Parameters
     ----------
-    hammer : Hammer
-        The hammer.
-    coil : CoilForce
-        Force of its coil.
-    largest : float
-        Largest current of either sign, A.
-    slew : float
-        Largest slope of the current of either sign, A/s.
-    force : float
-        Least force of a dot, N.
-    loading : float
-        Loading work of such a dot, J, by which work is measured.
-    heat : bool
-        Whether the squared current is to be least instead of the positive work.
-    tolerance : float
-        As for `printhammer.simulate`.
+    task : Task
+        What is asked.
+    period, past, spacing, flight : float
+        Times, s: of a slot, from the touch of a dot to the end of its slot, between nodes, and of the flight
+        of the single pulse.
     """
 
-    hammer: Hammer
-    coil: CoilForce
-    largest: float
-    slew: float
-    force: float
-    loading: float
-    heat: bool
-    tolerance: float
+    def __init__(self, task: Task, period: float, past: float, spacing: float, flight: float) -> None:
+        self._task = task
+        self._past = past
+        self._nodes = min(max(round(period / spacing), _FEWEST), _MOST)
+        self._step = period / self._nodes
+        self._lead = max(self._nodes, math.ceil((LEAD * flight + past) / self._step))
+        self._landing = max(_FEWEST, math.ceil(LANDING * flight / self._step))
+        self._state = SlotState(rest_state(task.hammer), 0.0, -1, 0.0, 0.0)
+        self._currents: list[FloatArray] = []
+        self.touches: list[float] = []
 
-    def run(self, begin: SlotState, currents: FloatArray, duration: float, tolerance: float) -> Outcomes:
-        """Run a slot with many currents."""
-        return outcomes(self.hammer, self.coil, begin, currents, duration, tolerance, self.largest)
+    def add_dot(self) -> bool:
+        """Plan one more dot; False where no current was found."""
+        nodes = self._nodes if self._currents else self._lead
+        duration = nodes * self._step
+        before = self._currents[-1] if len(self._currents) > 1 else None
+        found = printing_current(self._task, self._state, duration, duration - self._past, nodes, before)
+        if found is None:
+            return False
+        self._state = self._task.end(self._state, found, duration)
+        self._currents.append(found)
+        self.touches.append(sum(c.size for c in self._currents) * self._step - self._past)
+        return True
 
-    def end(self, begin: SlotState, currents: FloatArray, duration: float) -> SlotState:
-        """Return how the slot after one begins."""
-        return slot_end(self.hammer, begin, currents, duration, self.tolerance, self.largest)
+    def land(self) -> None:
+        """Plan the landing."""
+        found = landing_current(self._task, self._state, self._landing * self._step, self._landing)
+        self._currents.append(found)
 
-    def cost(self, found: Outcomes, duration: float) -> FloatArray:
-        """Return what is to be least, in parts of the loading work.
-
-        The net work counts as well, since it grows with what the backstop takes. Lagging in the pack is dear:
-        where the armature went into it again, the law as printed would jump to the loading branch, and the
-        pack give back more than it does once unloaded.
-        """
-        heat = found.squared_current / (self.largest**2 * duration)
-        spent = heat if self.heat else found.positive / self.loading + _SMOOTHING * heat
-        return np.asarray(spent + found.net / self.loading + found.reloading / _RELOADING)
+    def drive(self) -> PulseSequence:
+        """Return the whole current, fired slot by slot; the last one ends with the landing."""
+        *slots, last, landing = self._currents
+        waveforms, times, begin, node = [], [], 0.0, 0
+        for current in (*slots, np.concatenate([last, landing])):
+            # Each lasts a little longer than its slot and is cut off, so that no rounding leaves a gap.
+            values = np.concatenate([[begin], current, current[-1:]])
+            offsets = np.append(np.arange(current.size + 1), current.size + _OVERLAP) * self._step
+            waveforms.append(Sampled.from_samples(offsets, values, interpolation="linear"))
+            times.append(node * self._step)
+            node += current.size
+            begin = float(current[-1])
+        return PulseSequence(waveforms, times, overlap="replace")
 
 
 def printing_current(
@@ -123,8 +136,8 @@ def printing_current(
     """
 
     def asked(found: Outcomes) -> tuple[FloatArray, FloatArray]:
-        missed = np.where(np.isnan(found.arrival), _LOST, (found.arrival - arrival) / _ARRIVAL)
-        return missed, (found.force / task.force - 1.0) / _FORCE
+        missed = np.where(np.isnan(found.arrival), LOST, (found.arrival - arrival) / ARRIVAL)
+        return missed, (found.force / task.force - 1.0) / FORCE
 
     def measured(currents: FloatArray) -> FloatArray:
         found = task.run(begin, currents, duration, task.tolerance)
@@ -133,26 +146,22 @@ def printing_current(
     def meets(currents: FloatArray) -> bool:
         found = task.run(begin, currents[np.newaxis], duration, task.tolerance)
         missed, above = asked(found)
-        clean = found.ok[0] and found.extra_contacts[0] == 0 and found.reloading[0] < _LAGS * _RELOADING
-        return bool(clean and abs(missed[0]) < 0.05 and above[0] > -_SLACK)
+        clean = found.ok[0] and found.extra_contacts[0] == 0 and found.reloading[0] < _LAGS * RELOADING
+        return bool(clean and abs(missed[0]) < MISSED and above[0] > -SLACK)
 
-    if before is not None:
-        currents, cost = _descend(task, measured, begin.current, before, duration, _ROUNDS_AGAIN, 2)
-        if meets(currents):
-            return currents
+    def attempt(start: FloatArray, rounds: int = _ROUNDS) -> tuple[float, FloatArray] | None:
+        currents, cost = _descend(task, measured, begin.current, start, duration, rounds, printing=True)
+        return (cost, currents) if meets(currents) else None
+
+    again = None if before is None else attempt(before, _ROUNDS_AGAIN)
+    if again is not None:
+        return again[1]
     tried = _profiles(task, begin.current, duration, arrival, nodes)
     found = task.run(begin, tried, duration, _SEARCH_TOLERANCE)
     missed, above = asked(found)
     odd = _WRONG * ((found.extra_contacts > 0).astype(float) + ~found.ok)
     badness = task.cost(found, duration) + np.abs(missed) + np.abs(above) + odd
-    best: tuple[float, FloatArray] | None = None
-    for number, row in enumerate(np.argsort(badness, kind="stable")[:_MOST_TRIES]):
-        if number >= _TRIES and best is not None:
-            break
-        currents, cost = _descend(task, measured, begin.current, tried[row], duration, _ROUNDS, 2)
-        if meets(currents) and (best is None or cost < best[0]):
-            best = cost, currents
-    return None if best is None else best[1]
+    return best_of(badness, lambda row: attempt(tried[row]), _TRIES, _MOST_TRIES)
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
@@ -181,14 +190,15 @@ def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -
         return rated(currents, task.tolerance)[np.newaxis]
 
     tried = _landings(task, begin.current, duration, nodes)
-    order = np.argsort(rated(tried, _SEARCH_TOLERANCE), kind="stable")
-    best: tuple[float, FloatArray] | None = None
-    for row in order[:_TRIES]:
-        currents, cost = _descend(task, measured, begin.current, tried[row], duration, _ROUNDS, 0)
-        if best is None or cost < best[0]:
-            best = cost, currents
+
+    def attempt(row: int) -> tuple[float, FloatArray]:
+        start = tried[row]
+        currents, cost = _descend(task, measured, begin.current, start, duration, _ROUNDS, printing=False)
+        return cost, currents
+
+    best = best_of(rated(tried, _SEARCH_TOLERANCE), attempt, _TRIES)
     assert best is not None
-    return np.append(best[1], 0.0)
+    return np.append(best, 0.0)
 
 
 def _descend(
@@ -198,56 +208,29 @@ def _descend(
     start: FloatArray,
     duration: float,
     rounds: int,
-    conditions: int,
+    *,
+    printing: bool,
 ) -> tuple[FloatArray, float]:
-    """Minimise the first row that `measured` returns; of two more the first is 0, the second not negative.
+    """Return the best currents from a start, and their cost, within the bounds on value and slope.
 
-    `start` may lack a last node, at which the current is 0 then.
+    Without a dot to print, the current has to come back to zero in one more step.
     """
-    from scipy import optimize
-
-    free = start.size
-    known: dict[bytes, tuple[FloatArray, FloatArray]] = {}
-
-    def values(currents: FloatArray) -> tuple[FloatArray, FloatArray]:
-        key = currents.tobytes()
-        if key not in known:
-            known.clear()
-            rows = np.concatenate([currents[np.newaxis], currents + _DIFFERENCE * np.eye(free)])
-            found = np.nan_to_num(measured(rows), nan=_LOST)
-            known[key] = found[:, 0], (found[:, 1:] - found[:, :1]) / _DIFFERENCE
-        return known[key]
-
-    # Of zero conditions on the dot, the current has to come back to zero in one more step.
-    steps = free if conditions else free + 1
-    slope = (np.eye(steps) - np.eye(steps, k=-1))[:, :free]
+    steps = start.size if printing else start.size + 1
+    slope = (np.eye(steps) - np.eye(steps, k=-1))[:, : start.size]
     offset = np.zeros(steps)
     offset[0] = -begin
-    # A hair inside the bound, which rounding would exceed.
-    reach = (1.0 - 1e-9) * task.slew * duration / (start.size if conditions else steps)
+    reach = _INSIDE * task.slew * duration / steps
     both = np.concatenate([-slope, slope])
     room = reach + np.concatenate([-offset, offset])
-    steepness = both / task.largest
-    conditions_on_current: list[dict[str, Any]] = [
-        {"type": "ineq", "fun": lambda y: room / task.largest + steepness @ y, "jac": lambda _y: steepness}
-    ]
-    if conditions:
-        conditions_on_current += [
-            {"type": "eq", "fun": lambda y: values(y)[0][1], "jac": lambda y: values(y)[1][1]},
-            {"type": "ineq", "fun": lambda y: values(y)[0][2], "jac": lambda y: values(y)[1][2]},
-        ]
-    minimize: Any = optimize.minimize
-    options = {"maxiter": rounds, "ftol": _ENDS_AT}
-    found = minimize(
-        lambda y: values(y)[0][0],
+    found, cost = descend(
+        measured,
         start,
-        jac=lambda y: values(y)[1][0],
-        bounds=[(-task.largest, task.largest)] * free,
-        method="SLSQP",
-        options=options,
-        constraints=conditions_on_current,
+        (-task.largest, task.largest),
+        rounds,
+        conditions=printing,
+        linear=(room / task.largest, both / task.largest),
     )
-    return _within(task, np.asarray(found.x), begin, reach, conditions == 0), float(found.fun)
+    return _within(task, found, begin, reach, not printing), cost
 
 
 def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero: bool) -> FloatArray:
@@ -264,11 +247,11 @@ def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero:
 
 def _profiles(task: Task, begin: float, duration: float, arrival: float, nodes: int) -> FloatArray:
     """Return currents that brake, wait and throw, at levels and times evenly spread, within the bounds."""
-    share = _spread(5, _PROFILES)
+    share = spread(5, _PROFILES)
     levels = task.largest * np.stack([share[:, 0], 0.6 * share[:, 1], 0.3 + 0.7 * share[:, 2]], axis=1)
     released = 0.5 * arrival * share[:, 3]
     thrown = released + share[:, 4] * (arrival - released)
-    times = np.linspace(0.0, duration, nodes + 1)[1:]
+    times = node_times(duration, nodes)[1:]
     wanted = np.where(
         times < released[:, np.newaxis],
         levels[:, :1],
@@ -279,11 +262,11 @@ def _profiles(task: Task, begin: float, duration: float, arrival: float, nodes: 
 
 def _landings(task: Task, begin: float, duration: float, nodes: int) -> FloatArray:
     """Return currents that hold the armature back on its way, then a little before the backstop."""
-    share = _spread(4, _PROFILES)
+    share = spread(4, _PROFILES)
     first, second = task.largest * (1.1 * share[:, 0] - 0.1), task.largest * share[:, 1]
     caught = 0.7 * duration * share[:, 2]
     landed = caught + share[:, 3] * (duration - caught)
-    times = np.linspace(0.0, duration, nodes + 1)[1:-1]
+    times = node_times(duration, nodes)[1:-1]
     wanted = np.where(
         times < caught[:, np.newaxis],
         first[:, np.newaxis],
@@ -293,11 +276,5 @@ def _landings(task: Task, begin: float, duration: float, nodes: int) -> FloatArr
 
 
 def _limited(task: Task, wanted: FloatArray, begin: float, step: float, *, to_zero: bool) -> FloatArray:
-    reach = (1.0 - 1e-9) * task.slew * step
+    reach = _INSIDE * task.slew * step
     return np.array([_within(task, row, begin, reach, to_zero) for row in wanted])
-
-
-def _spread(dimensions: int, count: int) -> FloatArray:
-    from scipy.stats import qmc
-
-    return np.asarray(qmc.Sobol(dimensions, scramble=False).random(count))

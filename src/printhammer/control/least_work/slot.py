@@ -8,7 +8,7 @@ between nodes at even times, from where it was at the end of the slot before.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Final, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
 import numpy as np
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-_SAMPLES: Final = 301
+_SAMPLES: Final = 301  # Instants of a slot at which power and motion are looked at
 _IN_PACK: Final = {
     "loading": 1,
     "unloading": 2,
@@ -32,32 +32,28 @@ _IN_PACK: Final = {
     "held on the loading branch": 1,
     "held on the unloading branch": 2,
 }
-_MANY: Final = 64
-_LEAST_SPEED: Final = 0.03
-_CLEAR: Final = 2e-6
+"""Branch as `Ensemble` takes it, by the mode."""
+
+_MANY: Final = 64  # Number of runs from which on threads are worth their while
+_LEAST_SPEED: Final = 0.03  # Speed with which the armature is to leave the pack, m/s
+_CLEAR: Final = 2e-6  # Distance from where it turned from which on it leaves, m
+_SMOOTHING: Final = 1e-3
+"""Weight of the squared current beside the positive work, so that no current is spent for nothing."""
+
+RELOADING: Final = 1e-6
+"""Lag in the pack that costs as much as the loading work, m."""
 
 
 @dataclass(frozen=True)
 class SlotState:
-    """How a slot begins.
+    """How a slot begins."""
 
-    Attributes
-    ----------
-    x, v : float
-        Displacement, m, and velocity, m/s.
-    branch : int
-        Code of the mode, as in `Strobes`, or -1 for none.
-    memory : float
-        As in `Strobes`, m.
-    current : float
-        Coil current, A.
-    """
-
+    # Displacement, m, and velocity, m/s
     x: float
     v: float
-    branch: int
-    memory: float
-    current: float
+    branch: int  # Code of the mode, as in `Strobes`, or -1 for none
+    memory: float  # As in `Strobes`, m
+    current: float  # Coil current, A
 
     @property
     def row(self) -> list[float]:
@@ -102,35 +98,19 @@ class _NodeDrive(Drive):
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What some currents do in a slot: arrays of shape (M,).
+    """What some currents do in a slot: arrays of shape (M,)."""
 
-    Attributes
-    ----------
-    positive, net : array
-        Work of the coil, J, good to about 1e-4 of itself.
-    squared_current : array
-        Integral of the squared current, A^2 s.
-    force : array
-        Largest force of the first dot, N; 0 without one.
-    arrival : array
-        Time of its touch since the slot began, s; NaN without one.
-    extra_contacts : int array
-        Further contacts.
-    reloading : array
-        How far the armature lagged, m, in the contact with which the slot begins: by which way it left the
-        pack slower than `_LEAST_SPEED`, once clear of where it turned, or went into it again.
-    ok : bool array
-        Whether the run went as asked.
-    """
-
+    # Work of the coil, J, good to about 1e-4 of itself
     positive: FloatArray
     net: FloatArray
-    squared_current: FloatArray
-    force: FloatArray
-    arrival: FloatArray
-    extra_contacts: npt.NDArray[np.int64]
+    squared_current: FloatArray  # Integral of the squared current, A^2 s
+    force: FloatArray  # Largest force of the first dot, N; 0 without one
+    arrival: FloatArray  # Time of its touch since the slot began, s; NaN without one
+    extra_contacts: npt.NDArray[np.int64]  # Further contacts
+    # How far the armature lagged, m, in the contact with which the slot begins: by which way it left
+    # the pack slower than `_LEAST_SPEED`, once clear of where it turned, or went into it again
     reloading: FloatArray
-    ok: npt.NDArray[np.bool_]
+    ok: npt.NDArray[np.bool_]  # Whether the run went as asked
 
 
 def node_times(duration: float, nodes: int) -> FloatArray:
@@ -138,102 +118,79 @@ def node_times(duration: float, nodes: int) -> FloatArray:
     return np.linspace(0.0, duration, nodes + 1)
 
 
-def outcomes(
-    hammer: Hammer,
-    coil: CoilForce,
-    begin: SlotState,
-    currents: FloatArray,
-    duration: float,
-    tolerance: float,
-    largest: float,
-) -> Outcomes:
-    """Run a slot with many currents.
+@dataclass(frozen=True)
+class Task:
+    """What the slots of a burst have in common."""
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    coil : CoilForce
-        Force of its coil.
-    begin : SlotState
-        How the slot begins.
-    currents : array, shape (M, nodes)
-        Currents at the nodes after the first one, A.
-    duration : float
-        Of the slot, s.
-    tolerance : float
-        As for `printhammer.simulate`.
-    largest : float
-        Largest current that may occur, A.
-    """
-    assert hammer.front is not None
-    grid = np.linspace(0.0, duration, _SAMPLES)
-    nodes = node_times(duration, currents.shape[1])
-    paths = np.concatenate([np.full((len(currents), 1), begin.current), currents], axis=1)
-    result = _ensemble(hammer, begin, paths, duration, tolerance, largest).run(
-        dots=True, strobes=[grid] * len(paths), threads=1 if len(paths) < _MANY else None, engine="plain"
-    )
-    assert result.strobes is not None
-    assert result.dots is not None
-    current = np.array([np.interp(grid, nodes, path) for path in paths])
-    x, v = result.strobes.x, result.strobes.v
-    power = coil(x, current) * v
-    dots = result.dots
-    arrival = np.where(dots.struck[:, 0], dots.flight_time[:, 0], np.nan)
-    below = x < np.maximum.accumulate(x, axis=1) - _CLEAR
-    leaving = below & (x > hammer.front) & ~(grid >= arrival[:, np.newaxis])
-    return Outcomes(
-        positive=np.trapezoid(np.maximum(power, 0.0), grid, axis=1),
-        net=np.asarray(np.trapezoid(power, grid, axis=1)),
-        squared_current=np.trapezoid(current**2, grid, axis=1),
-        force=np.nan_to_num(dots.peak_force[:, 0]),
-        arrival=arrival,
-        extra_contacts=dots.extra_contacts[:, 0],
-        reloading=np.trapezoid(np.where(leaving, np.maximum(v + _LEAST_SPEED, 0.0), 0.0), grid, axis=1),
-        ok=result.ok,
-    )
+    hammer: Hammer  # The hammer
+    coil: CoilForce  # Force of its coil
+    largest: float  # Largest current of either sign, A
+    slew: float  # Largest slope of the current of either sign, A/s
+    force: float  # Least force of a dot, N
+    loading: float  # Loading work of such a dot, J, by which work is measured
+    heat: bool  # Whether the squared current is to be least instead of the positive work
+    tolerance: float  # As for `printhammer.simulate`
 
-
-def slot_end(
-    hammer: Hammer,
-    begin: SlotState,
-    currents: FloatArray,
-    duration: float,
-    tolerance: float,
-    largest: float,
-) -> SlotState:
-    """Return how the slot after one with given currents, A, at its nodes begins."""
-    path = np.concatenate([[begin.current], currents])[np.newaxis]
-    result = _ensemble(hammer, begin, path, duration, tolerance, largest).run(
-        strobes=[[duration]], threads=1, engine="plain"
-    )
-    found = result.strobes
-    assert found is not None
-    return SlotState(
-        float(found.x[0, 0]),
-        float(found.v[0, 0]),
-        int(found.branch[0, 0]),
-        float(found.memory[0, 0]),
-        float(currents[-1]),
-    )
-
-
-def _ensemble(
-    hammer: Hammer,
-    begin: SlotState,
-    paths: FloatArray,
-    duration: float,
-    tolerance: float,
-    largest: float,
-) -> Ensemble:
-    drives = [
-        # Thousands are made in a search: checks of what was just computed would take most of its time.
-        _NodeDrive(
-            NodeCurrent.model_construct(
-                quantity="current", duration=duration, values=tuple(path), largest=largest
-            ),
-            [0.0],
+    def run(self, begin: SlotState, currents: FloatArray, duration: float, tolerance: float) -> Outcomes:
+        """Run a slot of some duration, s, with many currents (M, nodes), A, at the nodes after the first."""
+        front = self.hammer.front
+        assert front is not None
+        grid = np.linspace(0.0, duration, _SAMPLES)
+        nodes = node_times(duration, currents.shape[1])
+        paths = np.concatenate([np.full((len(currents), 1), begin.current), currents], axis=1)
+        result = self._ensemble(begin, paths, duration, tolerance).run(
+            dots=True, strobes=[grid] * len(paths), threads=1 if len(paths) < _MANY else None, engine="plain"
         )
-        for path in paths.tolist()
-    ]
-    return Ensemble(hammer, drives, duration, states=begin.row, tolerance=tolerance)
+        strobes, dots = result.strobes, result.dots
+        assert strobes is not None
+        assert dots is not None
+        current = np.array([np.interp(grid, nodes, path) for path in paths])
+        x, v = strobes.x, strobes.v
+        power = self.coil(x, current) * v
+        arrival = np.where(dots.struck[:, 0], dots.flight_time[:, 0], np.nan)
+        below = x < np.maximum.accumulate(x, axis=1) - _CLEAR
+        leaving = below & (x > front) & ~(grid >= arrival[:, np.newaxis])
+        return Outcomes(
+            positive=np.trapezoid(np.maximum(power, 0.0), grid, axis=1),
+            net=np.asarray(np.trapezoid(power, grid, axis=1)),
+            squared_current=np.trapezoid(current**2, grid, axis=1),
+            force=np.nan_to_num(dots.peak_force[:, 0]),
+            arrival=arrival,
+            extra_contacts=dots.extra_contacts[:, 0],
+            reloading=np.trapezoid(np.where(leaving, np.maximum(v + _LEAST_SPEED, 0.0), 0.0), grid, axis=1),
+            ok=result.ok,
+        )
+
+    def end(self, begin: SlotState, currents: FloatArray, duration: float) -> SlotState:
+        """Return how the slot after one with some currents (nodes,), A, begins."""
+        path = np.concatenate([[begin.current], currents])[np.newaxis]
+        ensemble = self._ensemble(begin, path, duration, self.tolerance)
+        return end_of(ensemble, duration, float(currents[-1]))
+
+    def cost(self, found: Outcomes, duration: float) -> FloatArray:
+        """Return what is to be least, in parts of the loading work.
+
+        The net work counts as well, since it grows with what the backstop takes. Lagging in the pack is dear:
+        where the armature went into it again, the law as printed would jump to the loading branch, and the
+        pack give back more than it does once unloaded.
+        """
+        heat = found.squared_current / (self.largest**2 * duration)
+        spent = heat if self.heat else found.positive / self.loading + _SMOOTHING * heat
+        return np.asarray(spent + found.net / self.loading + found.reloading / RELOADING)
+
+    def _ensemble(self, begin: SlotState, paths: FloatArray, duration: float, tolerance: float) -> Ensemble:
+        # Thousands are made in a search: checks of what was just computed would take most of its time.
+        constants: dict[str, Any] = {"quantity": "current", "duration": duration, "largest": self.largest}
+        drives = [
+            _NodeDrive(NodeCurrent.model_construct(**constants, values=tuple(path)), [0.0])
+            for path in paths.tolist()
+        ]
+        return Ensemble(self.hammer, drives, duration, states=begin.row, tolerance=tolerance)
+
+
+def end_of(ensemble: Ensemble, end: float, current: float) -> SlotState:
+    """Return the state at the end of a run, s, where the current is known, A."""
+    found = ensemble.run(strobes=[[end]], threads=1, engine="plain").strobes
+    assert found is not None
+    x, v, memory = (float(column[0, 0]) for column in (found.x, found.v, found.memory))
+    return SlotState(x, v, int(found.branch[0, 0]), memory, current)

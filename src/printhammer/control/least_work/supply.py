@@ -13,7 +13,8 @@ from printhammer.run.ensemble import Ensemble
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.control.least_work.burst import LeastWork
+    from printhammer.drive.sequence import PulseSequence
+    from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
 
@@ -42,13 +43,29 @@ class SupplyCheck:
     status: npt.NDArray[np.str_]
 
 
-def supply_check(found: LeastWork, changes: npt.ArrayLike) -> SupplyCheck:
+def supply_check(
+    hammer: Hammer,
+    drive: PulseSequence,
+    end: float,
+    slots: FloatArray,
+    *,
+    rate: float,
+    single: float,
+    least: float,
+    changes: npt.ArrayLike,
+) -> SupplyCheck:
     """Run the drive of a burst with every current changed, in one ensemble.
 
     Parameters
     ----------
-    found : LeastWork
-        The burst.
+    hammer, drive, end
+        What is run, and how long, s.
+    slots : array, shape (dots,)
+        Times at which the dots are to touch, s.
+    rate : float
+        Dots per second, Hz.
+    single, least : float
+        Force of the single pulse, N, and least force of a dot in parts of it.
     changes : array
         Relative changes of the current, each above -1.
 
@@ -60,19 +77,19 @@ def supply_check(found: LeastWork, changes: npt.ArrayLike) -> SupplyCheck:
     factors = 1.0 + np.atleast_1d(np.asarray(changes, dtype=np.float64))
     if factors.ndim != 1 or not (np.isfinite(factors) & (factors > 0.0)).all():
         raise InputError(f"changes = {changes!r}, expected relative changes of the current above -1")
-    drives = [found.drive.scaled(factor) for factor in factors.tolist()]
-    result = Ensemble(found.hammer, drives, found.motion.end).run(dots=True, engine="plain")
+    drives = [drive.scaled(factor) for factor in factors.tolist()]
+    result = Ensemble(hammer, drives, end).run(dots=True, engine="plain")
     dots = result.dots
     assert dots is not None
     touched = np.where(dots.struck, dots.fired_at + dots.flight_time, np.inf)
-    away = np.abs(touched[:, :, np.newaxis] - found.slots)
+    away = np.abs(touched[:, :, np.newaxis] - slots)
     # The dot of a slot is the touch nearest to it, wherever its pulse was fired.
     which = away.argmin(axis=1)
     late = away.min(axis=1)
     rows = np.arange(len(drives))[:, np.newaxis]
-    made = late < 0.5 / found.rate
-    force = np.where(made, np.nan_to_num(dots.peak_force[rows, which]) / found.single.force, 0.0)
-    good = made & (dots.extra_contacts[rows, which] == 0) & (force >= found.force)
+    made = late < 0.5 / rate
+    force = np.where(made, np.nan_to_num(dots.peak_force[rows, which]) / single, 0.0)
+    good = made & (dots.extra_contacts[rows, which] == 0) & (force >= least)
     return SupplyCheck(
         changes=factors - 1.0,
         adequate=good.sum(axis=1),

@@ -1,96 +1,56 @@
-"""Compensation tables: how to fire a dot that follows others before the hammer has come to rest."""
+"""Compensation tables: feedforward for a dot that follows others before the hammer has come to rest."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.control.table.drive import COLUMNS, ROUNDING, Settings, print_pulse, pulses_of, sequence
+from printhammer.control.table.formats import HEAD, columns, csv_head, header_text, read_table
 from printhammer.control.table.histories import (
-    MOST_GAPS,
-    MOST_REACH,
     checked_size,
     entries_of,
     histories,
+    history_text,
     number_of,
     shared_numbers,
 )
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
+from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.declare import Column
+from printhammer.results.files import csv_text, frame, plain
+from printhammer.results.provenance import versions
+from printhammer.support.outputs import write_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
-    import numpy.typing as npt
-    import xarray as xr
+    import pandas as pd
 
-    from printhammer.control.table.drive import TableStrategy
     from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray
-
-COLUMNS: Final = ("advance", "width", "brake_delay", "brake_width")
-"""What a table says of a dot."""
-
-_NEAR: Final = 1e-9
 
 JUMP: Final = 8e-6
 """Difference of neighbouring advances from which on they belong to different ways to fire a dot, s."""
 
-
-@dataclass(frozen=True)
-class Settings:
-    """What a table says at one rate: arrays of shape (entries,), over the numbers of the histories.
-
-    Attributes
-    ----------
-    advance : array
-        How long before its slot a dot is fired, s; negative: after it.
-    width : array
-        Width of its pulse, s.
-    brake_delay : array
-        From the slot of the dot before to the brake pulse in the gap before this dot, s; 0 without one.
-    brake_width : array
-        Width of that brake pulse, s; 0 for none.
-    """
-
-    advance: FloatArray
-    width: FloatArray
-    brake_delay: FloatArray
-    brake_width: FloatArray
+_NEAR: Final = 1e-9  # Rounding allowed in a rate, relative, and in a time, s
+_CELLS: Final = "rate history"
 
 
-@dataclass(frozen=True)
-class CompensationTable:
+class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".nc", ".zarr", ".parquet")):
     """Pulse width and advance as a function of the last gaps between dots: a row a rate, a column a history.
 
     A dot of history h at a slot is fired `advance` before the slot, with a pulse of `width`. In the gap
     before it, `brake_delay` after the slot of the dot before it, a brake pulse of `brake_width` catches the
     armature on its way back, so that it does not rebound. What follows the last dot for long is the brake
-    pulse of a dot from rest. The numbers of histories are those of `printhammer.control.table.histories`.
-
-    Attributes
-    ----------
-    hammer : str
-        Name of the hammer it is made for.
-    fingerprint : str
-        Of this hammer.
-    rates : array, shape (R,)
-        Slots per second, Hz, ascending.
-    gaps : int
-        Number n of gaps in a history.
-    reach : int
-        Longest gap that counts, slots; a longer one is rest.
-    advance, width, brake_delay, brake_width : array, shape (R, (reach + 1)**n)
-        As in `Settings`, s.
-    deviation : array, shape (R, (reach + 1)**n)
-        Worst deviation of force or arrival, in parts of the limits, of the dots of this history in the
-        patterns that the table was tuned on; NaN where it is not known. 1 is on the limit.
-    largest_current : float
-        Bound on the current that was kept to, A.
+    pulse of a dot from rest. Arrays have a column for each of the (reach + 1)**gaps numbers of histories, see
+    `printhammer.control.table.histories`; the Dataset has one for each history that differs.
 
     Raises
     ------
@@ -99,17 +59,22 @@ class CompensationTable:
         before the one before has ended.
     """
 
-    hammer: str
-    fingerprint: str
-    rates: FloatArray
-    gaps: int
-    reach: int
-    advance: FloatArray = field(repr=False)
-    width: FloatArray = field(repr=False)
-    brake_delay: FloatArray = field(repr=False)
-    brake_width: FloatArray = field(repr=False)
-    deviation: FloatArray = field(repr=False)
-    largest_current: float
+    hammer: str = part("name of the hammer it is made for")
+    fingerprint: str = part("fingerprint of this hammer")
+    rates: FloatArray = coordinate("Hz", "slots per second", "rate", name="rate", more="ascending")
+    gaps: int = scalar("1", "number of gaps in a history")
+    reach: int = scalar("1", "longest gap that counts, slots", more="a longer one is rest")
+    advance: FloatArray = column("s", "how long before its slot a dot is fired", _CELLS)
+    width: FloatArray = column("s", "width of its pulse", _CELLS)
+    brake_delay: FloatArray = column("s", "from the slot of the dot before to the brake pulse", _CELLS)
+    brake_width: FloatArray = column("s", "width of the brake pulse, 0 for none", _CELLS)
+    deviation: FloatArray = column(
+        "1",
+        "worst deviation where it was tuned, in parts of the limits",
+        _CELLS,
+        more="of force or arrival; nan where it is not known, and 1 is on the limit",
+    )
+    largest_current: float = scalar("A", "bound on the current that was kept to")
 
     def __post_init__(self) -> None:
         checked_size(self.gaps, self.reach)
@@ -130,8 +95,8 @@ class CompensationTable:
 
     def _check(self, row: int, rate: float, history: Sequence[int]) -> None:
         """Refuse an entry that cannot be fired."""
-        column = number_of(history, self.reach)
-        values = {name: float(getattr(self, name)[row, column]) for name in COLUMNS}
+        number = number_of(history, self.reach)
+        values = {name: float(getattr(self, name)[row, number]) for name in COLUMNS}
         where = f"rate {rate:g} Hz, history {'-'.join(map(str, history))}"
         for name, value in values.items():
             if not np.isfinite(value):
@@ -162,7 +127,7 @@ class CompensationTable:
             )
 
     @property
-    def shared(self) -> npt.NDArray[np.int64]:
+    def shared(self) -> Any:
         """For every number of a history, that of the history it stands for."""
         return shared_numbers(self.gaps, self.reach)
 
@@ -193,31 +158,18 @@ class CompensationTable:
         periods = 1.0 / self.rates[[first, second]]
         share = 0.0 if first == second else float((periods[0] - 1.0 / asked) / (periods[0] - periods[1]))
         share = min(max(share, 0.0), 1.0)
-        mixed = np.abs(self.advance[first] - self.advance[second]) > JUMP
+        apart = np.abs(self.advance[first] - self.advance[second]) > JUMP
         for values in (self.brake_delay, self.brake_width):
-            mixed |= values[first] != values[second]
-        part = np.where(mixed, float(share > 0.5), share)
-        found = {}
-        for name in COLUMNS:
-            values = getattr(self, name)
+            apart |= values[first] != values[second]
+        part = np.where(apart, float(share > 0.5), share)
+
+        def between(values: FloatArray) -> FloatArray:
             # Exactly the values of the table at its own rates.
-            between = (1.0 - part) * values[first] + part * values[second]
-            found[name] = np.where(part == 0.0, values[first], np.where(part == 1.0, values[second], between))
-        return Settings(**found)
+            mixed = (1.0 - part) * values[first] + part * values[second]
+            upper = np.where(part == 1.0, values[second], mixed)
+            return np.asarray(np.where(part == 0.0, values[first], upper))
 
-    def check_hammer(self, hammer: Hammer) -> None:
-        """Make sure that a hammer is the one the table is made for.
-
-        Raises
-        ------
-        InputError
-            It is another one: its fingerprint differs.
-        """
-        if hammer.fingerprint != self.fingerprint:
-            raise InputError(
-                f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
-                f" {self.fingerprint[:12]}, expected {hammer.fingerprint[:12]}"
-            )
+        return Settings(*(between(getattr(self, name)) for name in COLUMNS))
 
     def strategy(self, hammer: Hammer) -> TableStrategy:
         """Return the table as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`.
@@ -230,11 +182,14 @@ class CompensationTable:
         Raises
         ------
         InputError
-            The table is made for another one, or its pulses would need more than `largest_current`.
+            The table is made for another one, of another fingerprint, or its pulses would need more than
+            `largest_current`.
         """
-        from printhammer.control.table.drive import TableStrategy
-
-        self.check_hammer(hammer)
+        if hammer.fingerprint != self.fingerprint:
+            raise InputError(
+                f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
+                f" {self.fingerprint[:12]}, expected {hammer.fingerprint[:12]}"
+            )
         return TableStrategy(self, hammer)
 
     def drive(self, hammer: Hammer, slots: Sequence[int], rate: float | str) -> Drive:
@@ -256,28 +211,144 @@ class CompensationTable:
         """
         return self.strategy(hammer)(hammer, [tuple(slots)], read_positive(rate, "Hz", "rate"))[0]
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the table as a Dataset over `rate` and `history`, with units and provenance."""
-        from printhammer.control.table.files import table_dataset
+    @property
+    def title(self) -> str:
+        """What the table is made for."""
+        return f"compensation table for {self.hammer}"
 
-        return table_dataset(self)
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """The hammer the table is made for, and versions."""
+        return {"hammer": self.hammer, "hammer_fingerprint": self.fingerprint, **versions()}
+
+    def entries(self) -> Entries:
+        """Return the arrays over the histories that differ, the gaps as text such as "1-2-rest"."""
+        every = histories(self.gaps, self.reach)
+        numbers = [number_of(history, self.reach) for history in every]
+        found = {
+            name: (note, values[:, numbers] if note.kind == "column" else values)
+            for name, (note, values) in super().entries().items()
+        }
+        meaning = "gaps to the dots before in slots, the latest first"
+        note = Column("", meaning, ("history",), "coordinate", name="history")
+        return {**found, "history": (note, np.array([history_text(history) for history in every]))}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each rate and history, the gaps of the history in columns of their own."""
+        entries = self.entries()
+        texts = np.array([text.split("-") for text in entries.pop("history")[1]])
+        arrays: list[Any] = [(("rate",), self.rates), *((("history",), gap) for gap in texts.T)]
+        arrays += [(note.dims, values) for note, values in entries.values() if note.kind == "column"]
+        named = dict(zip(columns(self.gaps), arrays, strict=True))
+        return frame(named, self.ROWS, plain(self.attributes))
+
+    def to_csv(self) -> str:
+        """Return the text of the CSV file."""
+        table = self.to_dataframe()
+        # Shortest digits that tell the numbers apart, below the lines with what holds for all of them.
+        rows = str(table.to_csv(index=False, header=False, lineterminator="\n"))
+        return csv_head(self._head) + csv_text(table.iloc[:0]) + rows
+
+    def to_header(self) -> str:
+        """Return the text of the C header."""
+        return header_text(self._head, self.rates, {name: getattr(self, name) for name in COLUMNS})
+
+    @property
+    def _head(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in HEAD}
 
     def save(self, path: str | Path) -> None:
-        """Write the table as CSV (.csv), JSON (.json), C header (.h) or NetCDF (.nc), whole or not at all.
+        """Write the table, a C header (.h) among others, by the ending of the name; whole or not at all.
+
+        `load_table` reads CSV and JSON again.
 
         Raises
         ------
         InputError
-            The name ends in none of these, or the file cannot be written.
+            The name ends in none of `ENDINGS`, or the file cannot be written.
         """
-        from printhammer.control.table.files import save_table
-
-        save_table(self, path)
-
-    def plot(self, **options: Any) -> Any:
-        """Draw the table; returns a matplotlib figure, see `printhammer.figures.control.compensation`."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.control.compensation").plot(self, **options)
+        texts = {".csv": self.to_csv, ".h": self.to_header}
+        suffix = Path(path).suffix.lower()
+        if suffix in texts:
+            write_file(Path(path), texts[suffix]())
+        else:
+            super().save(path)
 
 
-__all__ = ["COLUMNS", "MOST_GAPS", "MOST_REACH", "CompensationTable", "Settings"]
+class TableStrategy:
+    """A compensation table as a way to drive a hammer.
+
+    Parameters
+    ----------
+    table : CompensationTable
+        The table.
+    hammer : Hammer
+        The hammer it is made for, whose waveform gets other widths.
+
+    Raises
+    ------
+    InputError
+        A pulse of the table peaks above its largest current.
+    """
+
+    name = "table"
+
+    def __init__(self, table: CompensationTable, hammer: Hammer) -> None:
+        self.table = table
+        self._pulse, widest = print_pulse(hammer, table.largest_current)
+        for name in ("width", "brake_width"):
+            largest = float(getattr(table, name).max())
+            if largest > widest * (1.0 + ROUNDING):
+                raise InputError(
+                    f"the table for {table.hammer!r} has a {name} of {largest:.9g} s, expected at most"
+                    f" {widest:.9g} s, so that the current is at most {table.largest_current:g} A"
+                )
+
+    def __call__(self, _hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
+        """Return a drive for each pattern; the hammer that is driven does not change them.
+
+        Raises
+        ------
+        InputError
+            The table does not reach to this rate, or a firing would come before the one before it has ended.
+        """
+        speed, table = read_positive(rate, "Hz", "rate"), self.table
+        settings = table.at(speed)
+        known: dict[tuple[float, float, float], Waveform] = {}
+        every = (pulses_of(settings, table.gaps, table.reach, slots, speed) for slots in patterns)
+        return [sequence(pulses, self._pulse, known) for pulses in every]
+
+
+def load_table(path: str | Path) -> CompensationTable:
+    """Read a compensation table that was written as CSV or JSON.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its file.
+
+    Returns
+    -------
+    CompensationTable
+        The same, to the last bit.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is no such table; the sentence names file, key, value and what was
+        expected.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in (".csv", ".json"):
+        raise InputError(f"{target}: expected a table whose name ends in .csv or .json")
+    try:
+        text = target.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{target}: the table is expected to be UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{target}: the table cannot be read ({reason})") from None
+    try:
+        return CompensationTable(**read_table(text, target.suffix.lower()))
+    except InputError as error:
+        raise InputError(f"{target}: {error}") from None

@@ -1,14 +1,15 @@
-"""From a compensation table to a drive: a pulse of its own for each dot, and a brake pulse after it."""
+"""From the settings of a compensation table to a drive: a pulse for each dot, and a brake pulse after it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.control.table.histories import histories_of
-from printhammer.drive.input import read_positive
+from printhammer.control.widths import of_width, widest
+from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.waveforms.shapes import Chain
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.slots import slot_times
@@ -16,8 +17,6 @@ from printhammer.printing.dots.slots import slot_times
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.control.table.compensation import CompensationTable, Settings
-    from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
@@ -31,15 +30,37 @@ LARGEST_CURRENT: Final = 2.0
 MARGIN: Final = 1e-3
 """Part of the largest current that a single pulse stays below it, for what is left of a brake pulse."""
 
-_ROUNDING: Final = 1e-9
-_HALVINGS: Final = 50
-_SAMPLES: Final = 4001
-_WAIT: Final = 1e-6
+ROUNDING: Final = 1e-9
+"""Part by which rounding may go beyond a bound."""
+
+_HALVINGS: Final = 50  # Halvings of an interval of widths: more than a double has bits to tell them apart
+_SAMPLES: Final = 4001  # Instants at which a decaying pulse is looked at
+_WAIT: Final = 1e-6  # Step of the wait after a brake pulse, s
 
 
-def of_width(pulse: Waveform, width: float) -> Waveform:
-    """Return a pulse like another one, but of another width, s."""
-    return type(pulse)(**{**dict(pulse), "width": width})
+class Settings(NamedTuple):
+    """What a table says at one rate: arrays of shape (entries,), over the numbers of the histories.
+
+    Attributes
+    ----------
+    advance : array
+        How long before its slot a dot is fired, s; negative: after it.
+    width : array
+        Width of its pulse, s.
+    brake_delay : array
+        From the slot of the dot before to the brake pulse in the gap before this dot, s; 0 without one.
+    brake_width : array
+        Width of that brake pulse, s; 0 for none.
+    """
+
+    advance: FloatArray
+    width: FloatArray
+    brake_delay: FloatArray
+    brake_width: FloatArray
+
+
+COLUMNS: Final = Settings._fields
+"""What a table says of a dot."""
 
 
 def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
@@ -56,18 +77,12 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
         raise InputError(f"{hammer.path}: a {pulse.shape} has no width, expected a pulse that has one")
     if pulse.quantity != "current":
         raise InputError(f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current")
-    if pulse.peak > largest * (1.0 + _ROUNDING):
+    if pulse.peak > largest * (1.0 + ROUNDING):
         raise InputError(
             f"{hammer.path}: the waveform peaks at {pulse.peak:.4g} A, expected at most {largest:g} A"
         )
-    low, high = width, WIDEST * width
     bound = max(pulse.peak, largest * (1.0 - MARGIN))
-    if of_width(pulse, high).peak <= bound:
-        return pulse, high
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if of_width(pulse, middle).peak <= bound else (low, middle)
-    return pulse, low
+    return pulse, widest(pulse, bound, width, WIDEST * width, _HALVINGS)
 
 
 def fading(pulse: Waveform, share: float) -> float:
@@ -78,90 +93,28 @@ def fading(pulse: Waveform, share: float) -> float:
     return float(times[min(loud[-1] + 1, _SAMPLES - 1)] - own.width) if loud.size else 0.0
 
 
-def clearance(pulse: Waveform, widest: float, largest: float) -> float:
+def clearance(pulse: Waveform, width: float, largest: float) -> float:
     """Return how long after the width of a brake pulse the next pulse may begin, s.
 
-    By then so much of it has decayed that the widest pulses one after another keep to the bound on the
-    current, A.
+    By then so much of it has decayed that pulses of the largest width one after another keep to the bound on
+    the current, A.
     """
-    wide = of_width(pulse, widest)
+    wide = of_width(pulse, width)
     wait, times = 0.0, np.linspace(0.0, wide.support, _SAMPLES)
     rising = np.abs(wide.value(times))
-    while wait < wide.support - widest:
-        left = np.abs(wide.value(widest + wait + times))
-        if (rising + left).max() <= largest * (1.0 + _ROUNDING):
+    while wait < wide.support - width:
+        left = np.abs(wide.value(width + wait + times))
+        if (rising + left).max() <= largest * (1.0 + ROUNDING):
             break
         wait += _WAIT
     return wait
 
 
-def with_brake(pulse: Waveform, brake: Waveform | None, offset: float) -> Waveform:
-    """Return a pulse followed by a brake pulse, s after its firing; without one the pulse itself."""
-    from printhammer.drive.waveforms.shapes import Chain
-
-    return pulse if brake is None else Chain(parts=((0.0, pulse), (offset, brake)))
-
-
-class TableStrategy:
-    """A compensation table as a way to drive a hammer.
-
-    Parameters
-    ----------
-    table : CompensationTable
-        The table.
-    hammer : Hammer
-        The hammer it is made for, whose waveform gets other widths.
-
-    Raises
-    ------
-    InputError
-        A pulse of the table peaks above its largest current.
-    """
-
-    name = "table"
-
-    def __init__(self, table: CompensationTable, hammer: Hammer) -> None:
-        self.table = table
-        self._pulse, widest = print_pulse(hammer, table.largest_current)
-        for column in ("width", "brake_width"):
-            found = float(getattr(table, column).max())
-            if found > widest * (1.0 + _ROUNDING):
-                raise InputError(
-                    f"the table for {table.hammer!r} has a {column} of {found:.9g} s, expected at most"
-                    f" {widest:.9g} s, so that the current is at most {table.largest_current:g} A"
-                )
-
-    def __call__(self, _hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
-        """Return a drive for each pattern; the hammer that is driven does not change them.
-
-        Raises
-        ------
-        InputError
-            The table does not reach to this rate, or a firing would come before the one before it has ended.
-        """
-        speed = read_positive(rate, "Hz", "rate")
-        settings = self.table.at(speed)
-        known: dict[tuple[float, float, float], Waveform] = {}
-        every = (pulses_of(settings, self.table.gaps, self.table.reach, slots, speed) for slots in patterns)
-        return [sequence(pulses, self._pulse, known) for pulses in every]
-
-
-@dataclass(frozen=True)
-class Pulses:
+class Pulses(NamedTuple):
     """What the dots of one pattern are made with: arrays of shape (dots,), s.
 
-    Attributes
-    ----------
-    due : array
-        Slot times.
-    advance, fired : array
-        Advance, and firing time.
-    width : array
-        Widths of the pulses.
-    braked : array
-        Widths of the brake pulses that follow; 0 for none.
-    offset : array
-        From firing to brake pulse.
+    Slot times `due`, `advance` and firing times `fired`, the `width` of the pulses, and of the brake pulses
+    that follow them the width `braked`, 0 for none, and the `offset` from the firing.
     """
 
     due: FloatArray
@@ -176,19 +129,14 @@ def pulses_of(settings: Settings, gaps: int, reach: int, slots: Sequence[int], r
     """Return what the dots of a pattern are made with."""
     numbers = histories_of(slots, gaps, reach)
     here, after = numbers[:-1], numbers[1:]
-    due = slot_times(slots, rate)
-    advance = settings.advance[here]
-    return Pulses(
-        due=due,
-        advance=advance,
-        fired=due - advance,
-        width=settings.width[here],
-        braked=settings.brake_width[after],
-        offset=settings.brake_delay[after] + advance,
-    )
+    due, advance = slot_times(slots, rate), settings.advance[here]
+    offset = settings.brake_delay[after] + advance
+    return Pulses(due, advance, due - advance, settings.width[here], settings.brake_width[after], offset)
 
 
-def sequence(pulses: Pulses, pulse: Waveform, known: dict[tuple[float, float, float], Waveform]) -> Drive:
+def sequence(
+    pulses: Pulses, pulse: Waveform, known: dict[tuple[float, float, float], Waveform]
+) -> PulseSequence:
     """Return the drive of a pattern.
 
     Parameters
@@ -198,17 +146,13 @@ def sequence(pulses: Pulses, pulse: Waveform, known: dict[tuple[float, float, fl
     pulse : Waveform
         The pulse that gets these widths.
     known : dict
-        Waveforms that were made before, by their three numbers; added to.
+        Waveforms that were made before, by width, width of the brake pulse and its offset; added to.
     """
-    from printhammer.drive.sequence import PulseSequence
-
     waveforms = []
-    for row in np.column_stack([pulses.width, pulses.braked, pulses.offset]).tolist():
-        width, braked, offset = row
-        key = (width, braked, offset if braked else 0.0)
+    for width, braked, offset in zip(*(values.tolist() for values in pulses[3:]), strict=True):
+        key = width, braked, offset if braked else 0.0
         if key not in known:
-            known[key] = with_brake(
-                of_width(pulse, width), of_width(pulse, braked) if braked else None, offset
-            )
+            plain = of_width(pulse, width)
+            known[key] = Chain(parts=((0.0, plain), (offset, of_width(pulse, braked)))) if braked else plain
         waveforms.append(known[key])
     return PulseSequence(waveforms, at=pulses.fired.tolist())

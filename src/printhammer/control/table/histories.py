@@ -50,7 +50,7 @@ def checked_size(gaps: int, reach: int) -> tuple[int, int]:
 
 
 def entries_of(gaps: int, reach: int) -> int:
-    """Return how many numbers of histories there are."""
+    """Return the number of numbers of histories."""
     return int((reach + 1) ** gaps)
 
 
@@ -69,15 +69,7 @@ def number_of(history: Sequence[int], reach: int) -> int:
 
 
 def histories(gaps: int, reach: int) -> list[History]:
-    """List all histories that differ, those with more rest first, so that what comes before is known.
-
-    Parameters
-    ----------
-    gaps : int
-        Number of gaps of a history.
-    reach : int
-        Longest gap that counts, slots.
-    """
+    """List all histories that differ, those with more rest first, so that what comes before is known."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return sorted((row for row in every if row == plain(row)), key=lambda row: (gaps - row.count(REST), row))
 
@@ -91,17 +83,8 @@ def shared_numbers(gaps: int, reach: int) -> npt.NDArray[np.int64]:
 def histories_of(slots: Sequence[int], gaps: int, reach: int) -> npt.NDArray[np.int64]:
     """Return the number of the history of each dot of a pattern that begins at rest.
 
-    Parameters
-    ----------
-    slots : sequence of int
-        Numbers of the slots at which dots are wanted, ascending.
-    gaps, reach : int
-        As for `histories`.
-
-    Returns
-    -------
-    int array, shape (dots + 1,)
-        The last one is that of a dot long after, which is printed from rest: all rest.
+    The last one, of dots + 1, is that of a dot long after, which is printed from rest: all rest. `slots` are
+    those at which dots are wanted, ascending.
 
     Raises
     ------
@@ -124,16 +107,15 @@ def gap_text(gap: int) -> str:
     return "rest" if gap == REST else str(gap)
 
 
+def history_text(history: Sequence[int]) -> str:
+    """Return a history in words, such as "1-2-rest"."""
+    return "-".join(map(gap_text, history))
+
+
 def pattern_of(history: Sequence[int], before: Sequence[int] = ()) -> tuple[int, ...]:
     """Return the slots of a pattern whose last dot has a history.
 
-    Parameters
-    ----------
-    history : sequence of int
-        Gaps, the latest first.
-    before : sequence of int, optional
-        Further gaps, the latest first, of dots still earlier; for a history without rest only.
+    `before` are further gaps, the latest first, of dots still earlier; for a history without rest only.
     """
     gaps = [gap for gap in (*plain(history), *before) if gap != REST]
-    steps = gaps[::-1]
-    return tuple(np.concatenate([[0], np.cumsum(steps)]).astype(np.int64).tolist())
+    return tuple(itertools.accumulate(reversed(gaps), initial=0))

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.table.compensation import COLUMNS, CompensationTable
-from printhammer.control.table.histories import REST, number_of, shared_numbers
-from printhammer.control.table.polish import VALUES, Work, level_of, look_at, polish
+from printhammer.control.table.draft import Draft
+from printhammer.control.table.histories import REST, number_of
+from printhammer.control.table.polish import polish
 from printhammer.control.table.search import BAD, searched
 from printhammer.control.table.ways import costs, solved, ways_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy.typing as npt
+    from printhammer.control.table.draft import IntArray
 
 HALVINGS: Final = 3
 """How often the step between two rates is halved at most."""
@@ -25,126 +24,71 @@ BETWEEN: Final = 0.5
 """Deviation between two rates, in parts of the limits, from which on there is one more between them."""
 
 
-def table_of(work: Work, largest: float) -> CompensationTable:
-    """Return a table in the making as a table.
-
-    Raises
-    ------
-    InputError
-        Its values make no table.
-    """
-    shared = shared_numbers(work.gaps, work.reach)
-    values: dict[str, Any] = {name: getattr(work, name)[:, shared] for name in VALUES}
-    return CompensationTable(
-        hammer=work.hammers[0].name,
-        fingerprint=work.hammers[0].fingerprint,
-        rates=work.rates,
-        gaps=work.gaps,
-        reach=work.reach,
-        largest_current=largest,
-        **values,
-    )
-
-
-def refined(work: Work, largest: float, told: Callable[[], None], *, brake: bool) -> Work:
+def refined(draft: Draft, report: Callable[[], None]) -> Draft:
     """Put rates between those of a table where it is not good enough halfway between two of them.
 
     Such places are where the way to fire a dot changes. The new entries follow that of the rate below or that
-    of the rate above, whichever is the better one; where neither is good, another one is looked for.
-
-    Parameters
-    ----------
-    work : Work
-        A table that is done at its rates.
-    largest : float
-        Bound on the current, A.
-    told : callable
-        Called after each step of the work.
-    brake : bool
-        Whether brake pulses may be used.
-
-    Returns
-    -------
-    Work
-        With more rates.
+    of the rate above, whichever is the better one; where neither is good, another one is looked for. `report`
+    is called after each step of the work.
     """
     # Rates at which every dot is printed from rest need nothing.
-    steps = np.arange(work.rates.size - 1)
-    lower = steps[1.0 / work.rates[steps + 1] <= work.single.settled]
-    wanted = set(work.rates[lower].tolist())
+    lower = np.flatnonzero(1.0 / draft.rates[1:] <= draft.task.single.settled)
+    wanted = set(draft.rates[lower].tolist())
     for _ in range(HALVINGS):
-        lower = np.flatnonzero(np.isin(work.rates, list(wanted)))
-        lower = lower[lower < work.rates.size - 1]
+        lower = np.flatnonzero(np.isin(draft.rates, list(wanted)))
+        lower = lower[lower < draft.rates.size - 1]
         if not lower.size:
             break
-        halfway = _halfway(work, lower, largest)
-        told()
-        bad = np.flatnonzero(~(halfway.deviation.max(axis=1) <= BETWEEN))
-        lower = lower[bad]
+        halfway = _halfway(draft, lower)
+        report()
+        lower = lower[~(halfway.worst <= BETWEEN)]
         if not lower.size:
             break
-        more = _tuned(work, lower, told, brake=brake)
-        wanted = {*work.rates[lower].tolist(), *more.rates.tolist()}
-        work = _joined(work, more)
-    return work
+        more = _tuned(draft, lower, report)
+        wanted = {*draft.rates[lower].tolist(), *more.rates.tolist()}
+        rates = np.concatenate([draft.rates, more.rates])
+        order = np.argsort(rates, kind="stable")
+        values = np.concatenate([draft.values, more.values], axis=1)
+        draft = Draft(draft.task, rates[order], values[:, order])
+    return draft
 
 
-def _halfway(work: Work, lower: npt.NDArray[np.int64], largest: float) -> Work:
+def _halfway(draft: Draft, lower: IntArray) -> Draft:
     """Return what the table says halfway between some rates and those above them, and how good that is."""
-    table = table_of(work, largest)
-    rates = 0.5 * (work.rates[lower] + work.rates[lower + 1])
-    told = [table.at(float(rate)) for rate in rates]
-    values: dict[str, Any] = {name: np.array([getattr(one, name) for one in told]) for name in COLUMNS}
-    found = replace(work, rates=rates, deviation=np.zeros((rates.size, table.advance.shape[1])), **values)
-    for known in range(1, work.gaps + 1):
-        look_at(found, level_of(found, known))
+    table = draft.table()
+    rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
+    settings = np.array([table.at(float(rate)) for rate in rates])
+    values = np.concatenate([settings, np.zeros_like(settings[:, :1])], axis=1).transpose(1, 0, 2)
+    found = Draft(draft.task, rates, values)
+    found.judge()
     return found
 
 
-def _tuned(work: Work, lower: npt.NDArray[np.int64], told: Callable[[], None], *, brake: bool) -> Work:
+def _tuned(draft: Draft, lower: IntArray, report: Callable[[], None]) -> Draft:
     """Return tuned rows halfway between some rates and those above them."""
-    rates = 0.5 * (work.rates[lower] + work.rates[lower + 1])
-    values: dict[str, Any] = {name: getattr(work, name)[lower] for name in VALUES}
-    found = replace(work, rates=rates, **values)
-    for gap in range(1, work.reach + 1):
+    task = draft.task
+    rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
+    found = Draft(task, rates, draft.values[:, lower])
+    for gap in range(1, task.reach + 1):
         periods = gap / rates
-        near = np.flatnonzero(periods <= work.single.settled)
+        near = np.flatnonzero(periods <= task.single.settled)
         if not near.size:
             continue
-        column = number_of((gap, *[REST] * (work.gaps - 1)), work.reach)
-        cells = [
-            (
-                float(periods[row]),
-                float(work.brake_delay[side, column]),
-                float(work.brake_width[side, column]),
-                float(periods[row] - work.advance[side, column]),
-                float(work.width[side, column]),
-            )
-            for row in near.tolist()
-            for side in (lower[row], lower[row] + 1)
-        ]
-        ways = solved(work, ways_of(cells))
-        cost = costs(work, ways).reshape(-1, 2)
+        column = number_of((gap, *[REST] * (task.gaps - 1)), task.reach)
+        cells = []
+        for row in near.tolist():
+            for side in (lower[row], lower[row] + 1):
+                advance, width, delay, brake = draft.values[:4, side, column].tolist()
+                cells.append((float(periods[row]), delay, brake, float(periods[row]) - advance, width))
+        ways = solved(task, ways_of(cells))
+        cost = costs(task, ways).reshape(-1, 2)
         for place, row in enumerate(near.tolist()):
             best = ways.some([2 * place + int(cost[place].argmin())])
             if not cost[place].min() <= BAD:
                 # Neither goes on from its rate to here; perhaps there is one more.
-                more = searched(work, float(periods[row]), brake=brake)
+                more = searched(task, float(periods[row]))
                 if more.size and more.cost.min() < cost[place].min():
                     best = more.some([int(more.cost.argmin())])
-            found.advance[row, column] = best.period[0] - best.fired[0]
-            found.width[row, column] = best.width[0]
-            found.brake_delay[row, column] = best.delay[0]
-            found.brake_width[row, column] = best.brake[0]
-    polish(found, told)
+            found.values[:4, row, column] = best.settings[:, 0]
+    polish(found, report)
     return found
-
-
-def _joined(work: Work, more: Work) -> Work:
-    """Return the rows of both in the order of their rates."""
-    rates = np.concatenate([work.rates, more.rates])
-    order = np.argsort(rates, kind="stable")
-    values: dict[str, Any] = {
-        name: np.concatenate([getattr(work, name), getattr(more, name)])[order] for name in VALUES
-    }
-    return replace(work, rates=rates[order], **values)

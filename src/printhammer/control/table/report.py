@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,12 +15,11 @@ from printhammer.printing.dots.strategy import open_loop
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import from_rest
+from printhammer.results import Result, column, coordinate, derived, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-
-    import xarray as xr
 
     from printhammer.control.table.compensation import CompensationTable
     from printhammer.hammer.hammer import Hammer
@@ -52,7 +49,7 @@ STRATEGIES: Final = ("open loop", "table")
 SETS: Final = ("eight slots", "cycle", "random")
 """Patterns: all 255 of eight slots from rest; the de Bruijn cycle of order 8; long random ones."""
 
-_LONG: Final = 12
+_LONG: Final = 12  # Number of rates of a table from which on it is judged between them
 
 RANDOM: Final = 8
 """Number of random patterns."""
@@ -61,98 +58,66 @@ RANDOM_SLOTS: Final = 128
 """Length of a random pattern, slots."""
 
 
-@dataclass(frozen=True)
-class TableReport:
-    """How a table does beside open loop: arrays of shape (strategies, hammers, rates, sets of patterns).
+_AXES: Final = "strategy driven rate patterns"
 
-    Attributes
-    ----------
-    table : CompensationTable
-        The table.
-    hammer : Hammer
-        The hammer it is made for, whose single pulse is what every dot should be like.
-    hammers : tuple of str
-        In words, how the hammers that are driven differ from it.
-    rates : array
-        Slots per second, Hz.
-    limits : Limits
-        How far a dot may be off.
-    good : array
-        Share of dots within the limits.
-    force, arrival : array
-        Largest deviation of force, in parts of that of the single pulse, and of arrival, s, of printed dots.
-    lost, extra : int array
-        Number of lost dots and of extra contacts.
-    force_deviation, arrival_deviation : array, shape (strategies, dots)
-        Of every dot of the cycle at the first rate, of the hammer that the table is made for; NaN for a lost
-        one.
-    seed : int
-        Of the random patterns.
-    tolerance : float
-        Of the integration.
-    """
 
-    table: CompensationTable = field(repr=False)
-    hammer: Hammer
-    hammers: tuple[str, ...]
-    rates: FloatArray
-    limits: Limits
-    good: FloatArray = field(repr=False)
-    force: FloatArray = field(repr=False)
-    arrival: FloatArray = field(repr=False)
-    lost: FloatArray = field(repr=False)
-    extra: FloatArray = field(repr=False)
-    force_deviation: FloatArray = field(repr=False)
-    arrival_deviation: FloatArray = field(repr=False)
-    seed: int
-    tolerance: float
+class TableReport(Result, rows=_AXES):
+    """How a table does beside open loop, on hammers that differ, at some rates, and for sets of patterns."""
+
+    table: CompensationTable = part("the table", repr=False)
+    hammer: Hammer = part(
+        "the hammer it is made for", more="every dot should be like that of its single pulse"
+    )
+    hammers: tuple[str, ...] = coordinate(
+        "", "in words, how the hammers that are driven differ from it", "driven", name="driven"
+    )
+    rates: FloatArray = coordinate("Hz", "slots per second", "rate", name="rate")
+    limits: Limits = part("how far a dot may be off")
+    good: FloatArray = column("1", "share of dots within the limits", _AXES)
+    force: FloatArray = column(
+        "1",
+        "largest deviation of the force, in parts of that of the single pulse",
+        _AXES,
+        more="of printed dots",
+    )
+    arrival: FloatArray = column("s", "largest deviation of the arrival", _AXES, more="of printed dots")
+    lost: FloatArray = column("1", "lost dots", _AXES)
+    extra: FloatArray = column("1", "extra contacts", _AXES)
+    force_deviation: FloatArray = part(
+        "of every dot of the cycle at the first rate, of the hammer that the table is made for, shape"
+        " (strategies, dots)",
+        more="nan for a lost one",
+        repr=False,
+    )
+    arrival_deviation: FloatArray = part("likewise, s", repr=False)
+    seed: int = scalar("1", "seed of the random patterns")
+    tolerance: float = part("error allowed in one step")
 
     @property
     def passed(self) -> Any:
         """Whether all dots are within limits, bool array of shape (strategies, hammers, rates)."""
         return (self.good == 1.0).all(axis=3)
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the report as a Dataset over `strategy`, `hammer`, `rate` and `patterns`."""
-        import xarray as xr
+    @property
+    @derived("", "way to drive", "strategy", kind="coordinate")
+    def strategy(self) -> tuple[str, ...]:
+        """Names of the ways to drive."""
+        return STRATEGIES
 
-        from printhammer import __version__
+    @property
+    @derived("", "set of patterns", "patterns", kind="coordinate")
+    def patterns(self) -> tuple[str, ...]:
+        """Names of the sets of patterns."""
+        return SETS
 
-        axes = ("strategy", "driven", "rate", "patterns")
-        told = {
-            "good": ("1", "share of dots within the limits"),
-            "force": ("1", "largest deviation of the force, in parts of that of the single pulse"),
-            "arrival": ("s", "largest deviation of the arrival"),
-            "lost": ("1", "lost dots"),
-            "extra": ("1", "extra contacts"),
-        }
-        return xr.Dataset(
-            {
-                name: (axes, getattr(self, name), {"units": unit, "long_name": meaning})
-                for name, (unit, meaning) in told.items()
-            },
-            coords={
-                "strategy": np.array(STRATEGIES),
-                "driven": np.array(self.hammers),
-                "rate": ("rate", self.rates, {"units": "Hz", "long_name": "slots per second"}),
-                "patterns": np.array(SETS),
-            },
-            attrs={
-                "title": f"compensation table for {self.hammer.name} beside open loop",
-                "hammer": self.hammer.name,
-                "hammer_fingerprint": self.hammer.fingerprint,
-                "force_limit": self.limits.force,
-                "arrival_limit": self.limits.arrival,
-                "seed": self.seed,
-                "tolerance": repr(self.tolerance),
-                "printhammer": __version__,
-            },
-        )
+    @property
+    def title(self) -> str:
+        """What is judged."""
+        return f"compensation table for {self.hammer.name} beside open loop"
 
-    def plot(self, **options: Any) -> Any:
-        """Draw gain and loss; returns a matplotlib figure, see `printhammer.figures.control.compensation`."""
-        # By name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.control.compensation").plot_report(self, **options)
+    def notes(self) -> dict[str, Any]:
+        """Return the limits."""
+        return {"force_limit": self.limits.force, "arrival_limit": self.limits.arrival}
 
 
 def judge_table(
@@ -223,9 +188,8 @@ def judge_table(
     for s, strategy in enumerate(strategies):
         for p, patterns in enumerate(sets):
             for r, rate in enumerate(asked.tolist()):
-                cases = [Case(one, single, rate) for one in driven]
                 trial = attempt(
-                    cases,
+                    [Case(other, single, rate) for other in driven],
                     patterns,
                     strategy,
                     limits=bounds,
@@ -259,8 +223,8 @@ def judge_table(
         arrival=arrival,
         lost=lost,
         extra=extra,
-        force_deviation=np.array([one[0] for one in deviations]),
-        arrival_deviation=np.array([one[1] for one in deviations]),
+        force_deviation=np.array([force for force, _arrival in deviations]),
+        arrival_deviation=np.array([late for _force, late in deviations]),
         seed=seed,
         tolerance=tolerance,
     )

@@ -12,22 +12,20 @@ of them lead away from the single pulse, dot by dot, and others back to it. So t
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.control.table.compensation import JUMP
+from printhammer.control.table.newton import largest_of
 from printhammer.control.table.ways import (
     LEAST_OF_OWN,
     Ways,
-    brake_from,
     costs,
     fits,
-    largest_of,
+    joined,
     seconds,
     solved,
-    together,
     ways_of,
 )
 
@@ -36,7 +34,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.control.table.polish import Work
+    from printhammer.control.table.task import Task
     from printhammer.support.arrays import FloatArray
 
 SPACING: Final = 30e-6
@@ -45,40 +43,39 @@ SPACING: Final = 30e-6
 BAD: Final = 0.75
 """Cost from which on more ways are looked for."""
 
-_ROOM: Final = 100e-6
-_FIRED: Final = 12
-_WIDTHS: Final = 8
-_FINE: Final = 3
-_DELAY: Final = 45e-6
+_ROOM: Final = 100e-6  # How far before and after its slot a dot is tried, s
+_GRID: Final = (12, 8)  # Numbers of firing times and widths of the grid on which a search begins
+_FINE: Final = 3  # How much finer this grid is without a brake pulse, and how many more searches begin on it
+_DELAY: Final = 45e-6  # Step of the beginnings of brake pulses, s
+# Widths of brake pulses, in parts of that of the hammer's own
 _BRAKES: Final = (0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0)
-_APART: Final = 30e-6
-_STARTS: Final = 2
-_FAR: Final = 8.0
-_KEPT: Final = 5
-_ENOUGH: Final = 0.6
-_HOPELESS: Final = 20.0
-_CLOSE: Final = 8e-6
+_APART: Final = 30e-6  # Least difference of the firing times from which searches begin, s
+_STARTS: Final = 2  # Number of searches for each brake pulse
+_FAR: Final = 8.0  # Deviation, in parts of the limits, beyond which no search begins
+_KEPT: Final = 5  # Number of ways that are kept for a time
+_ENOUGH: Final = 0.6  # Cost of a way without a brake pulse up to which none with one is looked for
+_HOPELESS: Final = 20.0  # Cost above which a way is as bad as any
+_CLOSE: Final = 8e-6  # Between the times at which brake pulses between those of the grid are tried, s
+# By how much these begin later, s: no more than half of `_DELAY`
 _LATER: Final = (-22e-6, -8e-6, 8e-6, 22e-6)
-_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)
-_LEAST_BRAKE: Final = 0.05
+_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)  # How much wider these are: between neighbours of `_BRAKES`
+_LEAST_BRAKE: Final = 0.05  # Least width of a brake pulse, in parts of that of the hammer's own
+# What it costs to go to another way from one time to the next: there nothing is interpolated
 _SWITCH: Final = 0.15
+_SAME: Final = 1e-6  # Difference of firing times up to which ways with the same brake pulse are the same, s
 _ROUNDING: Final = 1e-12
 
 
-def chosen(
-    work: Work, periods: FloatArray, *, brake: bool, told: Callable[[], None]
-) -> tuple[FloatArray, Ways]:
+def chosen(task: Task, periods: FloatArray, report: Callable[[], None]) -> tuple[FloatArray, Ways]:
     """Choose a way for each of some times after a dot.
 
     Parameters
     ----------
-    work : Work
+    task : Task
         What the table is to be like.
     periods : array
         Times from slot to slot, s, ascending.
-    brake : bool
-        Whether brake pulses may be used.
-    told : callable
+    report : callable
         Called after each step of the work.
 
     Returns
@@ -91,19 +88,19 @@ def chosen(
     nodes = spaced(periods, SPACING)
     known = []
     for node in nodes:
-        known.append(searched(work, node, brake=brake))
-        told()
+        known.append(searched(task, node))
+        report()
     tried = []
     for period in periods.tolist():
         place = int(np.searchsorted(nodes, period))
         near = known[max(0, place - 1) : place + (2 if nodes[place] == period else 1)]
-        tried.append(_distinct(together([ways_of([]), *(one.at(period) for one in near)])))
-    groups = _valued(work, tried)
-    told()
-    if brake:
-        _look_closely(work, periods, groups, told)
+        tried.append(_distinct(joined(ways.at(period) for ways in near)))
+    groups = _valued(task, tried)
+    report()
+    if task.brake:
+        _look_closely(task, periods, groups, report)
     there = [group for group in groups if group.size]
-    every = together([ways_of([]), *there])
+    every = joined(there)
     ends = np.cumsum([group.size for group in there])
     found = every.some(_path(every, np.split(np.arange(every.size), ends[:-1]) if there else []))
     return found.period, found
@@ -118,109 +115,74 @@ def spaced(periods: FloatArray, spacing: float) -> list[float]:
     return nodes
 
 
-def _valued(work: Work, tried: Sequence[Ways]) -> list[Ways]:
+def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
     """Solve several groups of ways together, and keep those of each group that make dots."""
-    every = solved(work, together([ways_of([]), *tried]))
-    every = replace(every, cost=costs(work, every))
-    ends = np.cumsum([one.size for one in tried])
-    groups = [every.some(slice(end - one.size, end)) for end, one in zip(ends.tolist(), tried, strict=True)]
+    every = solved(task, joined(tried))
+    every = every._replace(cost=costs(task, every))
+    ends = np.cumsum([group.size for group in tried])
+    groups = [every.some(slice(end - own.size, end)) for end, own in zip(ends.tolist(), tried, strict=True)]
     return [group.some(np.isfinite(group.cost)) for group in groups]
 
 
-def _look_closely(work: Work, periods: FloatArray, groups: list[Ways], told: Callable[[], None]) -> None:
+def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: Callable[[], None]) -> None:
     """Look for more ways, with brake pulses between those tried before, where the best is not good enough.
 
-    Parameters
-    ----------
-    work : Work
-        What the table is to be like.
-    periods : array
-        Times from slot to slot, s.
-    groups : list of Ways
-        The ways of each of these that are known; added to.
-    told : callable
-        Called after each step of the work.
+    Adds to the groups of ways that are known at each of the times from slot to slot.
     """
-    bad = [row for row, group in enumerate(groups) if not group.cost.min(initial=np.inf) <= BAD]
+    least = [group.cost.min(initial=np.inf) for group in groups]
     # Where not even the neighbours have a way that is any good, there is none.
-    hope = [row for row in bad if groups[row].cost.min(initial=np.inf) <= _FAR]
+    hope = [row for row, cost in enumerate(least) if not cost <= BAD and cost <= _FAR]
     nodes = spaced(periods[hope], _CLOSE)
-    own: Any = work.pulse
-    begin = brake_from(work)
+    begin, narrowest = task.brake_from, _LEAST_BRAKE * task.width
     found = []
     for node in nodes:
-        row = int(np.searchsorted(periods, node))
-        best = groups[row].some(groups[row].brake > 0.0)
-        best = best.some(np.argsort(best.cost, kind="stable")[:_KEPT])
+        known = groups[int(np.searchsorted(periods, node))]
+        known = known.some(known.brake > 0.0)
+        known = known.some(np.argsort(known.cost, kind="stable")[:_KEPT])
         cells = [
-            (
-                node,
-                max(begin, delay + later),
-                min(max(brake * wider, _LEAST_BRAKE * own.width), work.widest),
-                fired,
-                width,
-            )
-            for delay, brake, fired, width in zip(
-                best.delay.tolist(),
-                best.brake.tolist(),
-                best.fired.tolist(),
-                best.width.tolist(),
-                strict=True,
-            )
+            (node, max(begin, delay + later), min(max(brake * wider, narrowest), task.widest), fired, width)
+            for _period, delay, brake, fired, width, _cost in zip(*(v.tolist() for v in known), strict=True)
             for later in _LATER
             for wider in _WIDER
         ]
-        found.append(_kept(work, solved(work, ways_of(cells))))
-        told()
+        found.append(_kept(task, solved(task, ways_of(cells))))
+        report()
     tried = []
     for row in hope:
-        near = [
-            one.at(float(periods[row]))
-            for node, one in zip(nodes, found, strict=True)
-            if abs(node - periods[row]) <= _CLOSE
-        ]
-        tried.append(_distinct(together([ways_of([]), *near])))
-    for row, group in zip(hope, _valued(work, tried), strict=True):
-        groups[row] = together([groups[row], group])
+        period = float(periods[row])
+        near = [ways for node, ways in zip(nodes, found, strict=True) if abs(node - period) <= _CLOSE]
+        tried.append(_distinct(joined(ways.at(period) for ways in near)))
+    for row, group in zip(hope, _valued(task, tried), strict=True):
+        groups[row] = joined([groups[row], group])
 
 
-def searched(work: Work, period: float, *, brake: bool) -> Ways:
+def searched(task: Task, period: float) -> Ways:
     """Look for all ways to make a dot a time after another one, s, and keep the best, the best one first.
 
-    Parameters
-    ----------
-    work : Work
-        What the table is to be like.
-    period : float
-        From slot to slot, s.
-    brake : bool
-        Whether to look for ways with a brake pulse where those without are not good enough.
+    Those with a brake pulse, if it may be used, come after those without, where these are not good enough.
     """
-    plain = _best(work, _grid(work, period, [(0.0, 0.0)], _FINE), _FINE)
-    if not brake or (plain.size and plain.cost[0] <= _ENOUGH):
+    plain = _best(task, _grid(task, period, [(0.0, 0.0)], _FINE), _FINE)
+    if not task.brake or (plain.size and plain.cost[0] <= _ENOUGH):
         return plain
-    own: Any = work.pulse
-    begin = brake_from(work)
+    begin = task.brake_from
     delays = np.arange(begin, max(begin, period) + _ROUNDING, _DELAY)
-    pairs = [(delay, part * own.width) for delay in delays.tolist() for part in _BRAKES]
-    with_one = _best(work, _grid(work, period, pairs))
-    return together([plain, with_one])
+    pairs = [(delay, part * task.width) for delay in delays.tolist() for part in _BRAKES]
+    return joined([plain, _best(task, _grid(task, period, pairs))])
 
 
-def _grid(work: Work, period: float, brakes: Sequence[tuple[float, float]], fine: int = 1) -> Ways:
+def _grid(task: Task, period: float, brakes: Sequence[tuple[float, float]], fine: int = 1) -> Ways:
     """Return cells of firing times and widths for each of some brake pulses."""
-    own: Any = work.pulse
-    fired = np.linspace(max(period - _ROOM, work.single.left), period + _ROOM, fine * _FIRED).tolist()
-    widths = np.linspace(LEAST_OF_OWN * own.width, work.widest, fine * _WIDTHS).tolist()
+    fired = np.linspace(max(period - _ROOM, task.single.left), period + _ROOM, fine * _GRID[0]).tolist()
+    widths = np.linspace(LEAST_OF_OWN * task.width, task.widest, fine * _GRID[1]).tolist()
     cells = ways_of([(period, *pair, time, width) for pair in brakes for time in fired for width in widths])
-    return cells.some(fits(work, cells))
+    return cells.some(fits(task, cells))
 
 
-def _best(work: Work, cells: Ways, more: int = 1) -> Ways:
+def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
     """Return the best ways that begin at some cells."""
     if not cells.size:
         return cells
-    off = largest_of(seconds(work, work.hammers[0], cells))
+    off = largest_of(seconds(task, cells))
     starts: list[int] = []
     counts: dict[tuple[float, float], list[float]] = {}
     for place in np.argsort(off, kind="stable").tolist():
@@ -231,12 +193,12 @@ def _best(work: Work, cells: Ways, more: int = 1) -> Ways:
         if len(others) < more * _STARTS and all(abs(cells.fired[place] - time) > _APART for time in others):
             others.append(float(cells.fired[place]))
             starts.append(place)
-    return _kept(work, solved(work, cells.some(np.array(starts, dtype=np.int64))))
+    return _kept(task, solved(task, cells.some(np.array(starts, dtype=np.int64))))
 
 
-def _kept(work: Work, found: Ways) -> Ways:
+def _kept(task: Task, found: Ways) -> Ways:
     """Return the best of some ways that are solved, the best one first."""
-    found = _distinct(replace(found, cost=costs(work, found)))
+    found = _distinct(found._replace(cost=costs(task, found)))
     best = np.argsort(found.cost, kind="stable")[:_KEPT]
     return found.some(best[np.isfinite(found.cost[best])])
 
@@ -244,15 +206,9 @@ def _kept(work: Work, found: Ways) -> Ways:
 def _distinct(ways: Ways) -> Ways:
     """Leave out those that lead to the same pulses as one before."""
     kept: list[int] = []
-    for place in range(ways.size):
-        same = [
-            other
-            for other in kept
-            if ways.delay[other] == ways.delay[place]
-            and ways.brake[other] == ways.brake[place]
-            and abs(ways.fired[other] - ways.fired[place]) <= 1e-6
-        ]
-        if not same:
+    for place, (delay, brake, fired) in enumerate(zip(ways.delay, ways.brake, ways.fired, strict=True)):
+        same = (ways.delay[kept] == delay) & (ways.brake[kept] == brake)
+        if not (same & (np.abs(ways.fired[kept] - fired) <= _SAME)).any():
             kept.append(place)
     return ways.some(np.array(kept, dtype=np.int64))
 

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Final, SupportsIndex
 
 import numpy as np
 
+from printhammer.control.table.draft import blank
 from printhammer.control.table.drive import LARGEST_CURRENT, clearance, print_pulse
-from printhammer.control.table.histories import checked_size, entries_of, histories, number_of
-from printhammer.control.table.polish import (
-    ROUNDS,
-    VALUES,
-    Work,
-    polish,
-    subset,
-)
-from printhammer.control.table.refine import refined, table_of
+from printhammer.control.table.histories import checked_size, histories, number_of
+from printhammer.control.table.newton import ROUNDS
+from printhammer.control.table.polish import polish
+from printhammer.control.table.refine import refined
 from printhammer.control.table.search import SPACING, chosen, spaced
-from printhammer.control.table.single import Single, single_of
+from printhammer.control.table.task import Single, Task, single_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
@@ -30,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from printhammer.control.table.compensation import CompensationTable
+    from printhammer.control.table.draft import Draft
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
@@ -47,8 +43,10 @@ SPREAD: Final = (
 )
 """By how much the hammers differ on which ways to fire a dot are compared, and a robust table is tuned."""
 
+# Deviation, in parts of the limits, up to which a rate belongs to a table over all rates
 _USABLE: Final = 0.9
-_POOR: Final = 0.5
+_POOR: Final = 0.5  # Deviation, in parts of the limits, above which a given rate is tuned once more
+# How far from the times between dots ways are then looked for as well, s
 _AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)
 
 
@@ -126,40 +124,36 @@ def tune(
         raise InputError("rate and rates are given, expected one of them")
     asked = [rate] if rate is not None else rates
     grid = _all_rates(single) if asked is None else _given_rates(asked)
-    hammers = [hammer, *([perturbed(hammer, by) for by in SPREAD] if robust else [])]
-    spread = _spread(hammer)
     nodes = len(spaced(_periods(grid, far, single), SPACING))
     # Once a time at which ways are looked for, once a step of Newton's method, with and without long rows.
-    steps = _Steps(progress, nodes + 3 + 2 * (ROUNDS + 1) * gaps)
-    shape = 0, entries_of(gaps, far)
-    blank = Work(
-        rates=grid[:0],
+    report = _counter(progress, nodes + 3 + 2 * (ROUNDS + 1) * gaps)
+    task = Task(
         gaps=gaps,
         reach=far,
-        **{name: np.zeros(shape) for name in VALUES},
-        hammers=hammers,
-        spread=spread,
+        hammers=[hammer, *([perturbed(hammer, by) for by in SPREAD] if robust else [])],
+        spread=_spread(hammer),
         pulse=pulse,
+        largest=largest,
         widest=widest,
         wait=clearance(pulse, widest, largest),
         single=single,
         limits=bounds,
+        brake=brake,
         tolerance=tolerance,
         threads=threads,
     )
-    work = _tuned(blank, grid, brake, steps, open_ended=asked is None)
-    if asked is not None:
-        _tune_again(work, blank, brake, steps)
-    lost = np.flatnonzero(~np.isfinite(work.deviation.max(axis=1)))
+    draft = _tuned(task, grid, report, open_ended=asked is None)
     if asked is None:
-        work = refined(subset(work, np.arange(_kept(work))), largest, steps, brake=brake)
-    elif lost.size:
+        return refined(draft.rows(np.arange(_usable(draft))), report).table()
+    _tune_again(draft, report)
+    lost = np.flatnonzero(~np.isfinite(draft.worst))
+    if lost.size:
         speed = float(grid[lost[0]])
         raise InputError(
             f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before,"
             " expected a lower rate"
         )
-    return table_of(work, largest)
+    return draft.table()
 
 
 def _spread(hammer: Hammer) -> list[Hammer]:
@@ -171,16 +165,16 @@ def _spread(hammer: Hammer) -> list[Hammer]:
     return found
 
 
-class _Steps:
-    """Tell how far the work is."""
+def _counter(progress: Callable[[int, int], None] | None, total: int) -> Callable[[], None]:
+    """Return what tells how far the work is, each time that it is called."""
+    steps = iter(range(1, total + 1))
 
-    def __init__(self, progress: Callable[[int, int], None] | None, total: int) -> None:
-        self._progress, self._total, self._done = progress, total, 0
+    def count() -> None:
+        step = next(steps, total)
+        if progress is not None:
+            progress(step, total)
 
-    def __call__(self) -> None:
-        self._done += 1
-        if self._progress is not None:
-            self._progress(min(self._done, self._total), self._total)
+    return count
 
 
 def _all_rates(single: Single) -> FloatArray:
@@ -198,78 +192,67 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
     return found
 
 
-def _tune_again(work: Work, blank: Work, brake: bool, steps: Callable[[], None]) -> None:
+def _tune_again(draft: Draft, report: Callable[[], None]) -> None:
     """Tune rates once more that are not good enough, with ways from times around theirs; changes the rows."""
-    poor = np.flatnonzero(~(work.deviation.max(axis=1) <= _POOR))
+    poor = np.flatnonzero(~(draft.worst <= _POOR))
     if not poor.size:
         return
-    again = _tuned(blank, work.rates[poor], brake, steps, open_ended=False, around=_AROUND)
-    better = again.deviation.max(axis=1) < work.deviation[poor].max(axis=1)
-    for name in VALUES:
-        getattr(work, name)[poor[better]] = getattr(again, name)[better]
+    again = _tuned(draft.task, draft.rates[poor], report, around=_AROUND)
+    better = again.worst < draft.worst[poor]
+    draft.values[:, poor[better]] = again.values[:, better]
 
 
 def _tuned(
-    blank: Work,
+    task: Task,
     rates: FloatArray,
-    brake: bool,
-    steps: Callable[[], None],
+    report: Callable[[], None],
     *,
-    open_ended: bool,
+    open_ended: bool = False,
     around: FloatArray | None = None,
-) -> Work:
+) -> Draft:
     """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
 
     Parameters
     ----------
-    blank : Work
-        What is asked, without rows.
+    task : Task
+        What is asked.
     rates : array
         Of the rows, Hz.
-    brake : bool
-        Whether brake pulses may be used.
-    steps : callable
+    report : callable
         Called after each step of the work.
-    open_ended : bool
-        Whether rates at which nothing comes near are left out.
+    open_ended : bool, optional
+        Whether the table ends below the first rate at which no pulse comes near.
     around : array, optional
         How far from the times between dots ways are looked for as well, s.
     """
-    own: Any = blank.pulse
-    shape = rates.size, entries_of(blank.gaps, blank.reach)
-    blanks: dict[str, Any] = {name: np.zeros(shape) for name in VALUES}
-    work = replace(blank, rates=rates, **blanks)
-    work.width[:] = own.width
-    every = np.arange(1, work.reach + 1) / rates[:, np.newaxis]
-    periods = _periods(rates, work.reach, work.single)
+    draft = blank(task, rates)
+    draft.timing[1] = task.width
+    every = np.arange(1, task.reach + 1) / rates[:, np.newaxis]
+    periods = _periods(rates, task.reach, task.single)
     if around is not None:
         others = (periods[:, np.newaxis] + around).ravel()
-        longest, shortest = work.single.settled, periods.min(initial=np.inf) + around.min()
+        longest, shortest = task.single.settled, periods.min(initial=np.inf) + around.min()
         periods = np.unique([*periods, *others[(others <= longest) & (others > max(shortest, 0.0))]])
-    there, ways = chosen(work, periods, brake=brake, told=steps)
-    for gap, columns in _columns(work).items():
+    there, ways = chosen(task, periods, report)
+    settings = ways.settings
+    for gap in range(1, task.reach + 1):
+        columns = [number_of(each, task.reach) for each in histories(task.gaps, task.reach) if each[0] == gap]
         for row, period in enumerate(every[:, gap - 1].tolist()):
-            if period > work.single.settled:
+            if period > task.single.settled:
                 continue
             place = int(np.searchsorted(there, period))
             if place == there.size or there[place] != period:
-                work.deviation[row, columns] = np.inf
-                continue
-            work.advance[row, columns] = period - ways.fired[place]
-            work.width[row, columns] = ways.width[place]
-            work.brake_delay[row, columns] = ways.delay[place]
-            work.brake_width[row, columns] = ways.brake[place]
-    found = np.isfinite(work.deviation.max(axis=1))
-    if open_ended and not found.all():
-        # A table without given rates ends below the first at which no pulse comes near.
-        work = subset(work, np.arange(int(np.argmin(found))))
-        found = found[: work.rates.size]
-    good = subset(work, np.flatnonzero(found))
-    if found.any():
-        polish(good, steps)
-    for name in VALUES:
-        getattr(work, name)[found] = getattr(good, name)
-    return work
+                draft.deviation[row, columns] = np.inf
+            else:
+                draft.values[:4, row, columns] = settings[:, [place]]
+    found = np.flatnonzero(np.isfinite(draft.worst))
+    if open_ended:
+        found = found[found == np.arange(found.size)]
+    if found.size:
+        good = draft.rows(found)
+        polish(good, report)
+        draft.values[:, found] = good.values
+    return draft
 
 
 def _periods(rates: FloatArray, reach: int, single: Single) -> FloatArray:
@@ -278,18 +261,9 @@ def _periods(rates: FloatArray, reach: int, single: Single) -> FloatArray:
     return np.unique(every[every <= single.settled])
 
 
-def _columns(work: Work) -> dict[int, list[int]]:
-    """Return the numbers of the histories that begin with a gap; the first one is rest before that."""
-    every = histories(work.gaps, work.reach)
-    return {
-        gap: [number_of(one, work.reach) for one in every if one[0] == gap]
-        for gap in range(1, work.reach + 1)
-    }
-
-
-def _kept(work: Work) -> int:
-    """Return how many rates keep well to the limits, from the lowest on."""
-    bad = np.flatnonzero(~(work.deviation.max(axis=1) <= _USABLE))
+def _usable(draft: Draft) -> int:
+    """Return the number of rates that keep well to the limits, from the lowest on."""
+    bad = np.flatnonzero(~(draft.worst <= _USABLE))
     if bad.size and bad[0] == 0:
         raise InputError("the table does not keep to the limits at any rate, expected a hammer that prints")
-    return int(bad[0]) if bad.size else work.rates.size
+    return int(bad[0]) if bad.size else draft.rates.size

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -12,6 +9,7 @@ import numpy as np
 
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName
 from printhammer.errors import InputError
+from printhammer.support.sheets import finite, read_sheet, split_heading
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -80,7 +78,7 @@ def read_csv(path: Path) -> Record:
         increasing times.
     """
     what = str(path)
-    rows = _rows(path, what)
+    rows = read_sheet(path, "the sampled waveform").rows
     if not rows:
         raise InputError(
             f"{what}: the file is empty, expected the heading {_HEADINGS} and at least 2 samples"
@@ -91,7 +89,7 @@ def read_csv(path: Path) -> Record:
         if len(row) != 2:
             raise InputError(f"{what}: line {line} has {len(row)} cells, expected 2")
         for cell, column in zip(row, columns, strict=True):
-            column.append(_number(cell, f"{what}: line {line}"))
+            column.append(finite(cell, f"{what}: line {line}"))
     return checked(
         _converted(columns[0], time_unit, "s", what),
         _converted(columns[1], unit, _UNITS[name], what),
@@ -100,55 +98,21 @@ def read_csv(path: Path) -> Record:
     )
 
 
-def _rows(path: Path, what: str) -> list[tuple[int, list[str]]]:
-    """Read the lines that carry something, with their line numbers."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{what}: the sampled waveform is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{what}: the sampled waveform cannot be read ({reason})") from None
-    reader = csv.reader(io.StringIO(text), strict=True)
-    rows = []
-    try:
-        for row in reader:
-            if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#"):
-                rows.append((reader.line_num, row))  # noqa: PERF401
-    except csv.Error as error:
-        raise InputError(f"{what}: expected comma-separated values ({error})") from None
-    return rows
-
-
 def _heading(cells: list[str], what: str) -> tuple[str, QuantityName, str]:
     """Return the unit of time, what is driven, and its unit."""
     if len(cells) != 2:
         raise InputError(f"{what}: {len(cells)} columns, expected the 2 columns {_HEADINGS}")
-    names, units = [], []
-    for cell in cells:
-        name, _, rest = cell.strip().partition("[")
-        unit, closed, tail = rest.partition("]")
-        if not closed or tail or not unit.strip():
+    names, units = zip(*map(split_heading, cells), strict=True)
+    for cell, unit in zip(cells, units, strict=True):
+        if not unit:
             raise InputError(
                 f"{what}: heading {cell.strip()!r} is expected to carry its unit, such as 'time [us]'"
             )
-        names.append(name.strip().lower())
-        units.append(unit.strip())
+    names = tuple(name.lower() for name in names)
     for quantity in _UNITS:
-        if names == ["time", quantity]:
+        if names == ("time", quantity):
             return units[0], quantity, units[1]
     raise InputError(f"{what}: columns {names[0]!r} and {names[1]!r}, expected {_HEADINGS}")
-
-
-def _number(cell: str, where: str) -> float:
-    """Read one finite number."""
-    try:
-        number = float(cell)
-    except ValueError:
-        raise InputError(f"{where}: {cell.strip()!r} is expected to be a number") from None
-    if not math.isfinite(number):
-        raise InputError(f"{where}: {cell.strip()!r} is expected to be finite")
-    return number
 
 
 def _converted(column: list[float], unit: str, si: str, what: str) -> list[float]:

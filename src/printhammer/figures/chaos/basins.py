@@ -42,17 +42,12 @@ def shade(number: int) -> str:
 def plot(basins: Basins, *, attractors: bool = True) -> Figure:
     """Draw basins.
 
+    Marks are the points of the attractors at the firings.
+
     Parameters
     ----------
-    basins : Basins
-        From `printhammer.basins`.
     attractors : bool, optional
         Whether the attractors are drawn in, where they lie in the plane.
-
-    Returns
-    -------
-    Figure
-        The figure. Marks are the points of the attractors at the firings.
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.lines import Line2D

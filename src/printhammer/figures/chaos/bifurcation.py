@@ -6,25 +6,13 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.tables import meaning_of
-from printhammer.chaos.bifurcation.windows import cells, hysteresis, windows_of
+from printhammer.chaos.bifurcation.diagram import hysteresis, windows_of
+from printhammer.chaos.bifurcation.windows import cells
 from printhammer.errors import InputError
+from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import note
 from printhammer.figures.elements.scales import Scale, label, scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    GREEN,
-    HAIR,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    YELLOW,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.hammer.names import PERIOD
 
 if TYPE_CHECKING:
@@ -37,18 +25,18 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 SHADES: Final = {
-    "period-1": BLUE,
-    "period-2": YELLOW,
-    "period-3": GREEN,
+    "period-1": style.BLUE,
+    "period-2": style.YELLOW,
+    "period-3": style.GREEN,
     "period-4": "#56b4e9",
     "other period": "#cc79a7",
     "strange": "#4d4d4d",
     "no period": "#c4c4c4",
-    "run ended early": ORANGE,
+    "run ended early": style.ORANGE,
 }
 """Colour of the band of a verdict; "no period" is what is not known to be strange."""
 
-WAYS: Final = {"from rest": INK, "up": BLUE, "down": ORANGE}
+WAYS: Final = {"from rest": style.INK, "up": style.BLUE, "down": style.ORANGE}
 """Colours of points that one direction alone leads to."""
 
 _POINT: Final = 0.7
@@ -69,10 +57,11 @@ def plot(
 ) -> Figure:
     """Draw a bifurcation diagram.
 
+    Black: points to which all directions lead; blue and orange: points to which only rising or falling values
+    do. The bands below tell the verdicts.
+
     Parameters
     ----------
-    diagram : Bifurcation
-        From `printhammer.bifurcation`.
     show : str, optional
         "x": displacements at the firings; "v": velocities.
     orbits : iterable, optional
@@ -82,12 +71,6 @@ def plot(
     limits : tuple of float, optional
         Least and largest displacement or velocity shown, SI; by default all but one in a thousand at
         either end are shown, and the others counted.
-
-    Returns
-    -------
-    Figure
-        The figure. Black: points to which all directions lead; blue and orange: points to which only rising
-        or falling values do. The bands below tell the verdicts.
 
     Raises
     ------
@@ -119,7 +102,9 @@ def plot(
     if show == "x" and diagram.regime.hammer.position is not None:
         position = diagram.regime.hammer.position
         if low < position < high:
-            ax.axhline(float(up.shown(position)), color=MUTED, lw=HAIR, zorder=1.0, gid="backstop")
+            ax.axhline(
+                float(up.shown(position)), color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="backstop"
+            )
     values = across.shown(diagram.values)
     ax.set_xlim(float(values[0]), float(values[-1]) if len(values) > 1 else float(values[0]) * 1.02 + 1e-9)
     label(ax, "y", up, f"{up.label} at the firing" if not diagram.phase else up.label)
@@ -134,7 +119,8 @@ def plot(
 
 def parameter_scale(diagram: Bifurcation) -> Scale:
     """Return how the parameter is shown."""
-    unit, meaning = meaning_of(diagram.regime, diagram.parameter)
+    note = diagram.regime.quantity(diagram.parameter)
+    unit, meaning = note.si, note.meaning
     if diagram.parameter == PERIOD:
         found = scale("time", float(np.abs(diagram.values).max()))
         return Scale(meaning.capitalize(), found.si, found.unit)
@@ -158,7 +144,7 @@ def _points(ax: Axes, diagram: Bifurcation, states: FloatArray, across: Scale, u
     for way, name in enumerate(diagram.directions):
         kinds = [(apart, WAYS[name], 3.0 + way)] if several else []
         if way == 0:
-            kinds.append((~apart, INK, 2.0))
+            kinds.append((~apart, style.INK, 2.0))
         for chosen, color, zorder in kinds:
             y = up.shown(states[way][chosen])
             ax.plot(
@@ -196,10 +182,10 @@ def _orbit(ax: Axes, diagram: Bifurcation, found: Any, show: str, across: Scale,
                 f" {diagram.parameter} at phase {diagram.phase:g}"
             )
         values, states, size = _crossed(across.shown(found.values), states, np.abs(found.multipliers[:, 0]))
-        for kind, style in (("stable", "-"), ("unstable", (0, (1.5, 1.5)))):
+        for kind, look in (("stable", "-"), ("unstable", (0, (1.5, 1.5)))):
             shown = size <= 1.0 if kind == "stable" else size >= 1.0
             line = np.where(shown[:, np.newaxis], states, np.nan)
-            ax.plot(values, line, color=GREEN, lw=THIN, ls=style, zorder=5.0, gid=f"{kind} branch")
+            ax.plot(values, line, color=style.GREEN, lw=style.THIN, ls=look, zorder=5.0, gid=f"{kind} branch")
         return
     if diagram.phase:
         raise InputError(
@@ -213,8 +199,8 @@ def _orbit(ax: Axes, diagram: Bifurcation, found: Any, show: str, across: Scale,
         marker="o",
         ms=3.2,
         mew=0.8,
-        mec=GREEN,
-        mfc=GREEN if stable else "white",
+        mec=style.GREEN,
+        mfc=style.GREEN if stable else "white",
         zorder=6.0,
         gid="stable orbit" if stable else "unstable orbit",
     )
@@ -247,7 +233,7 @@ def _bands(strip: Axes, diagram: Bifurcation, across: Scale) -> None:
             shade = SHADES[_kind(window.verdict, bool(stopped.all()))]
             strip.barh(level, ends[1] - ends[0], left=ends[0], height=0.9, color=shade, lw=0.0)
             place += window.columns
-    strip.set_yticks(range(len(diagram.directions)), list(reversed(diagram.directions)), fontsize=SMALL)
+    strip.set_yticks(range(len(diagram.directions)), list(reversed(diagram.directions)), fontsize=style.SMALL)
     strip.set_ylim(-0.5, len(diagram.directions) - 0.5)
     strip.tick_params(axis="y", length=0.0)
 
@@ -280,7 +266,7 @@ def _key(figure: Figure, diagram: Bifurcation) -> None:
     figure.legend(
         handles=handles,
         loc="outside lower left",
-        fontsize=SMALL,
+        fontsize=style.SMALL,
         frameon=False,
         ncols=5,
         handlelength=1.0,

@@ -8,22 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.figures.elements.style import (
-    BLUE,
-    GREEN,
-    HAIR,
-    INK,
-    LINE,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    TINY,
-    YELLOW,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements import style
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +21,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.regimes import Branches
     from printhammer.support.arrays import FloatArray
 
-_COLOURS: Final = {1: BLUE, 2: ORANGE, 3: GREEN, 4: YELLOW}
+_COLOURS: Final = {1: style.BLUE, 2: style.ORANGE, 3: style.GREEN, 4: style.YELLOW}
 _SHOWN: Final = {
     "x": ("Displacement at the section", "m", "µm", 1e6),
     "v": ("Velocity at the section", "m/s", "m/s", 1.0),
@@ -50,7 +36,7 @@ _MARKS: Final[dict[str, dict[str, Any]]] = {
     "branching": {"marker": "x", "ms": 5.0},
     "grazing": {"marker": "|", "ms": 5.0},
 }
-_UNSTABLE: Final[dict[str, Any]] = {"lw": HAIR, "ls": (0, (4, 2)), "zorder": 2.0}
+_UNSTABLE: Final[dict[str, Any]] = {"lw": style.HAIR, "ls": (0, (4, 2)), "zorder": 2.0}
 _AXIS: Final = {"s": ("ms", 1e3), "1": ("", 1.0)}
 
 
@@ -64,6 +50,8 @@ def plot(
 ) -> Figure:
     """Draw branches against their constant.
 
+    A colour for each number of firings.
+
     Parameters
     ----------
     branches : Branch or Branches
@@ -74,11 +62,6 @@ def plot(
         Whether grazings are marked beside folds, period doublings and the like.
     limits : tuple of float, optional
         Ends of the upward axis, SI.
-
-    Returns
-    -------
-    Figure
-        The figure; a colour for each number of firings.
 
     Raises
     ------
@@ -120,9 +103,11 @@ def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> N
         if i < len(stable) and stable[i] == stable[begin]:
             continue
         part = slice(begin, i + 1)
-        style: dict[str, Any] = {"lw": LINE, "ls": "-", "zorder": 3.0} if stable[begin] else dict(_UNSTABLE)
+        look: dict[str, Any] = (
+            {"lw": style.LINE, "ls": "-", "zorder": 3.0} if stable[begin] else dict(_UNSTABLE)
+        )
         for k in range(branch.firings):
-            (line,) = ax.plot(factors[0] * values[part], factors[1] * table[part, k], color=colour, **style)
+            (line,) = ax.plot(factors[0] * values[part], factors[1] * table[part, k], color=colour, **look)
             line.set_gid("stable" if stable[begin] else "unstable")
         begin = i
 
@@ -162,10 +147,10 @@ def _mark(
             span = nodes[i + 1].arc - nodes[i].arc
             share = min(max((event.point.node.arc - nodes[i].arc) / span, 0.0), 1.0) if span > 0.0 else 0.5
             row = table[i] + share * (table[i + 1] - table[i])
-            colour = MUTED if event.kind == "grazing" else colour_of(branch.firings)
+            colour = style.MUTED if event.kind == "grazing" else colour_of(branch.firings)
             places = np.full(branch.firings, factors[0] * event.value)
-            style = {"ls": "none", "mec": colour, "mew": THIN, "zorder": 4.0, **_MARKS[event.kind]}
-            ax.plot(places, factors[1] * row, gid=event.kind, **style)
+            look = {"ls": "none", "mec": colour, "mew": style.THIN, "zorder": 4.0, **_MARKS[event.kind]}
+            ax.plot(places, factors[1] * row, gid=event.kind, **look)
             if event.kind not in kinds:
                 kinds.append(event.kind)
     return kinds
@@ -173,28 +158,28 @@ def _mark(
 
 def colour_of(firings: int) -> str:
     """Return the colour of orbits of so many firings."""
-    return _COLOURS.get(firings, INK)
+    return _COLOURS.get(firings, style.INK)
 
 
 def _legend(ax: Axes, found: Sequence[Branch], kinds: Sequence[str]) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=colour_of(firings), lw=LINE, label=f"period {firings}, stable")
+        Line2D([], [], color=colour_of(firings), lw=style.LINE, label=f"period {firings}, stable")
         for firings in sorted({branch.firings for branch in found})
     ]
-    handles.append(Line2D([], [], color=MUTED, lw=HAIR, ls=_UNSTABLE["ls"], label="unstable"))
-    for kind, style in _MARKS.items():
+    handles.append(Line2D([], [], color=style.MUTED, lw=style.HAIR, ls=_UNSTABLE["ls"], label="unstable"))
+    for kind, look in _MARKS.items():
         if kind in kinds:
-            colour = MUTED if kind == "grazing" else INK
-            handles.append(Line2D([], [], ls="none", mec=colour, mew=THIN, label=kind, **style))
+            colour = style.MUTED if kind == "grazing" else style.INK
+            handles.append(Line2D([], [], ls="none", mec=colour, mew=style.THIN, label=kind, **look))
     columns = 3 if len(handles) > 4 else len(handles)
     ax.legend(
         handles=handles,
         loc="lower center",
         bbox_to_anchor=(0.5, 1.0),
         ncols=columns,
-        fontsize=TINY + 0.5 if len(handles) > 6 else SMALL,
+        fontsize=style.TINY + 0.5 if len(handles) > 6 else style.SMALL,
         frameon=False,
     )
 

@@ -22,16 +22,8 @@ if TYPE_CHECKING:
 def plot(train: ImpactTrain) -> Figure:
     """Draw the statistics of an impact train.
 
-    Parameters
-    ----------
-    train : ImpactTrain
-        From `printhammer.impact_train`.
-
-    Returns
-    -------
-    Figure
-        Histogram of the intervals, each interval against the one before, and their autocorrelation; what
-        independent intervals would not exceed in 19 of 20 lags lies between the broken lines.
+    Histogram of the intervals, each interval against the one before, and their autocorrelation; what
+    independent intervals would not exceed in 19 of 20 lags lies between the broken lines.
     """
     figure = new_figure(2.9)
     bars, returns, lags = figure.subplots(1, 3)

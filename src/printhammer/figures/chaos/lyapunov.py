@@ -9,22 +9,10 @@ import numpy as np
 
 from printhammer.chaos.exponents.zero_one import CHAOTIC, REGULAR
 from printhammer.figures.chaos.strobe import shown_period
+from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import HALO, note
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    HAIR,
-    INK,
-    LINE,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +21,7 @@ if TYPE_CHECKING:
     from printhammer.chaos import Lyapunov, LyapunovChart, ZeroOne
     from printhammer.support.arrays import FloatArray
 
-_COLOURS: Final = (BLUE, ORANGE)
+_COLOURS: Final = (style.BLUE, style.ORANGE)
 _SIGMAS: Final = 3.0
 """Standard errors that a band or bar reaches to either side: as many as decide on a sign."""
 
@@ -42,15 +30,7 @@ _SIGMAS: Final = 3.0
 def plot(found: Lyapunov) -> Figure:
     """Draw the running estimates of both exponents against the number of firings.
 
-    Parameters
-    ----------
-    found : Lyapunov
-        From `printhammer.lyapunov`.
-
-    Returns
-    -------
-    Figure
-        The figure; bands reach three standard errors to either side.
+    Bands reach three standard errors to either side.
     """
     figure = new_figure(4.6)
     upper, lower = figure.subplots(2, 1, sharex=True)
@@ -61,12 +41,12 @@ def plot(found: Lyapunov) -> Figure:
         value, error = float(found.exponents[k]), float(found.standard_errors[k])
         at, side = ((0.98, 0.96), "top") if value < _middle(ax) else ((0.98, 0.05), "bottom")
         note(ax, f"{value:+.4g} ± {error:.2g}", at, ha="right", va=side, color=colour, bbox=HALO)
-    upper.axhline(0.0, color=MUTED, lw=HAIR, zorder=1.0, gid="zero")
+    upper.axhline(0.0, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="zero")
     lower.set_xlabel("Number of firings averaged over")
     lower.set_xscale("log")
     # Also where no estimate is finite.
     lower.set_xlim(max(0.9 * float(counts[0]), 0.5), 1.1 * float(counts[-1]))
-    upper.set_title(_title(found), loc="left", fontsize=SMALL)
+    upper.set_title(_title(found), loc="left", fontsize=style.SMALL)
     remarks = [] if found.ok else [f"The run ended early: {found.status}."]
     if not found.smooth:
         remarks.append("The motion passes a touch without velocity, where it has no derivative.")
@@ -86,7 +66,7 @@ def _title(found: Lyapunov) -> str:
 
 def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colour: str) -> None:
     known = np.isfinite(means)
-    ax.plot(counts[known], means[known], color=colour, lw=LINE, gid="running", zorder=3.0)
+    ax.plot(counts[known], means[known], color=colour, lw=style.LINE, gid="running", zorder=3.0)
     sure = known & np.isfinite(errors)
     reach = _SIGMAS * errors[sure]
     band = (means[sure] - reach, means[sure] + reach)
@@ -110,16 +90,8 @@ def _middle(ax: Axes) -> float:
 def plot_chart(chart: LyapunovChart) -> Figure:
     """Draw both exponents and the K of the 0-1 test against the time between firings.
 
-    Parameters
-    ----------
-    chart : LyapunovChart
-        From `printhammer.chaos.lyapunovs`.
-
-    Returns
-    -------
-    Figure
-        The figure; bars reach three standard errors to either side, open marks are trains on which exponent
-        and 0-1 test do not both decide, or do not agree.
+    Bars reach three standard errors to either side, open marks are trains on which exponent and 0-1 test do
+    not both decide, or do not agree.
     """
     figure = new_figure(6.0)
     grid = figure.add_gridspec(3, 1, height_ratios=(3.0, 2.0, 2.0), hspace=0.04)
@@ -132,10 +104,10 @@ def plot_chart(chart: LyapunovChart) -> Figure:
     for k, (ax, colour) in enumerate(zip(axes, _COLOURS, strict=False)):
         _bars(ax, at, chart.exponents[:, k], chart.standard_errors[:, k], colour, agree, order)
         ax.set_ylabel(f"$\\lambda_{k + 1}$  [1/firing]")
-    axes[0].axhline(0.0, color=MUTED, lw=HAIR, zorder=1.0, gid="zero")
-    _bars(axes[2], at, chart.k, np.zeros(len(at)), INK, agree, order)
+    axes[0].axhline(0.0, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="zero")
+    _bars(axes[2], at, chart.k, np.zeros(len(at)), style.INK, agree, order)
     for level in (REGULAR, CHAOTIC):
-        axes[2].axhline(level, color=MUTED, lw=HAIR, ls=(0, (4, 3)), zorder=1.0)
+        axes[2].axhline(level, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)), zorder=1.0)
     axes[2].set_ylim(-0.25, 1.15)
     axes[2].set_ylabel("K of the 0-1 test")
     label(axes[2], "x", time, "Time between firings")
@@ -154,7 +126,7 @@ def _bars(
 ) -> None:
     finite = np.isfinite(values)
     joined = order[finite[order]]
-    ax.plot(at[joined], values[joined], color=FAINT, lw=THIN, zorder=1.5)
+    ax.plot(at[joined], values[joined], color=style.FAINT, lw=style.THIN, zorder=1.5)
     reach = _SIGMAS * np.where(np.isfinite(errors), errors, 0.0)
     for filled in (True, False):
         some = finite & (agree == filled)
@@ -168,7 +140,7 @@ def _bars(
             mec=colour,
             mfc=colour if filled else "white",
             ecolor=colour,
-            elinewidth=THIN,
+            elinewidth=style.THIN,
             zorder=3.0,
         )
 
@@ -193,37 +165,32 @@ def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
 def plot_zero_one(found: ZeroOne) -> Figure:
     """Draw what the 0-1 test looks at: the path, its mean square displacement, and the correlations.
 
-    Parameters
-    ----------
-    found : ZeroOne
-        From `printhammer.zero_one`.
-
-    Returns
-    -------
-    Figure
-        The figure; path and displacement are those of the angle with the median correlation, ringed at the
-        right.
+    Path and displacement are those of the angle with the median correlation, ringed at the right.
     """
     figure = new_figure(2.9)
     path, growth, angles = figure.subplots(1, 3)
-    path.plot(found.p, found.q, color=BLUE, lw=HAIR, gid="path")
+    path.plot(found.p, found.q, color=style.BLUE, lw=style.HAIR, gid="path")
     path.set(xlabel="$p_c$", ylabel="$q_c$")
     path.margins(0.06)
     path.set_aspect("equal", adjustable="datalim")
     steps = np.arange(1, len(found.displacement) + 1)
-    growth.plot(steps, found.displacement, color=BLUE, lw=THIN, gid="displacement")
+    growth.plot(steps, found.displacement, color=style.BLUE, lw=style.THIN, gid="displacement")
     growth.set(xlabel="Steps n", ylabel="Mean square displacement")
-    angles.plot(found.angles, found.correlations, ls="none", marker="o", ms=2.4, mew=0.0, color=BLUE, gid="k")
+    angles.plot(
+        found.angles, found.correlations, ls="none", marker="o", ms=2.4, mew=0.0, color=style.BLUE, gid="k"
+    )
     shown = found.shown
-    angles.plot(found.angles[shown], found.correlations[shown], marker="o", ms=7.0, mfc="none", mec=ORANGE)
+    angles.plot(
+        found.angles[shown], found.correlations[shown], marker="o", ms=7.0, mfc="none", mec=style.ORANGE
+    )
     for level in (REGULAR, CHAOTIC):
-        angles.axhline(level, color=MUTED, lw=HAIR, ls=(0, (4, 3)))
+        angles.axhline(level, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)))
     angles.set(xlabel="Angle c  [rad]", ylabel="Correlation $K_c$", ylim=(-1.1, 1.1))
     for ax in (path, growth, angles):
         ax.tick_params(axis="both", top=True, right=True)
         ax.ticklabel_format(axis="both", style="sci", scilimits=(-3, 4))
         ax.locator_params(axis="both", nbins=5)
-    figure.suptitle(f"0-1 test: {found.phrase}: {found.verdict}", x=0.01, ha="left", fontsize=SMALL)
+    figure.suptitle(f"0-1 test: {found.phrase}: {found.verdict}", x=0.01, ha="left", fontsize=style.SMALL)
     if found.reason:
-        figure.supxlabel(found.reason, x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
+        figure.supxlabel(found.reason, x=0.01, ha="left", fontsize=style.SMALL, color=style.ORANGE)
     return figure

@@ -9,25 +9,10 @@ import numpy as np
 from printhammer.chaos.strobe.points import strobe as strobed
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import shown_period
-from printhammer.figures.elements.marks import HALO, name_lines, note, place_lines
+from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import ALONG_X, HALO, beside, name_lines, note, place_lines
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    HAIR,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    TINY,
-    WIDTH,
-    YELLOW,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,9 +28,9 @@ if TYPE_CHECKING:
 POINTS: Final = 600
 """Strobe points below the orbits, after a third as many firings that are left out."""
 
-_MARKS: Final = (("o", BLUE), ("s", ORANGE), ("^", GREEN), ("D", YELLOW))
+_MARKS: Final = (("o", style.BLUE), ("s", style.ORANGE), ("^", style.GREEN), ("D", style.YELLOW))
 """Marker and colour of orbits of 1, 2, 3 and 4 firings."""
-_LONGER: Final = ("x", MUTED)
+_LONGER: Final = ("x", style.MUTED)
 _TRACES: Final = 4
 _ROOM: Final = 0.07
 _LINES: Final = ("-", "--", "-.", ":")
@@ -55,19 +40,14 @@ _LINES: Final = ("-", "--", "-.", ":")
 def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) -> Figure:
     """Draw orbits at their firings over the strobe points of the train from rest, and some against time.
 
+    Stable orbits are filled marks, all others open ones; the first few are drawn against time below.
+
     Parameters
     ----------
-    orbits : Orbits
-        From `printhammer.orbits`.
     points : int, optional
         Number of strobe points; 0 for none.
     longest : int, optional
         Leave out orbits of more firings.
-
-    Returns
-    -------
-    Figure
-        Stable orbits are filled marks, all others open ones; the first few are drawn against time below.
     """
     shown = [orbit for orbit in orbits if longest is None or orbit.firings <= longest]
     traced = shown[:_TRACES]
@@ -78,7 +58,7 @@ def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) ->
     _plane(ax, orbits.regime, shown, under)
     counts = ", ".join(f"{count} {kind}" for kind, count in orbits.counts.items())
     heading = f"{shown_period(orbits.regime.period)}: {counts or 'no orbit found'}"
-    ax.set_title(heading, loc="left", fontsize=SMALL)
+    ax.set_title(heading, loc="left", fontsize=style.SMALL)
     if traced:
         _traces(figure.add_subplot(rows[1]), traced)
     sign(figure, orbits.regime.hammer)
@@ -89,15 +69,7 @@ def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) ->
 def plot_orbit(orbit: Orbit) -> Figure:
     """Draw one orbit: its curve in the plane of displacement and velocity, and displacement against time.
 
-    Parameters
-    ----------
-    orbit : Orbit
-        The orbit.
-
-    Returns
-    -------
-    Figure
-        Marks are the states at the firings.
+    Marks are the states at the firings.
 
     Raises
     ------
@@ -106,20 +78,22 @@ def plot_orbit(orbit: Orbit) -> Figure:
     """
     if not orbit.ok:
         raise InputError(f"orbit: expected one that there is, not {orbit.name}: {orbit.status}")
-    figure = new_figure(3.4, width=1.35 * WIDTH)
+    figure = new_figure(3.4, width=1.35 * style.WIDTH)
     left, right = figure.subplots(1, 2)
     motion = orbit.motion()
     way, speed = scale("displacement", float(np.abs(motion.x).max())), scale("velocity")
-    left.plot(way.shown(motion.x), speed.shown(motion.v), color=INK, lw=THIN, gid="curve", zorder=2.0)
+    left.plot(
+        way.shown(motion.x), speed.shown(motion.v), color=style.INK, lw=style.THIN, gid="curve", zorder=2.0
+    )
     _mark(left, orbit, way, speed, 5.0)
     _room(left, way.shown(motion.x), speed.shown(motion.v))
     place_lines(left, orbit.regime.hammer, way, side="x")
     label(left, "x", way)
     label(left, "y", speed)
-    left.set_title(f"{shown_period(orbit.regime.period)}: {orbit.name}", loc="left", fontsize=SMALL)
+    left.set_title(f"{shown_period(orbit.regime.period)}: {orbit.name}", loc="left", fontsize=style.SMALL)
     _traces(right, [orbit])
     told = ", ".join(_number(multiplier) for multiplier in orbit.multipliers)
-    note(right, f"multipliers {told}", (0.03, 0.97), fontsize=TINY, bbox=HALO)
+    note(right, f"multipliers {told}", (0.03, 0.97), fontsize=style.TINY, bbox=HALO)
     sign(figure, orbit.regime.hammer)
     return figure
 
@@ -172,21 +146,12 @@ def _plane(ax: Axes, regime: Regime, orbits: list[Orbit], under: FloatArray) -> 
     for name, place in (("backstop", regime.hammer.position), ("pack", regime.hammer.front)):
         low, high = ax.get_xlim()
         if place is not None and low < float(way.shown(place)) < high:
-            ax.axvline(float(way.shown(place)), color=MUTED, lw=HAIR, zorder=1.0).set_gid(name)
-            ax.annotate(
-                name,
-                (float(way.shown(place)), 0.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(2, 3),
-                textcoords="offset points",
-                fontsize=TINY,
-                color=MUTED,
-                zorder=4.0,
-            )
+            ax.axvline(float(way.shown(place)), color=style.MUTED, lw=style.HAIR, zorder=1.0).set_gid(name)
+            beside(ax, name, (float(way.shown(place)), 0.0), (2, 3), xycoords=ALONG_X, zorder=4.0)
     label(ax, "x", way, "Displacement at the firing")
     label(ax, "y", speed)
     if ax.get_legend_handles_labels()[0]:
-        ax.legend(fontsize=TINY, loc="best", framealpha=0.85, edgecolor=FAINT, ncols=1)
+        ax.legend(fontsize=style.TINY, loc="best", framealpha=0.85, edgecolor=style.FAINT, ncols=1)
 
 
 def _mark(ax: Axes, orbit: Orbit, way: Scale, speed: Scale, size: float, name: str | None = None) -> None:
@@ -199,7 +164,7 @@ def _mark(ax: Axes, orbit: Orbit, way: Scale, speed: Scale, size: float, name: s
         ls="none",
         marker="P" if longer and orbit.stable else marker,
         ms=0.6 * size if longer else size,
-        mew=0.6 if longer else THIN,
+        mew=0.6 if longer else style.THIN,
         mec=colour,
         mfc=colour if orbit.stable else "white" if orbit.firings == 1 else "none",
         gid="orbit",
@@ -224,7 +189,7 @@ def _traces(ax: Axes, orbits: list[Orbit]) -> None:
             time.shown(since),
             way.shown(x),
             ls=_LINES[k % len(_LINES)],
-            lw=THIN,
+            lw=style.THIN,
             color=_style(orbit)[1],
             gid="trace",
             label=f"{orbit.name}, |µ| = {abs(orbit.multipliers[0]):.3g}",
@@ -235,13 +200,13 @@ def _traces(ax: Axes, orbits: list[Orbit]) -> None:
     low, high = ax.get_ylim()
     ax.set_ylim(low - 0.03 * (high - low), high + (0.26 if len(orbits) > 1 else 0.13) * (high - low))
     for k in range(1, longest.firings):
-        ax.axvline(float(time.shown(k * longest.regime.period)), color=FAINT, lw=HAIR, zorder=0.5)
+        ax.axvline(float(time.shown(k * longest.regime.period)), color=style.FAINT, lw=style.HAIR, zorder=0.5)
     place_lines(ax, hammer, way)
     name_lines(ax, hammer, way)
     label(ax, "x", time, "Time from the first firing")
     label(ax, "y", way)
     if len(orbits) > 1:
-        ax.legend(fontsize=TINY, loc="upper right", framealpha=0.85, edgecolor=FAINT, ncols=2)
+        ax.legend(fontsize=style.TINY, loc="upper right", framealpha=0.85, edgecolor=style.FAINT, ncols=2)
 
 
 def _from_firing(orbit: Orbit, motion: Motion) -> tuple[FloatArray, FloatArray]:

@@ -28,15 +28,7 @@ _FEW: Final = 0.01
 def plot(found: QuenchMap) -> Figure:
     """Draw a quench map.
 
-    Parameters
-    ----------
-    found : QuenchMap
-        From `printhammer.chaos.basins.quench.quench_map`.
-
-    Returns
-    -------
-    Figure
-        The figure. Crosses: the two cases of Fig. 6 of the paper, where they lie in the plane.
+    Crosses: the two cases of Fig. 6 of the paper, where they lie in the plane.
     """
     figure = new_figure(4.6)
     ax = figure.add_subplot()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from printhammer.figures.elements.style import INK, MUTED, SMALL, new_figure, styled
+from printhammer.figures.elements.marks import beside
+from printhammer.figures.elements.style import INK, SMALL, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,15 +29,7 @@ _NAMES: Final = {
 def plot(found: Recurrence) -> Figure:
     """Draw a recurrence plot: a point where two states lie within the threshold of each other.
 
-    Parameters
-    ----------
-    found : Recurrence
-        From `printhammer.recurrence`.
-
-    Returns
-    -------
-    Figure
-        The figure, the quantities beside the plot.
+    The quantities stand beside the plot.
     """
     from matplotlib.colors import ListedColormap
 
@@ -58,16 +51,14 @@ def plot(found: Recurrence) -> Figure:
     ax.tick_params(axis="both", top=True, right=True)
     told = [f"threshold  {found.threshold:.3g}"]
     told += [f"{_NAMES[name]}  {_shown(value)}" for name, value in found.quantities.items()]
-    ax.annotate(
+    beside(
+        ax,
         "\n".join(told),
         (1.0, 1.0),
+        (8, 0),
+        "left top",
         xycoords="axes fraction",
-        xytext=(8, 0),
-        textcoords="offset points",
-        va="top",
-        ha="left",
         fontsize=SMALL,
-        color=MUTED,
         linespacing=1.7,
     )
     return figure

@@ -5,19 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from printhammer.figures.chaos.strobe import shown_period
+from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import note
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    HAIR,
-    ORANGE,
-    SMALL,
-    YELLOW,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,21 +20,13 @@ if TYPE_CHECKING:
 def plot(section: Section) -> Figure:
     """Draw the touches of a surface: velocity against the time since the last firing.
 
-    Parameters
-    ----------
-    section : Section
-        From `printhammer.section`.
-
-    Returns
-    -------
-    Figure
-        The figure; the whole period is shown.
+    The whole period is shown.
     """
     figure = new_figure(4.2)
     ax = figure.add_subplot()
     time, speed = scale("time", section.period), scale("velocity")
-    colour = BLUE if section.surface == "backstop" else ORANGE
-    ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=1.0)
+    colour = style.BLUE if section.surface == "backstop" else style.ORANGE
+    ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=1.0)
     ax.plot(
         time.shown(section.since),
         speed.shown(section.v),
@@ -60,10 +43,10 @@ def plot(section: Section) -> Figure:
     ax.set_title(
         f"{len(section.t)} touches of the {section.surface}, fired every {shown_period(section.period)}",
         loc="left",
-        fontsize=SMALL,
+        fontsize=style.SMALL,
     )
     if not len(section.t):
-        note(ax, "no touches", (0.5, 0.5), ha="center", va="center", color=YELLOW)
+        note(ax, "no touches", (0.5, 0.5), ha="center", va="center", color=style.YELLOW)
     label(ax, "x", time, "Time since the last firing")
     label(ax, "y", speed, "Velocity at touch")
     sign(figure, section.hammer, f"{section.remark}." if section.remark else "")

@@ -8,18 +8,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.figures.elements.style import (
-    BLUE,
-    HAIR,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    TINY,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import beside
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,22 +34,17 @@ def plot(
 ) -> Figure:
     """Draw the largest sensitivities of one dot, or of the whole run.
 
+    A bar is the relative change of the quantity for a relative change of the constant: with a bar of 2, one
+    per cent of the constant makes two per cent of the quantity. Constants that are zero have none.
+
     Parameters
     ----------
-    found : Sensitivities
-        From `printhammer.sensitivities`.
     dot : int, optional
         Number of the firing, from 0; by default the first that struck.
     quantities : sequence of str, optional
         Quantities of a dot or of the run, one panel each.
     bars : int, optional
         Largest number of constants in a panel.
-
-    Returns
-    -------
-    Figure
-        A bar is the relative change of the quantity for a relative change of the constant: with a bar of 2,
-        one per cent of the constant makes two per cent of the quantity. Constants that are zero have none.
 
     Raises
     ------
@@ -77,9 +63,9 @@ def plot(
         ax = figure.add_subplot(rows, columns, place + 1)
         _panel(ax, found, _sensitivities(found, name, number), bars)
         of_dot = f", dot {number + 1}" if name in found.quantities and len(found.dots) > 1 else ""
-        ax.set_title(name.replace("_", " ") + of_dot, loc="left", fontsize=SMALL)
+        ax.set_title(name.replace("_", " ") + of_dot, loc="left", fontsize=style.SMALL)
         if place >= len(quantities) - columns:
-            ax.set_xlabel("change in % for 1 % of the constant", fontsize=SMALL)
+            ax.set_xlabel("change in % for 1 % of the constant", fontsize=style.SMALL)
     remarks = [] if found.ok else [f"The run ended early: {found.status}."]
     if not found.smooth:
         remarks.append("The motion passes a touch without velocity: what follows has no derivative.")
@@ -117,29 +103,36 @@ def _panel(ax: Axes, found: Sensitivities, values: FloatArray, bars: int) -> Non
     sizes = np.where(np.isfinite(values), np.abs(values), 0.0)
     order = [int(k) for k in np.argsort(-sizes, kind="stable")[:bars] if sizes[k] >= 5e-4]
     if not order:
-        ax.text(0.5, 0.5, "no sensitivity", transform=ax.transAxes, ha="center", color=MUTED, fontsize=SMALL)
+        ax.text(
+            0.5,
+            0.5,
+            "no sensitivity",
+            transform=ax.transAxes,
+            ha="center",
+            color=style.MUTED,
+            fontsize=style.SMALL,
+        )
         ax.set_yticks([])
         return
     longest = float(sizes[order[0]])
     for height, k in enumerate(order):
         value = float(values[k])
-        colour = BLUE if value > 0.0 else ORANGE
+        colour = style.BLUE if value > 0.0 else style.ORANGE
         ax.barh(height, value, height=_BAR, color=colour, gid=f"bar-{found.constants[k]}")
-        ax.annotate(
+        beside(
+            ax,
             f"{value:+.3g}".replace("-", "−"),
             (value, height),
-            xytext=(3.0 if value > 0.0 else -3.0, 0.0),
-            textcoords="offset points",
+            (3.0 if value > 0.0 else -3.0, 0.0),
             ha="left" if value > 0.0 else "right",
             va="center",
-            fontsize=TINY,
-            color=INK,
+            color=style.INK,
         )
-    ax.axvline(0.0, color=INK, lw=HAIR)
+    ax.axvline(0.0, color=style.INK, lw=style.HAIR)
     # Room for the numbers at the ends of the bars.
     least = min(float(values[k]) for k in order)
     most = max(float(values[k]) for k in order)
     ax.set_xlim(min(least, 0.0) - 0.32 * longest, max(most, 0.0) + 0.32 * longest)
     ax.set_ylim(max(len(order), 3) - 0.4, -0.6)
-    ax.set_yticks(range(len(order)), [found.constants[k] for k in order], fontsize=TINY)
+    ax.set_yticks(range(len(order)), [found.constants[k] for k in order], fontsize=style.TINY)
     ax.tick_params(axis="y", length=0.0)

@@ -6,19 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    HAIR,
-    LINE,
-    MUTED,
-    ORANGE,
-    SMALL,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements import style
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,9 +15,9 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.stability_chart import StabilityChart
 
 _STYLES: Final = {
-    "fold": (BLUE, "-"),
-    "period doubling": (ORANGE, (0, (5, 1.5))),
-    "Neimark-Sacker": (GREEN, (0, (1, 1))),
+    "fold": (style.BLUE, "-"),
+    "period doubling": (style.ORANGE, (0, (5, 1.5))),
+    "Neimark-Sacker": (style.GREEN, (0, (1, 1))),
 }
 _AXIS: Final = {"s": ("ms", 1e3), "1": ("", 1.0)}
 _REGION: Final = "#cfe3f1"
@@ -38,16 +27,8 @@ _REGION: Final = "#cfe3f1"
 def plot(chart: StabilityChart) -> Figure:
     """Draw a stability chart.
 
-    Parameters
-    ----------
-    chart : StabilityChart
-        From `printhammer.stability_chart`.
-
-    Returns
-    -------
-    Figure
-        The first constant to the right, the second upward. Shaded: where the train from rest settles to the
-        orbit's period; grey: where its run stopped.
+    The first constant to the right, the second upward. Shaded: where the train from rest settles to the
+    orbit's period; grey: where its run stopped.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -61,29 +42,29 @@ def plot(chart: StabilityChart) -> Figure:
 
         shown = np.where(chart.settled == chart.firings, 1, np.where(chart.settled < 0, 2, 0))
         edges = [_edges(axis) * factors[k][1] for k, axis in enumerate(chart.grid)]
-        colours = ListedColormap(["white", _REGION, FAINT])
+        colours = ListedColormap(["white", _REGION, style.FAINT])
         ax.pcolormesh(*edges, shown, cmap=colours, vmin=0, vmax=2, zorder=0.5, rasterized=True)
         told = f"from rest: period {chart.firings}"
         handles.append(Patch(facecolor=_REGION, edgecolor="none", label=told))
         if (shown == 2).any():
-            handles.append(Patch(facecolor=FAINT, edgecolor="none", label="run stopped"))
+            handles.append(Patch(facecolor=style.FAINT, edgecolor="none", label="run stopped"))
     kinds = []
     for curve in chart.curves:
         colour, dash = _STYLES[curve.kind]
         x, y = factors[0][1] * curve.first, factors[1][1] * curve.second
         limits = np.where(curve.limits, y, np.nan)
-        ax.plot(x, y, color=colour, lw=HAIR, ls=dash, alpha=0.5, zorder=2.0)
-        ax.plot(x, limits, color=colour, lw=LINE, ls=dash, gid=curve.kind, zorder=3.0)
+        ax.plot(x, y, color=colour, lw=style.HAIR, ls=dash, alpha=0.5, zorder=2.0)
+        ax.plot(x, limits, color=colour, lw=style.LINE, ls=dash, gid=curve.kind, zorder=3.0)
         if curve.kind not in kinds:
             kinds.append(curve.kind)
     handles += [
-        Line2D([], [], color=_STYLES[kind][0], ls=_STYLES[kind][1], lw=LINE, label=kind)
+        Line2D([], [], color=_STYLES[kind][0], ls=_STYLES[kind][1], lw=style.LINE, label=kind)
         for kind in _STYLES
         if kind in kinds
     ]
     own = chart.regime.value(chart.names[1]) * factors[1][1]
-    ax.axhline(own, color=MUTED, lw=HAIR, ls=(0, (1, 2)), zorder=1.0, gid="own")
-    handles.append(Line2D([], [], color=MUTED, lw=HAIR, ls=(0, (1, 2)), label="the hammer's own"))
+    ax.axhline(own, color=style.MUTED, lw=style.HAIR, ls=(0, (1, 2)), zorder=1.0, gid="own")
+    handles.append(Line2D([], [], color=style.MUTED, lw=style.HAIR, ls=(0, (1, 2)), label="the hammer's own"))
     ax.set_xlim(*(factors[0][1] * end for end in chart.bounds[0]))
     ax.set_ylim(*(factors[1][1] * end for end in chart.bounds[1]))
     names = []
@@ -93,7 +74,12 @@ def plot(chart: StabilityChart) -> Figure:
     ax.set_xlabel(names[0])
     ax.set_ylabel(names[1])
     ax.legend(
-        handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, fontsize=SMALL, frameon=False
+        handles=handles,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=4,
+        fontsize=style.SMALL,
+        frameon=False,
     )
     remarks = [f"Not followed: {'; '.join(chart.refused)}."] if chart.refused else []
     sign(figure, chart.regime.hammer, *remarks)

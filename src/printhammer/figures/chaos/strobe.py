@@ -7,20 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import HALO, note
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    HAIR,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    TINY,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.run.window import Window
 from printhammer.units import from_si
 
@@ -40,7 +30,7 @@ RING: Final[dict[str, Any]] = {
     "ms": 6.0,
     "mew": 0.9,
     "mfc": "none",
-    "mec": ORANGE,
+    "mec": style.ORANGE,
 }
 """How the last points of a periodic train are marked."""
 
@@ -49,17 +39,12 @@ RING: Final[dict[str, Any]] = {
 def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
     """Draw strobe points: velocity against displacement, the backstop, and the verdict.
 
+    Rings are the last points of a periodic train.
+
     Parameters
     ----------
-    strobe : Strobe
-        From `printhammer.strobe`.
     fit : bool, optional
         Whether the axes end close about the points, instead of at the window of Fig. 11.
-
-    Returns
-    -------
-    Figure
-        The figure; rings are the last points of a periodic train.
     """
     figure = new_figure(4.6)
     ax = figure.add_subplot()
@@ -67,7 +52,7 @@ def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
     way, speed = scales_of(window)
     panel(ax, strobe, window, way, speed, size=2.2, named=False)
     judged = "" if strobe.verdict is None else f": {strobe.verdict.name.replace('-', ' ')}"
-    ax.set_title(f"{shown_period(strobe.period)}{judged}", loc="left", fontsize=SMALL)
+    ax.set_title(f"{shown_period(strobe.period)}{judged}", loc="left", fontsize=style.SMALL)
     label(ax, "x", way)
     label(ax, "y", speed)
     remarks = [] if strobe.ok else [f"The run ended early: {strobe.status}."]
@@ -110,10 +95,6 @@ def panel(
 
     Parameters
     ----------
-    ax : Axes
-        The axes.
-    strobe : Strobe
-        The points.
     window : Window
         Limits of the axes; points outside are counted in a corner.
     way, speed : Scale
@@ -128,24 +109,26 @@ def panel(
     ax.set_xlim(*(float(way.shown(end)) for end in window.x))
     ax.set_ylim(*(float(speed.shown(end)) for end in window.v))
     if strobe.hammer.position is not None:
-        line = ax.axvline(float(way.shown(strobe.hammer.position)), color=MUTED, lw=HAIR, zorder=1.0)
+        line = ax.axvline(
+            float(way.shown(strobe.hammer.position)), color=style.MUTED, lw=style.HAIR, zorder=1.0
+        )
         line.set_gid("backstop")
     x, v = way.shown(strobe.x), speed.shown(strobe.v)
-    ax.plot(x, v, ls="none", marker="o", ms=size, mew=0.0, color=BLUE, gid="points", zorder=3.0)
+    ax.plot(x, v, ls="none", marker="o", ms=size, mew=0.0, color=style.BLUE, gid="points", zorder=3.0)
     judged = strobe.verdict
     if judged is not None and judged.period is not None and judged.period <= min(_CYCLE, len(x)):
         cycle = slice(len(x) - judged.period, None)
         ax.plot(x[cycle], v[cycle], **{**RING, "ms": size + 4.0}, gid="cycle", zorder=4.0)
     if named:
-        note(ax, shown_period(strobe.period), (0.97, 0.96), ha="right", color=INK)
+        note(ax, shown_period(strobe.period), (0.97, 0.96), ha="right", color=style.INK)
     if named and judged is not None:
         note(ax, judged.name.replace("-", " "), (0.97, 0.04), ha="right", va="bottom", bbox=HALO)
         if printed and printed != judged.name:
             told = f"paper: {printed.replace('-', ' ')}"
-            note(ax, told, (0.97, 0.15), ha="right", va="bottom", fontsize=TINY, bbox=HALO)
+            note(ax, told, (0.97, 0.15), ha="right", va="bottom", fontsize=style.TINY, bbox=HALO)
     outside = int(np.count_nonzero(np.isfinite(strobe.x) & ~window.inside(strobe.x, strobe.v)))
     if outside:
-        note(ax, f"{outside} outside", (0.97, 0.86), ha="right", fontsize=TINY)
+        note(ax, f"{outside} outside", (0.97, 0.86), ha="right", fontsize=style.TINY)
 
 
 def shown_period(period: float) -> str:

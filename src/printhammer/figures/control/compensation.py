@@ -8,22 +8,9 @@ import numpy as np
 
 from printhammer.control.table.histories import REST, gap_text, histories, number_of
 from printhammer.control.table.report import STRATEGIES
+from printhammer.figures.elements import style
 from printhammer.figures.elements.scales import Scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    HAIR,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    TINY,
-    YELLOW,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements.style import foot, new_figure, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,29 +21,17 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 _FEW: Final = 4
-_LINES: Final = (BLUE, ORANGE, GREEN, YELLOW)
+_LINES: Final = (style.BLUE, style.ORANGE, style.GREEN, style.YELLOW)
 _MICROSECONDS: Final = Scale("", "s", "us")
 _BINS: Final = 41
 
 
 @styled
 def plot(table: CompensationTable) -> Figure:
-    """Draw a table: as maps of history by history at one or few rates, else against the rate.
-
-    Parameters
-    ----------
-    table : CompensationTable
-        From `printhammer.tune`.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Draw a table: as maps of history by history at one or few rates, else against the rate."""
     figure = _few_rates(table) if table.rates.size < _FEW else _many_rates(table)
     told = f"{table.hammer} · {table.fingerprint[:8]} · at most {table.largest_current:g} A"
-    text = figure.supxlabel(told, x=0.99, ha="right", fontsize=TINY, color=MUTED)
-    text.set_in_layout(True)
+    foot(figure, told)
     return figure
 
 
@@ -84,15 +59,15 @@ def _few_rates(table: CompensationTable) -> Figure:
                         f"{value:.1f}",
                         ha="center",
                         va="center",
-                        fontsize=TINY,
+                        fontsize=style.TINY,
                         color="white" if dark else "black",
                     )
-            ax.set_title(f"{word}, µs, at {rate:g} Hz", loc="left", fontsize=SMALL)
+            ax.set_title(f"{word}, µs, at {rate:g} Hz", loc="left", fontsize=style.SMALL)
             ax.set_yticks(np.arange(side) + 0.5, [gap_text(gap) for gap in range(side)])
             ticks = {
                 number % across: "-".join(map(gap_text, history[1:])) for number, history in told.items()
             }
-            ax.set_xticks([place + 0.5 for place in ticks], list(ticks.values()), fontsize=TINY)
+            ax.set_xticks([place + 0.5 for place in ticks], list(ticks.values()), fontsize=style.TINY)
             ax.set_ylabel("Last gap, slots")
             if table.gaps > 1:
                 ax.set_xlabel("Gaps before, latest first")
@@ -113,7 +88,7 @@ def _many_rates(table: CompensationTable) -> Figure:
         word = "one slot after another" if gap == 1 else f"{gap} slots after another"
         for ax, name in ((upper, "advance"), (lower, "width")):
             values = _MICROSECONDS.shown(getattr(table, name)[shown, column])
-            ax.plot(rates, values, color=colour, lw=THIN, label=word, gid=f"{name} {gap}")
+            ax.plot(rates, values, color=colour, lw=style.THIN, label=word, gid=f"{name} {gap}")
             braked = table.brake_width[shown, column] > 0.0
             ax.plot(
                 rates[braked],
@@ -125,12 +100,12 @@ def _many_rates(table: CompensationTable) -> Figure:
                 gid=f"braked {name} {gap}",
                 label="with a brake pulse before" if ax is lower and gap == 1 and braked.any() else None,
             )
-    upper.axhline(0.0, color=MUTED, lw=HAIR)
+    upper.axhline(0.0, color=style.MUTED, lw=style.HAIR)
     upper.set_ylabel("Fired before its slot  [µs]")
     lower.set_ylabel("Width of the pulse  [µs]")
     lower.set_xlabel("Slots per second  [kHz]")
-    lower.legend(frameon=False, fontsize=SMALL)
-    upper.set_title("Dots after a dot from rest", loc="left", fontsize=SMALL)
+    lower.legend(frameon=False, fontsize=style.SMALL)
+    upper.set_title("Dots after a dot from rest", loc="left", fontsize=style.SMALL)
     return figure
 
 
@@ -138,35 +113,29 @@ def _many_rates(table: CompensationTable) -> Figure:
 def plot_report(report: TableReport) -> Figure:
     """Draw what a table gains and loses: shares of good dots for each hammer, and force and arrival.
 
-    Parameters
-    ----------
-    report : TableReport
-        From `printhammer.judge_table`.
-
-    Returns
-    -------
-    Figure
-        The figure. Bars: dots within the limits, over all rates and patterns. Histograms: dots of the de
-        Bruijn cycle at the first rate; grey bands are the limits.
+    Bars: dots within the limits, over all rates and patterns. Histograms: dots of the de Bruijn cycle at the
+    first rate; grey bands are the limits.
     """
     figure = new_figure(5.6)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.2, 1.0))
     bars = figure.add_subplot(grid[0, :])
     share = 100.0 * report.good.mean(axis=(2, 3))
     places = np.arange(len(report.hammers))
-    for number, (name, colour) in enumerate(zip(STRATEGIES, (ORANGE, BLUE), strict=True)):
+    for number, (name, colour) in enumerate(zip(STRATEGIES, (style.ORANGE, style.BLUE), strict=True)):
         bars.bar(places + 0.4 * number - 0.2, share[number], 0.38, color=colour, label=name)
-    bars.set_xticks(places, [name.replace(" %", "%") for name in report.hammers], fontsize=TINY, rotation=30)
+    bars.set_xticks(
+        places, [name.replace(" %", "%") for name in report.hammers], fontsize=style.TINY, rotation=30
+    )
     for text in bars.get_xticklabels():
         text.set_horizontalalignment("right")
     bars.set_ylabel("Dots within limits  [%]")
     bars.set_xlim(-0.6, places.size - 0.4)
     bars.set_ylim(0.0, 119.0)
     bars.set_yticks([0, 25, 50, 75, 100])
-    bars.legend(frameon=False, fontsize=SMALL, ncols=2, loc="upper right")
+    bars.legend(frameon=False, fontsize=style.SMALL, ncols=2, loc="upper right")
     rates = report.rates
     span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
-    bars.set_title(f"Hammers driven, {span}", loc="left", fontsize=SMALL)
+    bars.set_title(f"Hammers driven, {span}", loc="left", fontsize=style.SMALL)
     _histogram(
         figure.add_subplot(grid[1, 0]),
         100.0 * report.force_deviation,
@@ -186,11 +155,11 @@ def plot_report(report: TableReport) -> Figure:
 def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
     """Draw how far dots are off, what is beyond three limits in the outermost bins."""
     edges = np.linspace(-3.0 * limit, 3.0 * limit, _BINS + 1)
-    ax.axvspan(-limit, limit, color=FAINT, lw=0.0, zorder=0)
-    for row, colour, style in zip(values, (ORANGE, BLUE), ("--", "-"), strict=True):
+    ax.axvspan(-limit, limit, color=style.FAINT, lw=0.0, zorder=0)
+    for row, colour, look in zip(values, (style.ORANGE, style.BLUE), ("--", "-"), strict=True):
         known = np.clip(row[~np.isnan(row)], edges[0], edges[-1])
-        ax.hist(known, bins=edges.tolist(), histtype="step", color=colour, ls=style, lw=THIN)
-    ax.set_title("what is farther off: at the ends", loc="right", fontsize=TINY)
+        ax.hist(known, bins=edges.tolist(), histtype="step", color=colour, ls=look, lw=style.THIN)
+    ax.set_title("what is farther off: at the ends", loc="right", fontsize=style.TINY)
     ax.set_yscale("log")
     ax.set_xlabel(name)
     ax.set_ylabel("Dots of the cycle")

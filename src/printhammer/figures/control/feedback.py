@@ -6,20 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    HAIR,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    YELLOW,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements import style
+from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
@@ -29,7 +17,7 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.comparison import Feedback
     from printhammer.support.arrays import FloatArray
 
-_COLOURS: Final = (ORANGE, YELLOW, GREEN)
+_COLOURS: Final = (style.ORANGE, style.YELLOW, style.GREEN)
 _MARKS: Final = ("s", "^", "D")
 _BINS: Final = 41
 _REACH: Final = 4.0
@@ -39,17 +27,9 @@ _REACH: Final = 4.0
 def plot(found: Feedback) -> Figure:
     """Draw a comparison of feedback with other ways to drive.
 
-    Parameters
-    ----------
-    found : Feedback
-        From `printhammer.control.feedback.comparison.feedback`.
-
-    Returns
-    -------
-    Figure
-        Above: how many dots of all patterns are off by how much, lost ones not among them; what is farther
-        off than the axis reaches is counted at its ends. Below: the second of two dots, by the time between
-        their slots. Between the dashed lines a dot is within limits.
+    Above: how many dots of all patterns are off by how much, lost ones not among them; what is farther off
+    than the axis reaches is counted at its ends. Below: the second of two dots, by the time between their
+    slots. Between the dashed lines a dot is within limits.
     """
     figure = new_figure(5.6)
     grid = figure.add_gridspec(2, 2)
@@ -67,13 +47,13 @@ def plot(found: Feedback) -> Figure:
         below[column].set_xlabel("Time between two slots  [ms]")
     above[0].set_ylabel("Share of the dots")
     above[0].set_title(
-        f"All dots of the patterns of eight slots at {found.rate:.6g} Hz", loc="left", fontsize=SMALL
+        f"All dots of the patterns of eight slots at {found.rate:.6g} Hz", loc="left", fontsize=style.SMALL
     )
-    above[1].set_title("what is farther off: at the ends", loc="right", fontsize=SMALL)
-    below[0].set_title("The second of two dots", loc="left", fontsize=SMALL)
+    above[1].set_title("what is farther off: at the ends", loc="right", fontsize=style.SMALL)
+    below[0].set_title("The second of two dots", loc="left", fontsize=style.SMALL)
     # Room for the legend above the bars.
     above[1].set_ylim(0.0, (1.1 + 0.14 * len(found.strategies)) * above[1].get_ylim()[1])
-    above[1].legend(fontsize=SMALL, frameon=False, loc="upper right")
+    above[1].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
     remarks = [
         f"{name}: {int(lost)} dots are lost"
         for name, lost in zip(found.strategies, found.lost, strict=True)
@@ -86,7 +66,7 @@ def plot(found: Feedback) -> Figure:
 def _look(found: Feedback, number: int) -> tuple[str, str]:
     """Return colour and marker of a strategy: feedback is the last."""
     if number == len(found.strategies) - 1:
-        return BLUE, "o"
+        return style.BLUE, "o"
     return _COLOURS[number % len(_COLOURS)], _MARKS[number % len(_MARKS)]
 
 
@@ -107,7 +87,7 @@ def _histogram(ax: Axes, found: Feedback, values: FloatArray, limit: float) -> N
             color=colour,
             fill=number == len(found.strategies) - 1,
             alpha=0.75 if number == len(found.strategies) - 1 else 1.0,
-            lw=THIN,
+            lw=style.THIN,
             label=f"{name}: {passed:.0f} % of the patterns",
             gid=name,
         )
@@ -127,16 +107,16 @@ def _by_gap(ax: Axes, found: Feedback, values: FloatArray, limit: float) -> None
             color=colour,
             marker=marker,
             ms=2.6,
-            lw=THIN,
+            lw=style.THIN,
             label=name,
             gid=name,
         )
     _limits(ax.axhline, limit)
-    ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0)
+    ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
     ax.set_ylim(-1.05 * reach, 1.05 * reach)
     ax.set_xlim(float(gaps[0]), float(gaps[-1]) if len(gaps) > 1 else float(gaps[0]) + 1.0)
 
 
 def _limits(line: object, limit: float) -> None:
     for end in (-limit, limit):
-        line(end, color=MUTED, lw=HAIR, ls=(0, (4, 3)))  # type: ignore[operator]
+        line(end, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)))  # type: ignore[operator]

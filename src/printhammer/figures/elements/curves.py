@@ -42,8 +42,6 @@ def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
     times : iterable of float, optional
         Firing times, s; a single pulse at 0 by default.
     duration : float or str, optional
@@ -71,8 +69,6 @@ def times_of(motion: Motion, start: float | None = None, end: float | None = Non
 
     Parameters
     ----------
-    motion : Motion
-        The motion.
     start, end : float, optional
         Limits, s; those of the motion by default.
     """

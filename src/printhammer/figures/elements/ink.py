@@ -31,18 +31,13 @@ _TOGETHER: Final = 1_000_000
 
 @dataclass(frozen=True)
 class Sheet:
-    """A part of the paper.
-
-    Attributes
-    ----------
-    left, right, top, bottom : float
-        Its edges, m: across, and downward.
-    """
+    """A part of the paper."""
 
     left: float
     right: float
     top: float
     bottom: float
+    """Its edges, m: across, and downward."""
 
     @property
     def width(self) -> float:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.figures.elements.marks import ALONG_Y, beside, legend_above
 from printhammer.figures.elements.scales import Scale, scale
-from printhammer.figures.elements.style import HAIR, INK, MUTED, ORANGE, SMALL, TINY
+from printhammer.figures.elements.style import HAIR, INK, MUTED, ORANGE, SMALL, foot
 from printhammer.maps.layout import failed_rates, places_of
 
 if TYPE_CHECKING:
@@ -165,13 +166,7 @@ def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
     if lost_at.size:
         cap: Literal["butt", "projecting"] = "butt" if few else "projecting"
         ax.plot(
-            lost_at,
-            shown.shown(lost_rates),
-            color=ORANGE,
-            lw=_LOST,
-            solid_capstyle=cap,
-            zorder=2.5,
-            gid=LOST,
+            lost_at, shown.shown(lost_rates), color=ORANGE, lw=_LOST, solid_capstyle=cap, zorder=2.5, gid=LOST
         )
 
 
@@ -204,15 +199,7 @@ def key(ax: Axes, chart: xr.Dataset) -> None:
         Line2D([], [], color=LINES, lw=HAIR, path_effects=around, label="firings"),
         Line2D([], [], color=ORANGE, lw=_LOST + 0.8, label=f"lost dots, {lost} of {fired}"),
     ]
-    ax.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderaxespad=0.2,
-        fontsize=SMALL,
-        frameon=False,
-        ncols=2,
-    )
+    legend_above(ax, handles)
 
 
 def colour_bar(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> None:
@@ -242,17 +229,7 @@ def colour_bar(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> 
     for name, at in places.items():
         for colour, width in (("white", 2.0), (INK, 0.9)):
             ax.axhline(at, color=colour, lw=width, gid=name)
-        ax.annotate(
-            name,
-            (0.0, at),
-            xycoords=("axes fraction", "data"),
-            xytext=(-3.0, 0.0),
-            textcoords="offset points",
-            ha="right",
-            va="center",
-            fontsize=SMALL,
-            color=INK,
-        )
+        beside(ax, name, (0.0, at), (-3.0, 0.0), "right center", xycoords=ALONG_Y, fontsize=SMALL, color=INK)
 
 
 def failures(chart: xr.Dataset) -> str:
@@ -272,11 +249,7 @@ def sign_map(figure: Figure, chart: xr.Dataset, *remarks: str) -> None:
     constants = str(chart.attrs.get("hammer_constants", ""))
     if constants.startswith("in part"):
         told.append(f"constants {constants}")
-    text = figure.supxlabel(" · ".join(filter(None, told)), x=0.99, ha="right", fontsize=TINY, color=MUTED)
-    text.set_in_layout(True)
-    shown = [remark for remark in remarks if remark]
-    if shown:
-        figure.suptitle("\n".join(shown), x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
+    foot(figure, " · ".join(filter(None, told)), "\n".join(filter(None, remarks)))
 
 
 def norm_of(scales: Scales, *charts: xr.Dataset) -> Normalize:

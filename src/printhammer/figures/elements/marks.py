@@ -9,11 +9,23 @@ import numpy as np
 from printhammer.figures.elements.curves import places
 from printhammer.figures.elements.room import CURVE, freest, occupied
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import BLUE, FAINT, HAIR, INK, LINE, MUTED, SMALL, SURFACES, THIN
+from printhammer.figures.elements.style import (
+    BLUE,
+    FAINT,
+    HAIR,
+    INK,
+    LINE,
+    MUTED,
+    SMALL,
+    SURFACES,
+    THIN,
+    TINY,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.text import Text
 
@@ -24,6 +36,10 @@ if TYPE_CHECKING:
 
 HALO: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
 """Background of text that may lie on a line."""
+
+ALONG_X: Final = ("data", "axes fraction")
+ALONG_Y: Final = ("axes fraction", "data")
+"""Places given along one axis in its units, along the other in fractions of the axes."""
 
 _LINE_NAME: Final = (0.095, 0.06)
 """Width and height of a name on a horizontal line, of the axes."""
@@ -39,10 +55,6 @@ def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] 
     ----------
     ax : Axes
         Axes with displacement along `side`, whose limits are set.
-    hammer : Hammer
-        The hammer.
-    shown : Scale
-        The displacement.
     side : str, optional
         "y" for horizontal lines, "x" for vertical ones.
     """
@@ -72,16 +84,15 @@ def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
             for left in np.linspace(1.0 - _LINE_NAME[0], 0.0, 60).tolist()
         ]
         (left, bottom), _covered = freest(points, _LINE_NAME, corners)
-        ax.annotate(
+        beside(
+            ax,
             name,
             (left + _LINE_NAME[0], at),
-            xycoords="axes fraction",
-            xytext=(-4, 1.5 if bottom == at else -2.5),
-            textcoords="offset points",
+            (-4, 1.5 if bottom == at else -2.5),
             ha="right",
             va="bottom" if bottom == at else "top",
+            xycoords="axes fraction",
             fontsize=SMALL,
-            color=MUTED,
             zorder=4.0,
         )
 
@@ -94,17 +105,15 @@ def _double_line(ax: Axes, at: float, name: str) -> None:
         line = ax.axvline(at, color=MUTED, lw=HAIR, zorder=1.0)
         line.set_transform(ax.get_xaxis_transform() + offset)
         line.set_gid(f"{name}-{number}")
-    ax.annotate(
+    beside(
+        ax,
         name,
         (at, 1.0),
-        xycoords=("data", "axes fraction"),
-        xytext=(-_APART - 2.0, -4),
-        textcoords="offset points",
-        ha="right",
-        va="top",
+        (-_APART - 2.0, -4),
+        "right top",
+        xycoords=ALONG_X,
         rotation=90,
         fontsize=SMALL,
-        color=MUTED,
         zorder=4.0,
         bbox=HALO,
     )
@@ -114,6 +123,26 @@ def note(ax: Axes, text: str, at: tuple[float, float], **options: Any) -> Text:
     """Write a small remark at a place in fractions of the axes."""
     style = {"fontsize": SMALL, "color": MUTED, "va": "top", "ha": "left", "zorder": 5.0, **options}
     return ax.text(*at, text, transform=ax.transAxes, **style)
+
+
+def beside(
+    ax: Axes,
+    text: str,
+    at: tuple[float, float],
+    shift: tuple[float, float],
+    side: str = "left baseline",
+    **options: Any,
+) -> None:
+    """Write small beside a point, some points from it; `side` says what of the text lies there."""
+    ha, va = side.split()
+    how = {"fontsize": TINY, "color": MUTED, "textcoords": "offset points", "ha": ha, "va": va, **options}
+    ax.annotate(text, at, shift, **how)
+
+
+def legend_above(ax: Axes, handles: Sequence[Artist], **options: Any) -> None:
+    """Write a legend in one line above the axes, from the left."""
+    where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
+    ax.legend(handles=handles, fontsize=SMALL, frameon=False, ncols=len(handles), **where, **options)
 
 
 def contact_spans(ax: Axes, motion: Motion, until: float, shown: Scale) -> None:
@@ -210,8 +239,6 @@ def drive_strip(
 
     Parameters
     ----------
-    ax : Axes
-        The strip.
     motions : sequence of Motion
         Motions of one hammer; if they differ in what is driven, the first decides.
     times : sequence of array

@@ -32,8 +32,6 @@ def picture(figure: Figure, kind: str, *, dpi: float = DOTS_PER_INCH) -> bytes:
 
     Parameters
     ----------
-    figure : Figure
-        The figure.
     kind : str
         One of `FORMATS`.
     dpi : float, optional
@@ -57,8 +55,6 @@ def save(
 
     Parameters
     ----------
-    figure : Figure
-        The figure.
     folder : path
         Where to.
     name : str

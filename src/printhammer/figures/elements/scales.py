@@ -20,24 +20,16 @@ Name = Literal["displacement", "velocity", "force", "time", "current"]
 
 @dataclass(frozen=True)
 class Scale:
-    """How a quantity is shown.
-
-    Attributes
-    ----------
-    label : str
-        Name on the axis.
-    si : str
-        SI unit of the numbers inside.
-    unit : str
-        Unit of the numbers drawn.
-    other : str
-        Unit of the opposite axis; empty for none.
-    """
+    """How a quantity is shown."""
 
     label: str
+    """Name on the axis."""
     si: str
+    """SI unit of the numbers inside."""
     unit: str
+    """Unit of the numbers drawn."""
     other: str = ""
+    """Unit of the opposite axis; empty for none."""
 
     @property
     def factor(self) -> float:
@@ -70,10 +62,7 @@ _SCALES: Final[dict[str, tuple[tuple[float, Scale], ...]]] = {
     ),
     "velocity": ((float("inf"), Scale("Velocity", "m/s", "m/s", "in/s")),),
     "force": ((float("inf"), Scale("Force", "N", "N", "lbf")),),
-    "time": (
-        (0.5, Scale("Time", "s", "ms")),
-        (float("inf"), Scale("Time", "s", "s")),
-    ),
+    "time": ((0.5, Scale("Time", "s", "ms")), (float("inf"), Scale("Time", "s", "s"))),
     "current": ((float("inf"), Scale("Current", "A", "A")),),
 }
 
@@ -83,8 +72,6 @@ def scale(name: Name, largest: float = 0.0) -> Scale:
 
     Parameters
     ----------
-    name : str
-        The quantity.
     largest : float, optional
         Largest absolute value, SI; hammers far from the size of the paper's get larger units.
 
@@ -105,8 +92,6 @@ def label(ax: Axes, side: Literal["x", "y"], shown: Scale, name: str = "") -> Se
         Axes whose data are in `shown.unit`.
     side : str
         "x" or "y".
-    shown : Scale
-        The quantity.
     name : str, optional
         Other name than that of the scale.
 

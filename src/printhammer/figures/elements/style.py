@@ -128,8 +128,13 @@ def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
     told = [hammer.name, hammer.fingerprint[:8]]
     if known:
         told.append(f"constants in part {' and '.join(known)}")
-    text = figure.supxlabel(" · ".join(told), x=0.99, ha="right", fontsize=TINY, color=MUTED)
-    text.set_in_layout(True)
     shown = [line for remark in remarks if remark for line in wrap(remark, _LINE_OF_REMARK)]
-    if shown:
-        figure.suptitle("\n".join(shown), x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
+    foot(figure, " · ".join(told), "\n".join(shown))
+
+
+def foot(figure: Figure, told: str, remark: str = "") -> None:
+    """Write below a figure where it comes from, and a remark above it."""
+    text = figure.supxlabel(told, x=0.99, ha="right", fontsize=TINY, color=MUTED)
+    text.set_in_layout(True)
+    if remark:
+        figure.suptitle(remark, x=0.01, ha="left", fontsize=SMALL, color=ORANGE)

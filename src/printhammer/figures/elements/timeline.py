@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from printhammer.figures.elements import style
 from printhammer.figures.elements.curves import places, times_of
-from printhammer.figures.elements.marks import curve, drive_strip, firings, name_lines, place_lines
-from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    GREEN,
-    INK,
-    LINE,
-    ORANGE,
-    SMALL,
-    THIN,
-    new_figure,
-    sign,
-    styled,
-    with_strip,
+from printhammer.figures.elements.marks import (
+    curve,
+    drive_strip,
+    firings,
+    legend_above,
+    name_lines,
+    place_lines,
 )
+from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,7 +26,11 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
 
-_LOOKS: Final = ((BLUE, "-", LINE), (ORANGE, "-", LINE), (GREEN, "-", LINE))
+_LOOKS: Final = (
+    (style.BLUE, "-", style.LINE),
+    (style.ORANGE, "-", style.LINE),
+    (style.GREEN, "-", style.LINE),
+)
 _HEADROOM: Final = 0.08
 
 
@@ -46,6 +46,9 @@ def timeline(
     height: float = 4.2,
 ) -> Figure:
     """Draw one or more motions of one hammer against time, with the drive below.
+
+    Its lines have the gids "displacement" and "current" (or "force"), followed by " 1", " 2" where there are
+    several motions.
 
     Parameters
     ----------
@@ -63,12 +66,6 @@ def timeline(
         Sentences shown above the figure; those of runs that stopped early are added.
     height : float, optional
         Height of the figure, in.
-
-    Returns
-    -------
-    Figure
-        The figure; its lines have the gids "displacement" and "current" (or "force"), followed by " 1", " 2"
-        where there are several motions.
     """
     hammer = motions[0].hammer
     figure = new_figure(height)
@@ -89,13 +86,18 @@ def timeline(
         order = 3.0 - 0.1 * number
         curve(panel, time.shown(grid), way.shown(path), gid, colour, ls=dash, lw=width, zorder=order)
         if show_firings:
-            firings(panel, motion.drive.times[motion.drive.times <= until], time, colour if several else BLUE)
+            firings(
+                panel,
+                motion.drive.times[motion.drive.times <= until],
+                time,
+                colour if several else style.BLUE,
+            )
     drive_strip(strip, motions, grids, until, [look[0] for look in _LOOKS[: len(motions)]])
     name_lines(panel, hammer, way)
     if labels:
         _legend(figure, labels)
     elif heading:
-        panel.set_title(heading, loc="left", fontsize=SMALL, color=INK, pad=4.0)
+        panel.set_title(heading, loc="left", fontsize=style.SMALL, color=style.INK, pad=4.0)
     label(panel, "y", way)
     messages = [motion.message for motion in motions if motion.message]
     sign(figure, hammer, *remarks, *messages)
@@ -114,15 +116,7 @@ def _legend(figure: Figure, labels: Sequence[str]) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=_LOOKS[number][0], ls=_LOOKS[number][1], lw=THIN + 0.5, label=text)
+        Line2D([], [], color=_LOOKS[number][0], ls=_LOOKS[number][1], lw=style.THIN + 0.5, label=text)
         for number, text in enumerate(labels)
     ]
-    figure.axes[0].legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderaxespad=0.2,
-        fontsize=SMALL,
-        frameon=False,
-        ncols=len(labels),
-    )
+    legend_above(figure.axes[0], handles)

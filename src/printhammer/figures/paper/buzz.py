@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from printhammer.figures.elements.curves import fired, shown_until
+from printhammer.figures.elements.marks import beside
 from printhammer.figures.elements.scales import scale
-from printhammer.figures.elements.style import INK, TINY, in_style
+from printhammer.figures.elements.style import INK, in_style
 from printhammer.figures.elements.timeline import timeline
 from printhammer.units import from_si
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | str | None = None) -> Figure:
     """Draw Fig. 7: the train that `find_buzz_train` finds, or its best attempt, saying so.
 
+    The numbers at the dots that count are peak forces in units of that of a single pulse.
+
     Parameters
     ----------
     hammer : Hammer
@@ -29,11 +32,6 @@ def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | 
         Result of a search made before.
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled.
-
-    Returns
-    -------
-    Figure
-        The figure; the numbers at the dots that count are peak forces in units of that of a single pulse.
 
     Raises
     ------
@@ -84,13 +82,11 @@ def _number(figure: Figure, motion: Motion, train: BuzzTrain, until: float) -> N
         if contact.surface != "pack" or contact.extra or force is None or contact.t_peak > until:
             continue
         peak = float(motion.at(contact.t_peak)[0][0])
-        panel.annotate(
+        beside(
+            panel,
             f"{force:.2f}",
             (float(time.shown(contact.t_peak)), float(way.shown(peak))),
-            xytext=(0, 3),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=TINY,
+            (0, 3),
+            "center bottom",
             color=INK,
         )

@@ -37,17 +37,14 @@ def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     A clockwise loop is energy given to the armature, a counter-clockwise one energy lost; arrow heads tell
     which.
 
+    The insert shows what follows the second touch of the backstop, where there is one.
+
     Parameters
     ----------
     hammer : Hammer
         Any hammer with a waveform.
     duration : float or str, optional
         Time of the motion drawn, s, or text with a unit; 4 ms by default.
-
-    Returns
-    -------
-    Figure
-        The figure; the insert shows what follows the second touch of the backstop, where there is one.
 
     Raises
     ------

@@ -32,6 +32,9 @@ def frequency_map(
 ) -> Figure:
     """Draw Fig. 9: the frequency-time map in colours.
 
+    Thin lines are firings, strong ones lost dots, or marks in each row where there are fewer than 50 rates;
+    the gids are "firing 1" and so on, and "lost dots".
+
     Parameters
     ----------
     hammer : Hammer
@@ -40,12 +43,6 @@ def frequency_map(
         A map from `printhammer.frequency_map`; by default the one of the hammer.
     rates : array, optional
         Rates of the map that is computed, Hz.
-
-    Returns
-    -------
-    Figure
-        The figure. Thin lines are firings, strong ones lost dots, or marks in each row where there are fewer
-        than 50 rates; the gids are "firing 1" and so on, and "lost dots".
 
     Raises
     ------

@@ -26,11 +26,6 @@ def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     duration : float or str, optional
         Time of the motion drawn, s, or text with a unit; 4 ms by default.
 
-    Returns
-    -------
-    Figure
-        The figure.
-
     Raises
     ------
     InputError

@@ -56,6 +56,9 @@ def poincare(
 ) -> Figure:
     """Draw Fig. 11: the states at the first firings of trains, a panel for each strobe time.
 
+    The vertical line is the backstop; circles are the last points of a train with a period of up to 8
+    firings.
+
     Parameters
     ----------
     hammer : Hammer
@@ -69,12 +72,6 @@ def poincare(
     printed : mapping, optional
         Verdicts that the paper prints, such as "period-2", by strobe time, s; each is written in its panel
         where the verdict on the points is another.
-
-    Returns
-    -------
-    Figure
-        The figure. The vertical line is the backstop; circles are the last points of a train with a period
-        of up to 8 firings.
 
     Raises
     ------

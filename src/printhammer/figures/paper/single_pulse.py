@@ -23,11 +23,6 @@ def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figu
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled, at most 4 ms.
 
-    Returns
-    -------
-    Figure
-        The figure.
-
     Raises
     ------
     InputError

@@ -7,20 +7,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.figures.elements import style
 from printhammer.figures.elements.curves import places, reach
 from printhammer.figures.elements.marks import curve, place_lines
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    FAMILY,
-    HAIR,
-    ORANGE,
-    SMALL,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,11 +41,6 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     currents : sequence of float, optional
         Coil currents, A; those outside the range of the magnet's law are left out.
 
-    Returns
-    -------
-    Figure
-        The figure.
-
     Raises
     ------
     InputError
@@ -81,7 +67,7 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
 
     ax.set_xlim(float(way.shown(start)), float(way.shown(end)))
     ax.set_ylim(*_limits(hammer, x, list(magnet.values()), spring))
-    ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
+    ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0.5)
     place_lines(ax, hammer, way, "x")
     names = [f"{current:g} A" for current in magnet]
     colours = dict(zip(names, _colours(len(magnet)), strict=True))
@@ -89,14 +75,14 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     for name, values in curves.items():
         curve(ax, way.shown(x), values, f"magnet {name}", colours[name])
     if spring is not None:
-        curve(ax, way.shown(x), spring, "spring", ORANGE)
-        curve(ax, way.shown(x), -spring, "spring reflected", ORANGE, ls=(0, (4, 2)))
+        curve(ax, way.shown(x), spring, "spring", style.ORANGE)
+        curve(ax, way.shown(x), -spring, "spring reflected", style.ORANGE, ls=(0, (4, 2)))
         ax.legend(
             handles=ax.lines[-2:],
             labels=["spring force", "its reflection"],
             loc="upper center",
             bbox_to_anchor=(0.71, 1.0),
-            fontsize=SMALL,
+            fontsize=style.SMALL,
             edgecolor="none",
         )
     lines = way.shown(list(places(hammer).values()))
@@ -137,17 +123,13 @@ def _limits(
 
 def _colours(count: int) -> list[str]:
     if count == 1:
-        return [BLUE]
-    picks = np.linspace(0, len(FAMILY) - 1, count).round().astype(int)
-    return [FAMILY[pick] for pick in reversed(picks)]
+        return [style.BLUE]
+    picks = np.linspace(0, len(style.FAMILY) - 1, count).round().astype(int)
+    return [style.FAMILY[pick] for pick in reversed(picks)]
 
 
 def _label_curves(
-    ax: Axes,
-    x: FloatArray,
-    lines: FloatArray,
-    curves: dict[str, FloatArray],
-    further: list[FloatArray],
+    ax: Axes, x: FloatArray, lines: FloatArray, curves: dict[str, FloatArray], further: list[FloatArray]
 ) -> None:
     """Write a name on each curve where the others, further ones and the lines of places are far."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
@@ -179,8 +161,8 @@ def _label_curves(
             (x[row], curves[name][row]),
             ha="center",
             va="center",
-            fontsize=SMALL,
-            color=FAMILY[-1],
+            fontsize=style.SMALL,
+            color=style.FAMILY[-1],
             zorder=5.0,
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.9, "pad": 1.0},
         )

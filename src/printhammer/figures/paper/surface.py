@@ -83,6 +83,8 @@ class _View:
 def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None) -> Figure:
     """Draw Fig. 8: displacement against time, one curve for each rate, each hiding those behind it.
 
+    The parts of a curve inside the pack are blue; the gids of the curves are "rate" and their numbers.
+
     Parameters
     ----------
     hammer : Hammer
@@ -92,12 +94,6 @@ def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
         the hammer.
     rates : array, optional
         Rates of the map that is computed, Hz.
-
-    Returns
-    -------
-    Figure
-        The figure. The parts of a curve inside the pack are blue; the gids of the curves are "rate" and their
-        numbers.
 
     Raises
     ------

@@ -4,22 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from printhammer.figures.elements import style
 from printhammer.figures.elements.curves import fired, shown_until, times_of
 from printhammer.figures.elements.curves import total_force as force_at
-from printhammer.figures.elements.marks import contact_spans, curve, drive_strip
+from printhammer.figures.elements.marks import contact_spans, curve, drive_strip, legend_above
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    HAIR,
-    INK,
-    SMALL,
-    SURFACES,
-    new_figure,
-    sign,
-    styled,
-    with_strip,
-)
+from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,17 +23,14 @@ if TYPE_CHECKING:
 def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 4: the sum of all forces on the armature, equation (2), after a single pulse.
 
+    The impacts on a rigid backstop have no finite force and are not drawn.
+
     Parameters
     ----------
     hammer : Hammer
         Any hammer with a waveform.
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled, at most 4 ms.
-
-    Returns
-    -------
-    Figure
-        The figure. The impacts on a rigid backstop have no finite force and are not drawn.
 
     Raises
     ------
@@ -61,11 +48,11 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     low, high = min(float(total.min()), 0.0), max(float(total.max()), 0.0)
     room = 0.08 * (high - low) or 1.0
     panel.set_ylim(float(force.shown(low - room)), float(force.shown(high + room)))
-    panel.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.6)
+    panel.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0.6)
     contact_spans(panel, motion, until, time)
-    curve(panel, time.shown(times), force.shown(total), "total force", INK, lw=1.0)
+    curve(panel, time.shown(times), force.shown(total), "total force", style.INK, lw=1.0)
     _key(panel, motion)
-    drive_strip(strip, [motion], [times], until, [BLUE])
+    drive_strip(strip, [motion], [times], until, [style.BLUE])
     label(panel, "y", force, "Total force")
     sign(figure, hammer, motion.message, rigid_remark(motion))
     return figure
@@ -82,18 +69,9 @@ def _key(ax: Axes, motion: Motion) -> None:
 
     touched = {contact.surface for contact in motion.contacts}
     handles = [
-        Patch(color=SURFACES[name], alpha=0.3, lw=0.0, label=f"touches the {name}")
+        Patch(color=style.SURFACES[name], alpha=0.3, lw=0.0, label=f"touches the {name}")
         for name in ("pack", "backstop")
         if name in touched
     ]
     if handles:
-        ax.legend(
-            handles=handles,
-            loc="lower left",
-            bbox_to_anchor=(0.0, 1.0),
-            borderaxespad=0.2,
-            fontsize=SMALL,
-            frameon=False,
-            handlelength=1.2,
-            ncols=len(handles),
-        )
+        legend_above(ax, handles, handlelength=1.2)

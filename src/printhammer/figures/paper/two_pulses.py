@@ -34,11 +34,6 @@ def two_pulses(
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled.
 
-    Returns
-    -------
-    Figure
-        The figure.
-
     Raises
     ------
     InputError

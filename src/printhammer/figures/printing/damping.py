@@ -6,20 +6,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    TINY,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import ALONG_Y, beside
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +17,7 @@ if TYPE_CHECKING:
     from printhammer.printing.rates.damping import DampingStudy
     from printhammer.support.arrays import FloatArray
 
-COLOURS: Final = {"as it is": INK, "hard": BLUE, "elastomer": GREEN, "pack": ORANGE}
+COLOURS: Final = {"as it is": style.INK, "hard": style.BLUE, "elastomer": style.GREEN, "pack": style.ORANGE}
 """Colour of each kind of material."""
 
 _ROW: Final = 0.2
@@ -39,17 +28,9 @@ _BAR: Final = 0.66
 def plot(found: DampingStudy) -> Figure:
     """Draw a damping study.
 
-    Parameters
-    ----------
-    found : DampingStudy
-        From `printhammer.damping_study`.
-
-    Returns
-    -------
-    Figure
-        A row a material. Bars: safe rate, settle-out time, change of momentum at the backstop, all at the
-        same print force. Hollow: that takes more current than is allowed. Dashed: the hammer as it is. What
-        is not known is said instead of a bar.
+    A row a material. Bars: safe rate, settle-out time, change of momentum at the backstop, all at the same
+    print force. Hollow: that takes more current than is allowed. Dashed: the hammer as it is. What is not
+    known is said instead of a bar.
     """
     count = len(found.materials)
     figure = new_figure(1.3 + _ROW * count, 7.6)
@@ -67,24 +48,23 @@ def plot(found: DampingStudy) -> Figure:
         _panel(ax, found, values, told)
         ax.set_xlabel(name)
     labels = [one.label.replace(" us", " µs") for one in found.materials]
-    axes[0].set_yticks(range(count), labels, fontsize=TINY)
+    axes[0].set_yticks(range(count), labels, fontsize=style.TINY)
     axes[0].set_ylim(count - 0.4, -0.6)
     for tick, one in zip(axes[0].get_yticklabels(), found.materials, strict=True):
         tick.set_color(COLOURS[one.kind])
     kinds = [kind for kind in COLOURS if any(one.kind == kind for one in found.materials)]
     for place, kind in enumerate(kinds):
-        axes[0].annotate(
+        beside(
+            axes[0],
             kind,
             (place / len(kinds), 1.0),
+            (0.0, 4.0),
             xycoords="axes fraction",
-            xytext=(0.0, 4.0),
-            textcoords="offset points",
-            fontsize=TINY,
             color=COLOURS[kind],
         )
     over = int((found.status == "current limit").sum())
     limit = f"; hollow: over {found.current_limit:g} A" if over else f", {found.current_limit:g} A at most"
-    axes[2].set_title(f"All print with {found.nominal.force:.1f} N{limit}", loc="right", fontsize=SMALL)
+    axes[2].set_title(f"All print with {found.nominal.force:.1f} N{limit}", loc="right", fontsize=style.SMALL)
     sign(figure, found.hammer)
     return figure
 
@@ -94,16 +74,7 @@ def _panel(ax: Axes, found: DampingStudy, values: FloatArray, otherwise: list[st
     for row, one in enumerate(found.materials):
         colour = COLOURS[one.kind]
         if not np.isfinite(values[row]):
-            ax.annotate(
-                otherwise[row],
-                (0.0, row),
-                xycoords=("axes fraction", "data"),
-                xytext=(3.0, 0.0),
-                textcoords="offset points",
-                va="center",
-                fontsize=TINY,
-                color=MUTED,
-            )
+            beside(ax, otherwise[row], (0.0, row), (3.0, 0.0), xycoords=ALONG_Y, va="center")
             continue
         hollow = found.status[row] == "current limit"
         ax.barh(
@@ -115,19 +86,19 @@ def _panel(ax: Axes, found: DampingStudy, values: FloatArray, otherwise: list[st
             alpha=1.0 if row == best else 0.75,
             gid=f"bar-{row}",
         )
-        ax.annotate(
+        beside(
+            ax,
             f"{values[row]:.4g}" if values[row] >= 100.0 else f"{values[row]:.2f}",
             (values[row], row),
-            xytext=(2.0, 0.0),
-            textcoords="offset points",
-            va="center",
-            fontsize=TINY,
+            (2.0, 0.0),
+            "left center",
             fontweight="bold" if row == best else "normal",
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+            color=style.INK,
         )
         if one.kind == "as it is":
-            ax.axvline(values[row], color=MUTED, lw=THIN, ls=(0, (4, 3)), zorder=0.5)
+            ax.axvline(values[row], color=style.MUTED, lw=style.THIN, ls=(0, (4, 3)), zorder=0.5)
     ax.set_xlim(0.0, 1.24 * float(np.nanmax(values, initial=1e-12)))
-    ax.grid(axis="x", color=FAINT, lw=0.5)
+    ax.grid(axis="x", color=style.FAINT, lw=0.5)
     ax.set_axisbelow(True)
     ax.tick_params(axis="y", length=0.0)

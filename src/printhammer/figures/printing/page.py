@@ -8,21 +8,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.figures.elements import style
 from printhammer.figures.elements.ink import Sheet, coloured, inked
 from printhammer.figures.elements.scales import Scale
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    TINY,
-    sign,
-    styled,
-)
+from printhammer.figures.elements.style import sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,19 +52,14 @@ _MICRONS: Final = Scale("Placement error", "m", "um")
 def plot(page: Page, view: View = "page") -> Figure:
     """Draw a page.
 
+    In the difference a dot has the colour of its placement error, and crosses are lost dots. In the worst
+    place rings are where dots are wanted, and crosses lost dots.
+
     Parameters
     ----------
-    page : Page
-        From `printhammer.print_page`.
     view : str, optional
         "page": from the top, what was printed, what was wanted, the difference, and the worst place; "zoom":
         the worst place alone; "sheet": the paper alone, at its true size.
-
-    Returns
-    -------
-    Figure
-        The figure. In the difference a dot has the colour of its placement error, and crosses are lost dots.
-        In the worst place rings are where dots are wanted, and crosses lost dots.
 
     Raises
     ------
@@ -102,8 +86,8 @@ def plot(page: Page, view: View = "page") -> Figure:
     figure, top = _figure(height), height - 0.1
     if beside:
         top -= _LABEL
-        style: dict[str, Any] = {"fontsize": SMALL, "color": MUTED, "va": "center"}
-        figure.text(_SIDE / _WIDTH, (top + 0.1) / height, _printed_title(page), **style)
+        look: dict[str, Any] = {"fontsize": style.SMALL, "color": style.MUTED, "va": "center"}
+        figure.text(_SIDE / _WIDTH, (top + 0.1) / height, _printed_title(page), **look)
     axes = []
     for number, name in enumerate(("Printed" if beside else _printed_title(page), "Wanted", "Difference")):
         if number == 0 or not beside:
@@ -171,8 +155,8 @@ def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, 
     ax.set_xticks([])
     ax.set_yticks([])
     for spine in ax.spines.values():
-        spine.set_color(FAINT)
-    ax.set_title(title, loc="left", fontsize=SMALL, color=MUTED, pad=3.0)
+        spine.set_color(style.FAINT)
+    ax.set_title(title, loc="left", fontsize=style.SMALL, color=style.MUTED, pad=3.0)
     return ax
 
 
@@ -256,7 +240,7 @@ def _differences(
     # At least as wide as the limits, so that nothing shines that is nothing.
     bound = float(_MICRONS.shown(page.limits.arrival * page.speed))
     widest = max(float(np.abs(error).max(initial=0.0)), bound)
-    colours = LinearSegmentedColormap.from_list("off", [BLUE, _NEUTRAL, ORANGE])
+    colours = LinearSegmentedColormap.from_list("off", [style.BLUE, _NEUTRAL, style.ORANGE])
     discs = _discs(
         ax,
         across[on],
@@ -271,7 +255,14 @@ def _differences(
     lost_across, lost_down = (part[page.lost] for part in page.intended)
     mark = max(_in_points(ax, head.wire_diameter), _LEAST_MARK)
     ax.plot(
-        lost_across, lost_down, ls="none", marker="x", ms=0.9 * mark, mew=0.25 * mark, color=INK, gid="lost"
+        lost_across,
+        lost_down,
+        ls="none",
+        marker="x",
+        ms=0.9 * mark,
+        mew=0.25 * mark,
+        color=style.INK,
+        gid="lost",
     )
     width, whole = figure.get_size_inches()
     box = ax.get_position()
@@ -285,7 +276,14 @@ def _differences(
         (1.02, "left", f"late, {widest:.3g} µm"),
     ):
         bar_axes.text(
-            place, 0.5, text, ha=side, va="center", fontsize=TINY, color=MUTED, transform=bar_axes.transAxes
+            place,
+            0.5,
+            text,
+            ha=side,
+            va="center",
+            fontsize=style.TINY,
+            color=style.MUTED,
+            transform=bar_axes.transAxes,
         )
 
 
@@ -299,13 +297,15 @@ def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
     near &= (down > sheet.top - reach) & (down < sheet.bottom + reach)
     on, lost = near & page.printed, near & page.lost
     mark = _in_points(ax, head.wire_diameter)
-    rings = {"facecolors": "none", "linewidths": min(THIN, 0.07 * mark)}
-    _discs(ax, across[on], down[on], head.wire_diameter, edgecolors=BLUE, gid="wanted", **rings)
-    _discs(ax, across[lost], down[lost], head.wire_diameter, edgecolors=ORANGE, gid="lost", **rings)
-    ax.plot(across[lost], down[lost], ls="none", marker="x", ms=0.4 * mark, mew=0.1 * mark, color=ORANGE)
+    rings = {"facecolors": "none", "linewidths": min(style.THIN, 0.07 * mark)}
+    _discs(ax, across[on], down[on], head.wire_diameter, edgecolors=style.BLUE, gid="wanted", **rings)
+    _discs(ax, across[lost], down[lost], head.wire_diameter, edgecolors=style.ORANGE, gid="lost", **rings)
+    ax.plot(
+        across[lost], down[lost], ls="none", marker="x", ms=0.4 * mark, mew=0.1 * mark, color=style.ORANGE
+    )
     more = near[page.extra_of]
     extra_across, extra_down = (part[more] for part in page.extra_places)
-    _discs(ax, extra_across, extra_down, head.wire_diameter, edgecolors=GREEN, gid="extra", **rings)
+    _discs(ax, extra_across, extra_down, head.wire_diameter, edgecolors=style.GREEN, gid="extra", **rings)
 
 
 def _tell(figure: Figure, page: Page) -> None:
@@ -313,7 +313,7 @@ def _tell(figure: Figure, page: Page) -> None:
     sign(figure, page.hammer)
     _width, whole = figure.get_size_inches()
     left = _SIDE / _WIDTH
-    figure.text(left, 0.4 / whole, summary(page), fontsize=SMALL, color=INK, va="center")
+    figure.text(left, 0.4 / whole, summary(page), fontsize=style.SMALL, color=style.INK, va="center")
 
 
 def summary(page: Page) -> str:

@@ -6,21 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.figures.elements.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    HAIR,
-    INK,
-    MUTED,
-    ORANGE,
-    SMALL,
-    THIN,
-    TINY,
-    new_figure,
-    sign,
-    styled,
-)
+from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import ALONG_X, beside
+from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,16 +28,8 @@ _ROOM: Final = 1.25
 def plot(found: Quality) -> Figure:
     """Draw where the dots of a pattern lie in force and arrival, and one after the other.
 
-    Parameters
-    ----------
-    found : Quality
-        From `printhammer.quality`.
-
-    Returns
-    -------
-    Figure
-        Left: every dot, its force over that of the single pulse against how late it arrives, the limits as a
-        box. Right: both against the slot, at most 64 slots, those with the worst dot among them.
+    Left: every dot, its force over that of the single pulse against how late it arrives, the limits as a box.
+    Right: both against the slot, at most 64 slots, those with the worst dot among them.
     """
     figure = new_figure(3.6, 7.6)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.35))
@@ -61,26 +41,31 @@ def plot(found: Quality) -> Figure:
     good = found.fault < 0
     limits = found.limits
     _box(plane, limits, late, share)
-    for which, colour, name in ((good, BLUE, "within limits"), (~good & ~found.lost, ORANGE, "off")):
+    for which, colour, name in (
+        (good, style.BLUE, "within limits"),
+        (~good & ~found.lost, style.ORANGE, "off"),
+    ):
         if which.any():
             plane.plot(
                 late[which], share[which], "o", ms=3.2, mew=0.0, alpha=0.7, color=colour, label=name, gid=name
             )
     if found.lost.any():
-        plane.plot([], [], "x", ms=5.0, color=INK, label=f"{int(found.lost.sum())} lost")
+        plane.plot([], [], "x", ms=5.0, color=style.INK, label=f"{int(found.lost.sum())} lost")
     plane.set_xlabel("Arrives late by  [µs]")
     plane.set_ylabel("Force against the single pulse  [%]")
-    plane.legend(loc="upper right", fontsize=TINY, frameon=False, handletextpad=0.2)
+    plane.legend(loc="upper right", fontsize=style.TINY, frameon=False, handletextpad=0.2)
     begin = _window(found)
     shown = (found.slot >= begin) & (found.slot < begin + _MOST_SLOTS)
     where = found.slot[shown]
     for ax, values, bound in ((force, share, 100.0 * limits.force), (arrival, late, _US * limits.arrival)):
-        ax.axhspan(-bound, bound, color=FAINT, alpha=0.5, lw=0.0)
-        ax.axhline(0.0, color=MUTED, lw=HAIR)
-        ax.vlines(where, 0.0, values[shown], color=np.where(good[shown], BLUE, ORANGE), lw=THIN)
-        ax.scatter(where, values[shown], s=7.0, color=np.where(good[shown], BLUE, ORANGE), lw=0.0)
+        ax.axhspan(-bound, bound, color=style.FAINT, alpha=0.5, lw=0.0)
+        ax.axhline(0.0, color=style.MUTED, lw=style.HAIR)
+        ax.vlines(
+            where, 0.0, values[shown], color=np.where(good[shown], style.BLUE, style.ORANGE), lw=style.THIN
+        )
+        ax.scatter(where, values[shown], s=7.0, color=np.where(good[shown], style.BLUE, style.ORANGE), lw=0.0)
         gone = found.slot[shown & np.isnan(values)]
-        ax.plot(gone, np.zeros(gone.size), "x", ms=5.0, color=INK, gid="lost")
+        ax.plot(gone, np.zeros(gone.size), "x", ms=5.0, color=style.INK, gid="lost")
         _symmetric(ax, values, bound)
     force.set_ylabel("Force  [%]")
     arrival.set_ylabel("Arrival  [µs]")
@@ -88,7 +73,7 @@ def plot(found: Quality) -> Figure:
     arrival.set_xlabel("Slot" if begin == 0 else f"Slot; the {_MOST_SLOTS} with the worst dot")
     arrival.set_xlim(begin - 1.0, min(begin + _MOST_SLOTS, len(found.wanted)))
     told = f"{found.rate:g} Hz, {found.strategy}: {int(good.sum())} of {good.size} dots within limits"
-    force.set_title(told, loc="left", fontsize=SMALL)
+    force.set_title(told, loc="left", fontsize=style.SMALL)
     sign(figure, found.hammer, "" if found.ok else f"The run ended early: {found.status}.")
     return figure
 
@@ -97,50 +82,46 @@ def plot(found: Quality) -> Figure:
 def plot_safe_rate(*found: SafeRate) -> Figure:
     """Draw how force and arrival deviate against the rate, and up to which rate all patterns pass.
 
+    Bands from the least to the largest deviation of any dot of any pattern; grey: within limits.
+
     Parameters
     ----------
     found : SafeRate
         From `printhammer.safe_rate`; several, such as of different strategies, are drawn over each other.
-
-    Returns
-    -------
-    Figure
-        Bands from the least to the largest deviation of any dot of any pattern; grey: within limits.
     """
     figure = new_figure(4.6)
     axes = figure.subplots(2, 1, sharex=True)
     for number, one in enumerate(found):
-        colour = (BLUE, GREEN, ORANGE)[number % 3]
+        colour = (style.BLUE, style.GREEN, style.ORANGE)[number % 3]
         for ax, low, high in (
             (axes[0], 100.0 * one.force_low, 100.0 * one.force_high),
             (axes[1], _US * one.arrival_low, _US * one.arrival_high),
         ):
             ax.fill_between(one.rates, low, high, color=colour, alpha=0.3, lw=0.0)
-            ax.plot(one.rates, low, color=colour, lw=THIN)
-            ax.plot(one.rates, high, color=colour, lw=THIN, label=one.strategy)
+            ax.plot(one.rates, low, color=colour, lw=style.THIN)
+            ax.plot(one.rates, high, color=colour, lw=style.THIN, label=one.strategy)
             if np.isfinite(one.rate):
-                ax.axvline(one.rate, color=colour, lw=THIN, ls=(0, (4, 3)), gid="safe rate")
+                ax.axvline(one.rate, color=colour, lw=style.THIN, ls=(0, (4, 3)), gid="safe rate")
         if np.isfinite(one.rate):
-            axes[0].annotate(
+            beside(
+                axes[0],
                 f"{'at least ' if one.at_least else ''}{one.rate:g} Hz",
                 (one.rate, 1.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(-3.0, -3.0 - 10.0 * number),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                fontsize=SMALL,
+                (-3.0, -3.0 - 10.0 * number),
+                "right top",
+                xycoords=ALONG_X,
+                fontsize=style.SMALL,
                 color=colour,
             )
     limits = found[0].limits
     for ax, bound in ((axes[0], 100.0 * limits.force), (axes[1], _US * limits.arrival)):
-        ax.axhspan(-bound, bound, color=FAINT, alpha=0.5, lw=0.0, zorder=0)
-        ax.axhline(0.0, color=MUTED, lw=HAIR)
+        ax.axhspan(-bound, bound, color=style.FAINT, alpha=0.5, lw=0.0, zorder=0)
+        ax.axhline(0.0, color=style.MUTED, lw=style.HAIR)
     axes[0].set_ylabel("Force  [%]")
     axes[1].set_ylabel("Arrival  [µs]")
     axes[1].set_xlabel("Slots per second  [Hz]")
     if len(found) > 1:
-        axes[0].legend(loc="lower left", fontsize=TINY, frameon=False)
+        axes[0].legend(loc="lower left", fontsize=style.TINY, frameon=False)
     remarks = [one.failure.text for one in found if one.failure is not None]
     sign(figure, found[0].hammer, *remarks[:1])
     return figure
@@ -151,10 +132,10 @@ def _box(ax: Axes, limits: Limits, late: FloatArray, share: FloatArray) -> None:
     from matplotlib.patches import Rectangle
 
     x, y = _US * limits.arrival, 100.0 * limits.force
-    box: Any = Rectangle((-x, -y), 2.0 * x, 2.0 * y, facecolor=FAINT, alpha=0.5, lw=0.0)
+    box: Any = Rectangle((-x, -y), 2.0 * x, 2.0 * y, facecolor=style.FAINT, alpha=0.5, lw=0.0)
     ax.add_patch(box)
-    ax.axhline(0.0, color=MUTED, lw=HAIR)
-    ax.axvline(0.0, color=MUTED, lw=HAIR)
+    ax.axhline(0.0, color=style.MUTED, lw=style.HAIR)
+    ax.axvline(0.0, color=style.MUTED, lw=style.HAIR)
     reach = [_reach(late, x), _reach(share, y)]
     ax.set_xlim(-reach[0], reach[0])
     ax.set_ylim(-reach[1], reach[1])

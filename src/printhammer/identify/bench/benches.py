@@ -75,27 +75,18 @@ _LEAST: Final = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """What is there to be measured.
-
-    Attributes
-    ----------
-    what : str
-        One line that says what is measured, and how.
-    true : dict of str to array, shape (rows,)
-        Columns by name, SI, before noise and resolution.
-    words : dict of str to tuple of str
-        Columns of words.
-    exact : tuple of str
-        Columns that have no error, such as the time.
-    suspect : str
-        Column in which wrong readings occur.
-    """
+    """What is there to be measured."""
 
     what: str
+    """One line that says what is measured, and how."""
     true: dict[str, FloatArray]
+    """Columns by name, SI, before noise and resolution, shape (rows,)."""
     suspect: str
+    """Column in which wrong readings occur."""
     words: dict[str, tuple[str, ...]]
+    """Columns of words."""
     exact: tuple[str, ...] = ()
+    """Columns that have no error, such as the time."""
 
 
 def magnet(
@@ -202,11 +193,7 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
 
 
 def motion(
-    hammer: Hammer,
-    sensor: Sensor,
-    *,
-    duration: float | str | None = None,
-    before: float | str = BEFORE,
+    hammer: Hammer, sensor: Sensor, *, duration: float | str | None = None, before: float | str = BEFORE
 ) -> Bench:
     """Record one shot from rest for a duration after the firing, s, and a while before, s."""
     from printhammer.drive.input import read_number, read_positive
@@ -320,10 +307,7 @@ def _restitution(k: float, damping: float, speed: float) -> float:
 
     if damping == 0.0:
         return 1.0
-    found: float = brentq(
-        lambda e: damping_from_restitution(k, e, speed) / damping - 1.0, _LEAST, 1.0, xtol=1e-15
-    )
-    return found
+    return brentq(lambda e: damping_from_restitution(k, e, speed) / damping - 1.0, _LEAST, 1.0, xtol=1e-15)
 
 
 def _simulated_rebound(bare: Hammer, speed: float) -> float:

@@ -7,7 +7,6 @@ numbers, so that none disturbs another.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -24,6 +23,7 @@ from printhammer.identify.bench.sensor import (
     wrong_rows,
 )
 from printhammer.identify.bench.sensor_settings import adjusted
+from printhammer.results import Column, Result, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray
 
 KINDS: Final = tuple(BENCHES)
@@ -70,32 +71,38 @@ SENSORS: Final = {
 """The sensors of an ordinary bench, by what is measured."""
 
 
-@dataclass(frozen=True, eq=False)
-class Measurement:
-    """One table of measurements.
+class Measurement(Result):
+    """One table of measurements."""
 
-    Attributes
-    ----------
-    kind : str
-        "magnet", "spring", "pack", "backstop" or "motion".
-    comments : dict of str to str
-        What was measured, of which hammer, with what sensors and which seed.
-    values : dict of str to array, shape (rows,)
-        Readings by column, SI.
-    words : dict of str to tuple of str
-        Columns of words.
-    true : dict of str to array, shape (rows,)
-        What noise, resolution, offset and wrong readings have been added to, SI.
-    outliers : array of int
-        Rows with a wrong reading.
-    """
+    kind: str = scalar("", "what was measured", more='"magnet", "spring", "pack", "backstop" or "motion"')
+    comments: dict[str, str] = scalar(
+        "", "what was measured, of which hammer, with what sensors and which seed"
+    )
+    values: dict[str, FloatArray] = part("readings by column, SI")
+    words: dict[str, tuple[str, ...]] = part("columns of words")
+    true: dict[str, FloatArray] = part(
+        "what noise, resolution, offset and wrong readings have been added to, SI"
+    )
+    outliers: npt.NDArray[np.int64] = part("rows with a wrong reading")
+    hammer: Hammer = part("what was measured")
 
-    kind: str
-    comments: dict[str, str]
-    values: dict[str, FloatArray]
-    words: dict[str, tuple[str, ...]]
-    true: dict[str, FloatArray]
-    outliers: npt.NDArray[np.int64]
+    @property
+    def title(self) -> str:
+        """One line that says what was measured."""
+        return f"measurement of the {self.kind} of {self.hammer.name}"
+
+    def entries(self) -> Entries:
+        """Return readings and words, what they were without the sensors as `true_force`, and `wrong`."""
+        entries: Entries = {}
+        for name, readings in self.values.items():
+            key, si = name.replace(" ", "_"), SI[name]
+            entries[key] = Column(si, name, ("row",), head=name), readings
+            true = Column(si, f"{name} without errors", ("row",), head=f"true {name}")
+            entries[f"true_{key}"] = true, self.true[name]
+        for name, words in self.words.items():
+            entries[name] = Column("", name, ("row",)), list(words)
+        wrong = np.isin(np.arange(len(next(iter(self.values.values())))), self.outliers)
+        return entries | {"wrong": (Column("1", "whether the reading is wrong", ("row",)), wrong)}
 
     def to_csv(self) -> str:
         """Return the table as CSV: comments, a heading with units, the rows."""
@@ -140,8 +147,6 @@ def measure(
     kind : str
         "magnet": static force of magnet and spring over displacement and current; "spring": that of the
         spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": the record of one shot.
-    hammer : Hammer
-        The hammer.
     sensor : Sensor or mapping, optional
         By default that of an ordinary bench, `SENSORS`; or what is different there, such as
         {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `sensor_settings.adjusted`.
@@ -151,11 +156,6 @@ def measure(
         What is measured where, in SI: `displacements`, `currents` (magnet); `displacements` (spring);
         `peaks`, the largest indentations, and `points` of a branch (pack); `speeds` (backstop); `duration`
         and `before`, the time before the firing (motion).
-
-    Returns
-    -------
-    Measurement
-        The table.
 
     Raises
     ------
@@ -185,7 +185,7 @@ def measure(
     comments = _comments(kind, hammer, used, there.true, there.exact, there.what)
     comments["outliers"] = f"{len(rows)} of {len(values[there.suspect])} rows"
     comments["seed"] = str(seed)
-    return Measurement(kind, comments, values, there.words, there.true, rows)
+    return Measurement(kind, comments, values, there.words, there.true, rows, hammer)
 
 
 def _comments(

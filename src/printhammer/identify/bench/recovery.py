@@ -40,24 +40,16 @@ _START: Final = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """One laboratory, and what was found.
-
-    Attributes
-    ----------
-    truth : Hammer
-        What was measured.
-    fits : dict of str to Fit
-        By kind: "magnet" (with the spring), "pack", "backstop", "motion".
-    constants : dict of str to FittedConstant
-        The constants of the hammer file in the end, from all measurements.
-    hammer : Hammer
-        Built of them.
-    """
+    """One laboratory, and what was found."""
 
     truth: Hammer
+    """What was measured."""
     fits: Mapping[str, Fit]
+    """By kind: "magnet" (with the spring), "pack", "backstop", "motion"."""
     constants: Mapping[str, FittedConstant]
+    """The constants of the hammer file in the end, from all measurements."""
     hammer: Hammer
+    """Built of them."""
 
     def true(self, key: str) -> float:
         """Return the true value of a constant, SI."""
@@ -65,11 +57,7 @@ class Recovery:
 
 
 def recover(
-    hammer: Hammer,
-    seed: int,
-    *,
-    sensor: Mapping[str, Any] | None = None,
-    folder: str | Path | None = None,
+    hammer: Hammer, seed: int, *, sensor: Mapping[str, Any] | None = None, folder: str | Path | None = None
 ) -> Recovery:
     """Measure a hammer, fit its constants and build a hammer of them.
 

@@ -32,18 +32,12 @@ _WRONG: Final = 0.1
 
 @dataclass(frozen=True)
 class Amount:
-    """A size in SI, or a share of the full scale or of the reading.
-
-    Attributes
-    ----------
-    size : float
-        SI, or the share.
-    of : str
-        "" for SI, "of full scale", which is the largest true value, or "of reading".
-    """
+    """A size in SI, or a share of the full scale or of the reading."""
 
     size: float = 0.0
+    """SI, or the share."""
     of: str = ""
+    """Empty for SI, "of full scale", which is the largest true value, or "of reading"."""
 
     @classmethod
     def read(cls, text: str | float, si: str, name: str, *, signed: bool = False) -> Amount:
@@ -59,11 +53,6 @@ class Amount:
             For messages.
         signed : bool, optional
             Whether it may be negative.
-
-        Returns
-        -------
-        Amount
-            The amount.
 
         Raises
         ------
@@ -98,21 +87,14 @@ class Amount:
 
 @dataclass(frozen=True)
 class Channel:
-    """One quantity as it is read.
-
-    Attributes
-    ----------
-    noise : Amount
-        Standard deviation of white, normal noise.
-    resolution : Amount
-        Step of the readings; 0 for none.
-    offset : Amount
-        What is read at zero.
-    """
+    """One quantity as it is read."""
 
     noise: Amount = field(default_factory=Amount)
+    """Standard deviation of white, normal noise."""
     resolution: Amount = field(default_factory=Amount)
+    """Step of the readings; 0 for none."""
     offset: Amount = field(default_factory=Amount)
+    """What is read at zero."""
 
     def __post_init__(self) -> None:
         if self.resolution.of == READING:
@@ -174,24 +156,16 @@ class Channel:
 
 @dataclass(frozen=True)
 class Sensor:
-    """The sensors of one bench.
-
-    Attributes
-    ----------
-    channels : mapping of str to Channel
-        By quantity: "displacement", "indentation", "current", "force", "impact speed", "rebound speed".
-    sampling_rate : float or None
-        Of records, Hz; None on a bench without records.
-    bandwidth : float or None
-        -3 dB frequency of a first-order low-pass before the sampling of records, Hz; None for none.
-    outliers : float
-        Share of the rows whose measured quantity is wrong.
-    """
+    """The sensors of one bench."""
 
     channels: Mapping[str, Channel]
+    """By quantity: "displacement", "indentation", "current", "force", "impact speed", "rebound speed"."""
     sampling_rate: float | None = None
+    """Of records, Hz; None on a bench without records."""
     bandwidth: float | None = None
+    """-3 dB frequency of a first-order low-pass before the sampling of records, Hz; None for none."""
     outliers: float = 0.0
+    """Share of the rows whose measured quantity is wrong."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))

@@ -36,11 +36,6 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
     units : mapping of str to str
         SI unit of each quantity.
 
-    Returns
-    -------
-    Sensor
-        The sensor.
-
     Raises
     ------
     InputError

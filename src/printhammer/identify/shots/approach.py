@@ -33,21 +33,55 @@ _TRIES: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known of the parameters beside the records: normal, (p - mean) with a covariance.
-
-    Attributes
-    ----------
-    which : int array, shape (k,)
-        Numbers of the parameters.
-    mean : array, shape (k,)
-        SI.
-    covariance : array, shape (k, k)
-        SI.
-    """
+    """What is known of the parameters beside the records: normal, (p - mean) with a covariance."""
 
     which: npt.NDArray[np.int64]
+    """Numbers of the parameters, shape (k,)."""
     mean: FloatArray
+    """SI, shape (k,)."""
     covariance: FloatArray
+    """SI, shape (k, k)."""
+
+
+class Priors:
+    """What is known of the parameters, over its standard errors; parameters are counted in their scales.
+
+    Parameters
+    ----------
+    priors : sequence of Prior
+        Independent of each other.
+    scales : array, shape (p,)
+        Sizes of the parameters, SI.
+    """
+
+    def __init__(self, priors: Sequence[Prior], scales: FloatArray) -> None:
+        self.scales = scales
+        self._white = []
+        for prior in priors:
+            size = scales[prior.which]
+            factor = np.linalg.cholesky(prior.covariance / np.outer(size, size))
+            self._white.append((prior, np.linalg.inv(factor)))
+
+    def residuals(self, values: FloatArray) -> list[FloatArray]:
+        """Return how far values, SI, are off what each prior says."""
+        return [
+            white @ ((prior.mean - values[prior.which]) / self.scales[prior.which])
+            for prior, white in self._white
+        ]
+
+    def rows(self, columns: int) -> list[FloatArray]:
+        """Return the rows of each prior in a linear problem, the parameters in its first columns."""
+        found = []
+        for prior, white in self._white:
+            row = np.zeros((len(prior.which), columns))
+            row[:, prior.which] = white
+            found.append(row)
+        return found
+
+
+def largest_gap(chains: Sequence[Chain], units: FloatArray) -> float:
+    """Return the largest gap, in strokes and typical speeds."""
+    return max((float(np.abs(chain.gaps / units).max()) for chain in chains if chain.gaps.size), default=0.0)
 
 
 class Approach:
@@ -55,10 +89,8 @@ class Approach:
 
     Parameters
     ----------
-    shooting : Shooting
-        The model.
-    priors : sequence of (Prior, array)
-        What is known beside, each with the matrix that whitens it, counted in the scales of the parameters.
+    priors : Priors
+        What is known beside.
     spikes : sequence of bool array
         Samples of each shot that do not count.
     """
@@ -66,18 +98,18 @@ class Approach:
     def __init__(
         self,
         shooting: Shooting,
-        priors: Sequence[tuple[Prior, FloatArray]],
+        priors: Priors,
         spikes: Sequence[npt.NDArray[np.bool_]],
     ) -> None:
         self.shooting = shooting
-        self.priors = list(priors)
+        self.priors = priors
         self.keep = [(~rows).astype(np.float64) for rows in spikes]
 
     def run(self, values: FloatArray, states: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
         """Return parameters, SI, and states at the joints from which a fit without gaps can begin."""
         values, states = values.copy(), list(states)
         chains = self.shooting.chains(values, states, derivatives=True)
-        width = 0.0 if chains is None else _WIDE * self._widest(chains)
+        width = 0.0 if chains is None else _WIDE * largest_gap(chains, self.shooting.units)
         while width > _NARROW and chains is not None:
             scales = self._scales(chains)
             for _ in range(_TRIES):
@@ -117,10 +149,6 @@ class Approach:
             )
         ]
 
-    def _widest(self, chains: Sequence[Chain]) -> float:
-        gaps = [chain.gaps / self.shooting.units for chain in chains if chain.gaps.size]
-        return max((float(np.abs(gap).max()) for gap in gaps), default=0.0)
-
     def _scales(self, chains: Sequence[Chain]) -> FloatArray:
         found = [
             float(np.sqrt(left @ left / keep.sum()))
@@ -128,14 +156,8 @@ class Approach:
         ]
         return np.maximum(found, 1e-16)
 
-    def _prior(self, values: FloatArray) -> list[FloatArray]:
-        scales = self.shooting.parameters.scales
-        return [
-            white @ ((prior.mean - values[prior.which]) / scales[prior.which]) for prior, white in self.priors
-        ]
-
     def _cost(self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float) -> float:
-        total = sum(float(off @ off) for off in self._prior(values))
+        total = sum(float(off @ off) for off in self.priors.residuals(values))
         for left, chain, scale in zip(self._left(chains), chains, scales, strict=True):
             gaps = chain.gaps / self.shooting.units / width
             total += float(left @ left) / scale**2 + len(left) * float((gaps * gaps).sum())
@@ -170,11 +192,8 @@ class Approach:
                 rows.append(row * weight)
                 right.append(-chain.gaps[joint] / units * weight)
             first += chain.gaps.size
-        for (prior, white), off in zip(self.priors, self._prior(values), strict=True):
-            row = np.zeros((len(off), size))
-            row[:, prior.which] = white
-            rows.append(row)
-            right.append(off)
+        rows += self.priors.rows(size)
+        right += self.priors.residuals(values)
         design, wanted = np.concatenate(rows), np.concatenate(right)
         sizes = np.sqrt((design * design).sum(axis=0))
         sizes[sizes == 0.0] = 1.0

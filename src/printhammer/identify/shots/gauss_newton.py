@@ -14,13 +14,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.residuals import (
-    memory_factor,
-    outliers_of,
-    spikes_of,
-)
+from printhammer.identify.residuals import memory_factor, outliers_of, spikes_of
 from printhammer.identify.result import Profile, student
-from printhammer.identify.shots.approach import Approach, Prior
+from printhammer.identify.shots.approach import Approach, Prior, Priors, largest_gap
 from printhammer.identify.shots.identifiable import singular
 
 if TYPE_CHECKING:
@@ -55,38 +51,28 @@ _NO_MOTION: Final = "the hammer does not move so that the records could be compa
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the fit ended.
-
-    Attributes
-    ----------
-    values : array, shape (p,)
-        Parameters, SI.
-    covariance : array, shape (p, p)
-        SI.
-    states : list of array
-        States at the joints of each shot.
-    shown, by_parameter : list of array, shape (n,) and (n, p)
-        The model of each record, m, and its derivatives with respect to the parameters in their scales.
-    outliers : list of bool array
-        Samples left out.
-    scales, memories : array, shape (shots,)
-        Standard deviation of the residuals, m, and the factor by which their memory increases variances.
-    design : array
-        Rows of data and prior over their standard errors, columns counted in the scales.
-    cost : float
-        Weighted sum of squares, prior included.
-    """
+    """Where the fit ended."""
 
     values: FloatArray
+    """Parameters, SI, shape (p,)."""
     covariance: FloatArray
+    """SI, shape (p, p)."""
     states: list[FloatArray]
+    """States at the joints of each shot."""
     shown: list[FloatArray]
     by_parameter: list[FloatArray]
+    """The model of each record, m, and its derivatives with respect to the parameters in their scales. Shape
+    (n,) and (n, p)."""
     outliers: list[npt.NDArray[np.bool_]]
+    """Samples left out."""
     scales: FloatArray
     memories: FloatArray
+    """Standard deviation of the residuals, m, and the factor by which their memory increases variances. Shape
+    (shots,)."""
     design: FloatArray
+    """Rows of data and prior over their standard errors, columns counted in the scales."""
     cost: float
+    """Weighted sum of squares, prior included."""
 
 
 class GaussNewton:
@@ -94,8 +80,6 @@ class GaussNewton:
 
     Parameters
     ----------
-    shooting : Shooting
-        The model.
     priors : sequence of Prior
         What is known beside.
     robust : bool
@@ -104,7 +88,7 @@ class GaussNewton:
 
     def __init__(self, shooting: Shooting, priors: Sequence[Prior], *, robust: bool) -> None:
         self.shooting = shooting
-        self.priors = list(priors)
+        self.priors = Priors(priors, shooting.parameters.scales)
         self.robust = robust
         self.data = [shot.x for shot in shooting.shots]
         self.spikes = [
@@ -112,12 +96,6 @@ class GaussNewton:
             for shot in shooting.shots
         ]
         self.floor = _FLOOR * shooting.stroke
-        scales = shooting.parameters.scales
-        self.whitening = []
-        for prior in self.priors:
-            size = scales[prior.which]
-            factor = np.linalg.cholesky(prior.covariance / np.outer(size, size))
-            self.whitening.append(np.linalg.inv(factor))
 
     def design(self, values: FloatArray, states: Sequence[FloatArray]) -> FloatArray:
         """Return the rows of data and priors over their standard errors, shape (m, p), at some values.
@@ -153,11 +131,6 @@ class GaussNewton:
         noise : Solution, optional
             Whose noise and outliers are taken as known, near it.
 
-        Returns
-        -------
-        Solution
-            The solution.
-
         Raises
         ------
         InputError
@@ -166,8 +139,7 @@ class GaussNewton:
         scales = self.shooting.parameters.scales
         # A profile begins where all is near.
         if noise is None:
-            pairs = list(zip(self.priors, self.whitening, strict=True))
-            values, states = Approach(self.shooting, pairs, self.spikes).run(values, states)
+            values, states = Approach(self.shooting, self.priors, self.spikes).run(values, states)
         free = np.ones(len(values), bool) if held is None else ~held
         values, states = values.copy(), [state.copy() for state in states]
         chains = self.shooting.chains(values, states, derivatives=True)
@@ -181,7 +153,7 @@ class GaussNewton:
             step = np.zeros(len(values))
             step[free], errors = _solved(here.design[:, free], here.residuals)
             in_errors = np.abs(step[free]) / np.maximum(errors, 1e-300)
-            gap = _gap(chains, self.shooting.units)
+            gap = largest_gap(chains, self.shooting.units)
             small = bool((in_errors < _DONE).all()) or bool((np.abs(step) < _EXACT).all())
             if near and small and gap < _CLOSED:
                 return self._solution(values, states, parts, here)
@@ -199,7 +171,9 @@ class GaussNewton:
                 trial = self.shooting.chains(new, moved, derivatives=True)
                 if trial is not None and (
                     near
-                    or self._accepted(passed, self._cost(new, trial, here), _gap(trial, self.shooting.units))
+                    or self._accepted(
+                        passed, self._cost(new, trial, here), largest_gap(trial, self.shooting.units)
+                    )
                 ):
                     break
                 length *= 0.5
@@ -242,12 +216,8 @@ class GaussNewton:
             outliers.append(out)
             scales.append(scale)
             memories.append(memory)
-        for prior, white in zip(self.priors, self.whitening, strict=True):
-            size = self.shooting.parameters.scales[prior.which]
-            row = np.zeros((len(prior.which), len(values)))
-            row[:, prior.which] = white
-            rows.append(row)
-            residuals.append(white @ ((prior.mean - values[prior.which]) / size))
+        rows += self.priors.rows(len(values))
+        residuals += self.priors.residuals(values)
         return _Weighted(
             np.concatenate(rows),
             np.concatenate(residuals),
@@ -264,8 +234,7 @@ class GaussNewton:
             left = self.data[shot] - self.shooting.shown(shot, chain.motion)
             left = left[~self.spikes[shot]]
             total += float(left @ left) / here.scales[shot] ** 2
-        for prior, white in zip(self.priors, self.whitening, strict=True):
-            off = white @ ((prior.mean - values[prior.which]) / self.shooting.parameters.scales[prior.which])
+        for off in self.priors.residuals(values):
             total += float(off @ off)
         return total
 
@@ -361,11 +330,6 @@ def _solved(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, Floa
     step = inverse @ (inverse.T @ ((design / sizes).T @ residuals)) / sizes
     errors = np.sqrt((inverse * inverse).sum(axis=1)) / sizes
     return step, errors
-
-
-def _gap(chains: Sequence[Chain], units: FloatArray) -> float:
-    """Return the largest gap, in strokes and typical speeds."""
-    return max((float(np.abs(chain.gaps / units).max()) for chain in chains if chain.gaps.size), default=0.0)
 
 
 def _interval(places: FloatArray, increase: FloatArray, best: float, reach: float) -> tuple[float, float]:

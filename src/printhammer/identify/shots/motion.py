@@ -15,12 +15,7 @@ from printhammer.identify.lowpass import time_constant
 from printhammer.identify.result import Fit, FittedConstant
 from printhammer.identify.shots.approach import Prior
 from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
-from printhammer.identify.shots.identifiable import (
-    condition_number,
-    refuse_degenerate,
-    tied_constants,
-    weak,
-)
+from printhammer.identify.shots.identifiable import condition_number, refuse_degenerate, tied_constants, weak
 from printhammer.identify.shots.notes import further, remembered, rests, tested
 from printhammer.identify.shots.pulse import Pulse, fit_pulse
 from printhammer.identify.shots.shooting import Parameters, Shooting
@@ -315,5 +310,5 @@ def _result(
         profiles={keys[which]: fit.profile(solution, which, degrees) for which in weak(values, covariance)},
         rejected=rejected,
         p_value=p_value,
-        notes=tuple(notes),
+        remarks=tuple(notes),
     )

@@ -31,27 +31,18 @@ _INTERVALS: Final = 200
 
 @dataclass(frozen=True, eq=False)
 class Pulse:
-    """The waveform of one shot, and how well it is known.
-
-    Attributes
-    ----------
-    waveform : Waveform
-        At the values found.
-    names : tuple of str
-        Constants that are uncertain; "scale" for the size of a waveform taken from the record.
-    values : array, shape (n,)
-        Their values, SI.
-    covariance : array, shape (n, n)
-        Of these.
-    note : str
-        What is odd; may be empty.
-    """
+    """The waveform of one shot, and how well it is known."""
 
     waveform: Waveform
+    """At the values found."""
     names: tuple[str, ...]
+    """Constants that are uncertain; "scale" for the size of a waveform taken from the record."""
     values: FloatArray
+    """Their values, SI, shape (n,)."""
     covariance: FloatArray
+    """Of these, shape (n, n)."""
     note: str = ""
+    """What is odd; may be empty."""
 
     def changed(self, values: Sequence[float]) -> Waveform:
         """Return the waveform with other values of its constants."""
@@ -79,11 +70,6 @@ def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform
         Its shape, with constants near which to look.
     tau : float
         Time constant of the sensor, s.
-
-    Returns
-    -------
-    Pulse
-        The waveform.
 
     Raises
     ------

@@ -39,21 +39,14 @@ _FINEST: Final = 2e-6
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """What is fitted: constants of the hammer, and constants of the current of each shot.
-
-    Attributes
-    ----------
-    keys : tuple of str
-        Constants of the hammer.
-    owners : tuple of int
-        Of each further parameter the shot; those of one shot are the constants of its pulse.
-    scales : array
-        Sizes in which all are counted, SI.
-    """
+    """What is fitted: constants of the hammer, and constants of the current of each shot."""
 
     keys: tuple[str, ...]
+    """Constants of the hammer."""
     owners: tuple[int, ...]
+    """Of each further parameter the shot; those of one shot are the constants of its pulse."""
     scales: FloatArray
+    """Sizes in which all are counted, SI."""
 
     @property
     def count(self) -> int:
@@ -67,29 +60,20 @@ class Parameters:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """The stretches of one shot at some values of the parameters.
-
-    Attributes
-    ----------
-    motion : array, shape (g, 2)
-        Displacement, m, and velocity, m/s, at the times of the grid.
-    gaps : array, shape (j, 2)
-        End of each stretch less the beginning of the next.
-    by_parameter : array, shape (g, 2, p)
-        Derivatives of the motion with respect to the parameters, counted in their scales; p = 0 if not asked
-        for.
-    by_state : array, shape (g, 2, 2)
-        Derivatives with respect to the state at the beginning of the stretch.
-    end_by_parameter, end_by_state : array, shape (j, 2, p) and (j, 2, 2)
-        Of the state at the end of each stretch but the last.
-    """
+    """The stretches of one shot at some values of the parameters."""
 
     motion: FloatArray
+    """Displacement, m, and velocity, m/s, at the times of the grid. Shape (g, 2)."""
     gaps: FloatArray
+    """End of each stretch less the beginning of the next, shape (j, 2)."""
     by_parameter: FloatArray
+    """Derivatives of the motion with respect to the parameters, counted in their scales; p = 0 if not asked
+    for. Shape (g, 2, p)."""
     by_state: FloatArray
+    """Derivatives with respect to the state at the beginning of the stretch. Shape (g, 2, 2)."""
     end_by_parameter: FloatArray
     end_by_state: FloatArray
+    """Of the state at the end of each stretch but the last, shape (j, 2, p) and (j, 2, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +103,6 @@ class Shooting:
     ----------
     hammer : Hammer
         Its constants that are not fitted stay as they are.
-    shots : sequence of Shot
-        The records.
     pulses : sequence of Pulse
         The current of each; None where the hammer's own waveform is fired.
     parameters : Parameters

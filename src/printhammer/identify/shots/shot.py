@@ -38,19 +38,13 @@ _WINDOW: Final = 15e-6
 
 @dataclass(frozen=True)
 class Touch:
-    """A contact as the record shows it.
-
-    Attributes
-    ----------
-    surface : str
-        "pack" or "backstop".
-    first, last : int
-        Rows of the first and the last sample in it.
-    """
+    """A contact as the record shows it."""
 
     surface: Surface
+    """Either "pack" or "backstop"."""
     first: int
     last: int
+    """Rows of the first and the last sample in it."""
 
     @property
     def count(self) -> int:
@@ -60,40 +54,27 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One record, ready to be fitted.
-
-    Attributes
-    ----------
-    name : str
-        The file, as messages name it.
-    t, x : array, shape (n,)
-        Times of the samples, s, ascending, 0 at the firing, and displacements, m.
-    current : array, shape (n,), or None
-        Current, A.
-    lines : int array, shape (n,)
-        Line of the file of each sample.
-    bandwidth : float or None
-        Of the sensor, Hz; None for one without delay.
-    noise : float
-        Of the displacement, m, from the differences of the samples.
-    touches : list of Touch
-        Contacts in order; the first is the rest at the backstop, if there is one.
-    joints : int array, shape (j,)
-        Rows at which the record is cut.
-    states : array, shape (j, 2)
-        Displacement, m, and velocity, m/s, there, as the record shows them.
-    """
+    """One record, ready to be fitted."""
 
     name: str
+    """The file, as messages name it."""
     t: FloatArray
     x: FloatArray
+    """Times of the samples, s, ascending, 0 at the firing, and displacements, m. Shape (n,)."""
     current: FloatArray | None
+    """Current, A, shape (n,), or None."""
     lines: npt.NDArray[np.int64]
+    """Line of the file of each sample, shape (n,)."""
     bandwidth: float | None
+    """Of the sensor, Hz; None for one without delay."""
     noise: float
+    """Of the displacement, m, from the differences of the samples."""
     touches: list[Touch]
+    """Contacts in order; the first is the rest at the backstop, if there is one."""
     joints: npt.NDArray[np.int64]
+    """Rows at which the record is cut, shape (j,)."""
     states: FloatArray
+    """Displacement, m, and velocity, m/s, there, as the record shows them. Shape (j, 2)."""
 
     def touching(self, surface: Surface) -> list[Touch]:
         """Return the contacts with one surface, but for the rest at the beginning."""
@@ -111,11 +92,6 @@ def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) 
         Whose backstop and pack stand where contacts are to be found.
     bandwidth : float, optional
         Of the sensor, Hz; by default what a comment ``# bandwidth: 200 kHz`` says, and else unlimited.
-
-    Returns
-    -------
-    Shot
-        The record.
 
     Raises
     ------

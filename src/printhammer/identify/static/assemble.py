@@ -29,34 +29,22 @@ _GRID: Final = 25
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """The data of a fit and where they were measured.
-
-    Attributes
-    ----------
-    files : tuple of Path
-        The tables.
-    kind : str
-        "magnet", "spring", "pack" or "backstop".
-    abscissa, values : array, shape (m,)
-        SI.
-    axes : tuple of tuple of str
-        Names and SI units.
-    series : array of int, shape (m,)
-        Place in `series_names`.
-    series_names : tuple of str
-        For the legend.
-    lines : array of int, shape (m,)
-        Lines of the files.
-    """
+    """The data of a fit and where they were measured."""
 
     files: tuple[Path, ...]
     kind: str
+    """One of "magnet", "spring", "pack" and "backstop"."""
     abscissa: FloatArray
     values: FloatArray
+    """SI, shape (m,)."""
     axes: tuple[tuple[str, str], tuple[str, str]]
+    """Names and SI units."""
     series: npt.NDArray[np.int64]
+    """Place in `series_names`, shape (m,)."""
     series_names: tuple[str, ...]
+    """For the legend."""
     lines: npt.NDArray[np.int64]
+    """Lines of the files, shape (m,)."""
 
 
 def assemble(
@@ -79,8 +67,6 @@ def assemble(
         What was fitted.
     law : Law
         For the profiles.
-    solution : Solution
-        The fit.
     parameters : sequence of tuple
         Key, SI unit, and whether a hammer file has it; an empty key for a parameter that is of no interest.
     given, indistinct, rejected, p_value, notes
@@ -131,7 +117,7 @@ def assemble(
         profiles=profiles,
         rejected=rejected,
         p_value=p_value,
-        notes=(*notes, *weak),
+        remarks=(*notes, *weak),
     )
 
 
@@ -140,12 +126,8 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
 
     Parameters
     ----------
-    law : Law
-        The law.
     data : array, shape (m,)
         The data.
-    solution : Solution
-        The fit.
     index : int
         Of the parameter.
 
@@ -171,12 +153,10 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
         return p
 
     def residuals(rest: FloatArray, value: float) -> FloatArray:
-        found: FloatArray = (law.value(full(rest, value)) - data)[used] / root
-        return found
+        return (law.value(full(rest, value)) - data)[used] / root
 
     def jacobian(rest: FloatArray, value: float) -> FloatArray:
-        found: FloatArray = law.jacobian(full(rest, value))[used][:, others] / root[:, None]
-        return found
+        return law.jacobian(full(rest, value))[used][:, others] / root[:, None]
 
     middle = _GRID // 2
     for way in (range(middle, _GRID), range(middle, -1, -1)):
@@ -226,8 +206,6 @@ def positive(fit: Fit, path: Path, remedies: Mapping[str, str]) -> None:
 
     Parameters
     ----------
-    fit : Fit
-        The fit.
     path : Path
         The table, for the message.
     remedies : mapping of str to str

@@ -45,21 +45,14 @@ _AXES: Final = (("impact speed", "m/s"), ("rebound speed", "m/s"))
 
 @dataclass(frozen=True)
 class Stiffness:
-    """A Hertz stiffness k and where it comes from.
-
-    Attributes
-    ----------
-    value : float
-        k, N/m^1.5.
-    standard_error : float
-        The same unit; 0 where it is not known.
-    how : str
-        For the source of the constant; empty where the stiffness is taken as known, and not a result.
-    """
+    """A Hertz stiffness k and where it comes from."""
 
     value: float
+    """k, N/m^1.5."""
     standard_error: float = 0.0
+    """The same unit; 0 where it is not known."""
     how: str = ""
+    """For the source of the constant; empty where the stiffness is taken as known, and not a result."""
 
     @classmethod
     def from_bodies(
@@ -280,5 +273,5 @@ def _of_bodies(k: Stiffness) -> Fit:
         series=whole,
         series_names=(),
         lines=whole,
-        notes=("the geometry gives the stiffness alone; the damping needs rebounds",),
+        remarks=("the geometry gives the stiffness alone; the damping needs rebounds",),
     )

@@ -29,10 +29,7 @@ _HARD_TO_TELL: Final = 30.0
 
 
 def judge(
-    solution: Solution,
-    terms: Mapping[str, FloatArray],
-    abscissa: FloatArray,
-    series: npt.NDArray[np.int64],
+    solution: Solution, terms: Mapping[str, FloatArray], abscissa: FloatArray, series: npt.NDArray[np.int64]
 ) -> tuple[float, str]:
     """Test a law against ones with one more term each, and its residuals for runs.
 
@@ -120,8 +117,6 @@ def together(solution: Solution, names: Sequence[str]) -> list[str]:
 
     Parameters
     ----------
-    solution : Solution
-        The fit.
     names : sequence of str
         Of its parameters; an empty name for one that is of no interest.
 

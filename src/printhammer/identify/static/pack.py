@@ -72,8 +72,7 @@ class PackLaw:
         if len(self.turns):
             depth = p[1 + self.column]
             power = np.where(self.cycles.unloading, low * depth + high * (self.log_r - depth), power)
-        force: FloatArray = np.where(self.inside, p[0] * np.exp(power), 0.0)
-        return force
+        return np.where(self.inside, p[0] * np.exp(power), 0.0)
 
     def jacobian(self, p: FloatArray) -> FloatArray:
         """Return its derivatives by the parameters."""
@@ -90,10 +89,7 @@ class PackLaw:
         """Return the derivatives of the force by the two exponents."""
         force, out = self.value(p), self.cycles.unloading
         depth = p[1 + self.column] if len(self.turns) else np.zeros_like(force)
-        return [
-            np.where(out, depth, self.log_r) * force,
-            np.where(out, (self.log_r - depth) * force, 0.0),
-        ]
+        return [np.where(out, depth, self.log_r) * force, np.where(out, (self.log_r - depth) * force, 0.0)]
 
     def spread(self, p: FloatArray) -> FloatArray:
         """Return the components of the variance: force, force in proportion, indentation."""

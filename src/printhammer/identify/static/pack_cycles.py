@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.identify.residuals import robust_scale
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
@@ -25,21 +26,14 @@ _FALL: Final = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Branch and load cycle of each row.
-
-    Attributes
-    ----------
-    unloading : array of bool, shape (m,)
-        Whether a row is on the unloading branch.
-    cycle : array of int, shape (m,)
-        Number of the load cycle, from 0.
-    unloaded : array of int
-        Cycles with rows of unloading inside the pack, ascending.
-    """
+    """Branch and load cycle of each row."""
 
     unloading: npt.NDArray[np.bool_]
+    """Whether a row is on the unloading branch, shape (m,)."""
     cycle: npt.NDArray[np.int64]
+    """Number of the load cycle, from 0, shape (m,)."""
     unloaded: npt.NDArray[np.int64]
+    """Cycles with rows of unloading inside the pack, ascending."""
 
 
 def cycles_of(table: Table) -> Cycles:
@@ -128,12 +122,11 @@ def _smooth(values: FloatArray) -> FloatArray:
     """Return running medians, of as many values as there are enough for; they pass single outliers over."""
     width = 5 if len(values) >= 9 else 3 if len(values) >= 5 else 1
     padded = np.pad(values, width // 2, mode="edge")
-    found: FloatArray = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
-    return found
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
 
 
 def _noise(values: FloatArray) -> float:
     """Return the standard deviation of noise, from second differences; 0 for few values."""
     if len(values) < 9:
         return 0.0
-    return 1.482602218505602 * float(np.median(np.abs(np.diff(values, 2)))) / float(np.sqrt(6.0))
+    return robust_scale(np.diff(values, 2)) / float(np.sqrt(6.0))

@@ -68,13 +68,11 @@ class RestitutionLaw:
 
     def value(self, p: FloatArray) -> FloatArray:
         """Return the rebound speeds, m/s."""
-        found: FloatArray = self.speed * rebound(self._z(p))[0]
-        return found
+        return self.speed * rebound(self._z(p))[0]
 
     def jacobian(self, p: FloatArray) -> FloatArray:
         """Return the derivatives by l/k."""
-        found: FloatArray = (self.speed**2 * rebound(self._z(p))[1])[:, None]
-        return found
+        return (self.speed**2 * rebound(self._z(p))[1])[:, None]
 
     def spread(self, p: FloatArray) -> FloatArray:
         """Return the components of the variance, absolute and in proportion, with the effect of both speeds.

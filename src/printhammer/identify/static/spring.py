@@ -40,8 +40,7 @@ class SpringLaw:
 
     def value(self, p: FloatArray) -> FloatArray:
         """Return the force, N."""
-        force: FloatArray = p[0] * (1.0 - self.travel / p[1])
-        return force
+        return np.asarray(p[0] * (1.0 - self.travel / p[1]))
 
     def jacobian(self, p: FloatArray) -> FloatArray:
         """Return its derivatives by Bs and As."""

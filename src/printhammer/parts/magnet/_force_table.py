@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from printhammer.errors import InputError
+from printhammer.support.sheets import finite, read_sheet, split_heading
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -113,7 +112,7 @@ def read_csv(path: Path) -> ForceTable:
     from printhammer.units import to_si
 
     what = str(path)
-    lines = _lines(path, what)
+    lines = read_sheet(path, "the force table").rows
     if not lines:
         raise InputError(f"{what}: the file is empty, expected the heading {_HEADING!r} and a grid of forces")
     order, units = _heading(lines[0][1], what)
@@ -121,7 +120,7 @@ def read_csv(path: Path) -> ForceTable:
     for number, cells in lines[1:]:
         if len(cells) != len(order):
             raise InputError(f"{what}: line {number} has {len(cells)} cells, expected {len(order)}")
-        row = dict(zip(order, (_number(cell, f"{what}: line {number}") for cell in cells), strict=True))
+        row = dict(zip(order, (finite(cell, f"{what}: line {number}") for cell in cells), strict=True))
         try:
             x, current, force = (to_si(row[name], units[name], si) for name, si in COLUMNS.items())
         except InputError as error:
@@ -130,37 +129,17 @@ def read_csv(path: Path) -> ForceTable:
     return gather(rows, what)
 
 
-def _lines(path: Path, what: str) -> list[tuple[int, list[str]]]:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{what}: the force table is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{what}: the force table cannot be read ({reason})") from None
-    reader = csv.reader(io.StringIO(text), strict=True)
-    try:
-        rows = [(reader.line_num, row) for row in reader]
-    except csv.Error as error:
-        raise InputError(f"{what}: expected comma-separated values ({error})") from None
-    return [
-        (number, row)
-        for number, row in rows
-        if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
-    ]
-
-
 def _heading(cells: Sequence[str], what: str) -> tuple[list[str], dict[str, str]]:
     """Return the columns in order and the unit of each."""
     from printhammer.units import to_si
 
     units = {}
     for cell in cells:
-        name, bracket, rest = cell.partition("[")
-        name, unit = name.strip().lower(), rest.strip().removesuffix("]").strip()
+        name, unit = split_heading(cell)
+        name = name.lower()
         if name not in COLUMNS or name in units:
             break
-        if not bracket or not unit:
+        if not unit:
             raise InputError(
                 f"{what}: column {cell.strip()!r} has no unit, expected the heading {_HEADING!r}"
             )
@@ -173,16 +152,6 @@ def _heading(cells: Sequence[str], what: str) -> tuple[list[str], dict[str, str]
         given = ",".join(cell.strip() for cell in cells)
         raise InputError(f"{what}: the heading is {given!r}, expected {_HEADING!r}")
     return list(units), units
-
-
-def _number(cell: str, where: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{where}: {cell.strip()!r} is expected to be a finite number")
-    return value
 
 
 def packed_spline(table: ForceTable) -> tuple[float, ...]:

@@ -15,13 +15,15 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
+from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.settling import touches
+from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Contact
     from printhammer.run.motion import Motion
@@ -226,18 +228,9 @@ def delayed_train(
 
 
 def _run(hammer: Hammer, times: Sequence[float], patience: float | None) -> Motion:
-    from printhammer.drive.trains import PulseTrain
-    from printhammer.run.simulate import simulate
-
-    drive = PulseTrain(_waveform(hammer), at=list(times))
+    drive = PulseTrain(pulse_of(hammer), at=list(times))
     duration = None if patience is None else times[-1] + patience
     return simulate(hammer, drive, duration=duration, points=2)
-
-
-def _waveform(hammer: Hammer) -> Waveform:
-    if hammer.waveform is None:
-        raise InputError(f"the hammer {hammer.name!r} has no waveform, expected one for buzz printing")
-    return hammer.waveform
 
 
 def _dot_contact(motion: Motion, firing: int) -> Contact | None:
@@ -251,13 +244,13 @@ class _Search:
     def __init__(
         self, hammer: Hammer, pulses: int, fewest: int, forces: tuple[float, float], max_current: float
     ) -> None:
-        for part, name in ((hammer.pack, "pack"), (hammer.backstop, "backstop")):
-            if part is None:
+        for name in ("pack", "backstop", "waveform"):
+            if getattr(hammer, name) is None:
                 raise InputError(f"the hammer {hammer.name!r} has no {name}, expected one for buzz printing")
         if not 1 <= fewest <= pulses:
             raise InputError(f"pulses = {pulses}, expected at least the {fewest} dots that must count")
         self.hammer, self.pulses, self.fewest, self.forces = hammer, pulses, fewest, forces
-        self.limit = max_current if _waveform(hammer).quantity == "current" else math.inf
+        self.limit = max_current if pulse_of(hammer).quantity == "current" else math.inf
         self.tried = 0
         self.best: BuzzTrain | None = None
         single = _run(hammer, [0.0], None)

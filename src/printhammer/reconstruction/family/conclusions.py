@@ -38,21 +38,14 @@ _TOGETHER: Final = 40
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a conclusion is.
-
-    Attributes
-    ----------
-    title : str
-        A few words.
-    unit : str
-        SI unit; "1" for a pure number.
-    meaning : str
-        One sentence.
-    """
+    """What a conclusion is."""
 
     title: str
+    """A few words."""
     unit: str
+    """SI unit; "1" for a pure number."""
     meaning: str
+    """One sentence."""
 
 
 QUANTITIES: Final[dict[str, Quantity]] = {
@@ -63,9 +56,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         " within a tenth and its flight time within 50 us, on a grid of 5 Hz.",
     ),
     "chaos_onset_s": Quantity(
-        "chaos onset",
-        "s",
-        "Longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms.",
+        "chaos onset", "s", "Longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms."
     ),
     "flight_time_spread_s": Quantity(
         "flight-time spread",
@@ -84,9 +75,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         "Lowest of these rates at which that difference exceeds 200 us, what dot-matrix printing tolerates.",
     ),
     "energy_per_dot_J": Quantity(
-        "energy per dot",
-        "J",
-        "Work of the coil on the armature in the cycle of a single pulse.",
+        "energy per dot", "J", "Work of the coil on the armature in the cycle of a single pulse."
     ),
     "pack_loss_J": Quantity("pack loss", "J", "What the pack keeps of it."),
     "backstop_loss_J": Quantity("backstop loss", "J", "What the backstop takes of it."),
@@ -108,36 +97,25 @@ QUANTITIES: Final[dict[str, Quantity]] = {
 
 @dataclass(frozen=True)
 class Conclusions:
-    """The conclusions about one hammer; what they are is said by `QUANTITIES`.
-
-    Attributes
-    ----------
-    safe_rate_Hz : float or None
-        Safe rate, Hz; None where even the slowest rate tried prints badly.
-    chaos_onset_s : float or None
-        Longest strobe time of a strange train, s; None where there is none.
-    flight_time_spread_s : float
-        Largest peak-to-peak flight time of nine-pulse bursts, s.
-    engraved_limit_Hz, dot_matrix_limit_Hz : float or None
-        Lowest rate at which it exceeds 30 us and 200 us, Hz; None where it never does.
-    energy_per_dot_J, pack_loss_J, backstop_loss_J : float
-        Coil work of the single pulse, and what pack and backstop take, J.
-    settle_out_s : float
-        Settle-out time of the single pulse, s.
-    print_force_N : float
-        Peak force of the single-pulse dot, N.
-    """
+    """The conclusions about one hammer; what they are is said by `QUANTITIES`."""
 
     safe_rate_Hz: float | None
+    """Safe rate, Hz; None where even the slowest rate tried prints badly."""
     chaos_onset_s: float | None
+    """Longest strobe time of a strange train, s; None where there is none."""
     flight_time_spread_s: float
+    """Largest peak-to-peak flight time of nine-pulse bursts, s."""
     engraved_limit_Hz: float | None
     dot_matrix_limit_Hz: float | None
+    """Lowest rate at which it exceeds 30 us and 200 us, Hz; None where it never does."""
     energy_per_dot_J: float
     pack_loss_J: float
     backstop_loss_J: float
+    """Coil work of the single pulse, and what pack and backstop take, J."""
     settle_out_s: float
+    """Settle-out time of the single pulse, s."""
     print_force_N: float
+    """Peak force of the single-pulse dot, N."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values by name, for JSON."""
@@ -153,11 +131,6 @@ def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
         The hammer, with magnet, pack, backstop and waveform.
     context : Context, optional
         Runs to share; by default a new one.
-
-    Returns
-    -------
-    Conclusions
-        The conclusions.
 
     Raises
     ------

@@ -54,24 +54,16 @@ _MOST: Final = 2000
 
 @dataclass(frozen=True)
 class Member:
-    """A hammer of the family, judged.
-
-    Attributes
-    ----------
-    constants : mapping
-        Key of a hammer file to value, SI.
-    verdicts : mapping
-        Claim to "holds" or "fails": of kind "stated" as judged here, others as the log has them.
-    panels : int
-        Verdicts of Fig. 11 that are as printed.
-    conclusions : mapping
-        See `printhammer.reconstruction.family.conclusions`.
-    """
+    """A hammer of the family, judged."""
 
     constants: Mapping[str, float]
+    """Key of a hammer file to value, SI."""
     verdicts: Mapping[str, str]
+    """Claim to "holds" or "fails": of kind "stated" as judged here, others as the log has them."""
     panels: int
+    """Verdicts of Fig. 11 that are as printed."""
     conclusions: Mapping[str, Any]
+    """See `printhammer.reconstruction.family.conclusions`."""
 
 
 def family_hammers(folder: str | Path | None = None) -> list[Hammer]:
@@ -143,11 +135,6 @@ def write_family(
         Number of members wanted.
     least : int, optional
         Number of members needed.
-
-    Returns
-    -------
-    list of Member
-        The members.
 
     Raises
     ------
@@ -328,8 +315,6 @@ def json_text(family: Sequence[Member], gauged: Sequence[Mapping[str, float]]) -
 
     Parameters
     ----------
-    family : sequence of Member
-        The members.
     gauged : sequence of mapping
         Their constants at the common gauge, key to value, SI.
     """

@@ -18,24 +18,16 @@ LEAST_PANELS: Final = 8
 
 @dataclass(frozen=True)
 class Logged:
-    """A hammer of a log.
-
-    Attributes
-    ----------
-    constants : mapping
-        Key of a hammer file to value, SI.
-    verdicts : mapping
-        Claim to whether it holds, as far as it was judged.
-    panels : int or None
-        Verdicts of Fig. 11 that are as printed.
-    source : str
-        File, and place in it.
-    """
+    """A hammer of a log."""
 
     constants: Mapping[str, float]
+    """Key of a hammer file to value, SI."""
     verdicts: Mapping[str, bool]
+    """Claim to whether it holds, as far as it was judged."""
     panels: int | None
+    """Verdicts of Fig. 11 that are as printed."""
     source: str
+    """File, and place in it."""
 
     @property
     def promising(self) -> bool:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 def family_picture(hammer: Hammer, results: Results | None = None) -> Figure:
     """Draw the constants of the family over those of a hammer, and the conclusions from its members.
 
+    See `printhammer.figures.family`.
+
     Parameters
     ----------
     hammer : Hammer
@@ -27,11 +29,6 @@ def family_picture(hammer: Hammer, results: Results | None = None) -> Figure:
         print force and the current of the family first, which leaves its motion as it is.
     results : Results, optional
         Where the table of the family is; by default that which ships with the program.
-
-    Returns
-    -------
-    Figure
-        See `printhammer.figures.family`.
 
     Raises
     ------

@@ -33,24 +33,16 @@ _SCALING: Final = ("J", "N")
 
 @dataclass(frozen=True)
 class Statement:
-    """Something that the paper says in general, as a margin by which it is true of a hammer.
-
-    Attributes
-    ----------
-    text : str
-        The statement.
-    source : str
-        Where the paper says it.
-    unit : str
-        SI unit of the margin.
-    margin : callable
-        Conclusions of a hammer to the margin; the statement is true where it is positive.
-    """
+    """Something that the paper says in general, as a margin by which it is true of a hammer."""
 
     text: str
+    """The statement."""
     source: str
+    """Where the paper says it."""
     unit: str
+    """SI unit of the margin."""
     margin: Callable[[Values], float]
+    """Conclusions of a hammer to the margin; the statement is true where it is positive."""
 
 
 def _tolerated(name: str) -> float:

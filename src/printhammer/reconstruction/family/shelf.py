@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from printhammer import __version__
-from printhammer.errors import InputError
+from printhammer.reconstruction.lines import append, read_object, read_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,18 +27,14 @@ class Shelf:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._found: dict[str, dict[str, Any]] = {}
-        try:
-            lines = path.read_text(encoding="utf-8").splitlines()
-        except FileNotFoundError:
-            lines = []
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise InputError(f"{path}: the file cannot be read ({reason})") from None
-        for line in lines:
-            with suppress(ValueError, KeyError, TypeError):
-                row = json.loads(line)
-                if row["version"] == __version__:
-                    self._found[row["fingerprint"]] = row["judged"]
+        for line in read_text(path).split("\n"):
+            row = read_object(line) or {}
+            if (
+                row.get("version") == __version__
+                and isinstance(row.get("fingerprint"), str)
+                and "judged" in row
+            ):
+                self._found[row["fingerprint"]] = row["judged"]
 
     def get(self, hammer: Hammer) -> dict[str, Any] | None:
         """Return what is known of a hammer; None if nothing is."""
@@ -54,11 +50,7 @@ class Shelf:
         """
         self._found[hammer.fingerprint] = judged
         row = {"version": __version__, "fingerprint": hammer.fingerprint, "judged": judged}
-        try:
-            with self._path.open("a", encoding="utf-8") as file:
-                file.write("\n" + json.dumps(row))
-        except OSError as error:
-            raise InputError(f"{self._path}: the file cannot be written ({error.strerror})") from None
+        append(self._path, "\n" + json.dumps(row))
 
     def remove(self) -> None:
         """Remove the file."""

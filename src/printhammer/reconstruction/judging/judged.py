@@ -34,8 +34,6 @@ def plain_panels(hammer: Hammer, tolerance: float = TOLERANCE) -> dict[str, tupl
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
     tolerance : float, optional
         Of the integration; by default that of the claims.
     """

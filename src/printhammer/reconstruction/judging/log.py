@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.claims.definition import claims
 from printhammer.errors import InputError
 from printhammer.reconstruction.judging.judged import text_of
+from printhammer.reconstruction.lines import append, read_object, read_text
 from printhammer.support.constants import shown
 
 if TYPE_CHECKING:
@@ -31,8 +31,6 @@ def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
 
     Parameters
     ----------
-    path : Path
-        The log.
     some : bool, optional
         Whether there must be some.
 
@@ -47,7 +45,7 @@ def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
         The file cannot be read, is no such log, or has no candidates where there must be some.
     """
     found: dict[Key, dict[str, Any]] = {}
-    for number, line in enumerate(_read(path)[0].split("\n")[:-1], 1):
+    for number, line in enumerate(read_text(path).split("\n")[:-1], 1):
         row = _row(line, f"{path}, line {number}")
         key = key_of(row["constants"])
         found[key] = joined(found.get(key), row)
@@ -74,53 +72,18 @@ def mend(path: Path) -> None:
     InputError
         The file cannot be written, or its end is no beginning of a judged candidate.
     """
-    whole, rest = _read(path)
+    whole, newline, rest = read_text(path).rpartition("\n")
     if not rest:
         return
     begin = text_of({"constants": {}})[: len(rest)].partition("}")[0]
     if not rest.startswith(begin):
         raise InputError(f"{path}: expected a log of judged candidates, its last line is {shown(rest)}")
-    try:
-        with path.open("r+b") as file:
-            file.truncate(len(whole.encode()))
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be written ({error.strerror or error})") from None
-
-
-def append(path: Path, row: Mapping[str, Any]) -> None:
-    """Add a row to a log.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
-    try:
-        with path.open("a", encoding="utf-8") as file:
-            file.write(text_of(row))
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be written ({error.strerror or error})") from None
-
-
-def _read(path: Path) -> tuple[str, str]:
-    """Return the complete lines of a file and what stands behind the last of them."""
-    try:
-        text = path.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        return "", ""
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8"
-        raise InputError(f"{path}: the file cannot be read ({reason})") from None
-    whole, newline, rest = text.rpartition("\n")
-    return whole + newline, rest
+    append(path, "", kept=whole + newline)
 
 
 def _row(line: str, where: str) -> dict[str, Any]:
-    try:
-        row = json.loads(line)
-    except ValueError:
-        row = None
-    if not isinstance(row, dict):
+    row = read_object(line)
+    if row is None:
         raise InputError(f"{where}: expected a judged candidate as a JSON object, not {line[:40]!r}")
     constants = row.get("constants")
     if not isinstance(constants, dict) or not constants:

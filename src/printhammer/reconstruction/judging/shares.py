@@ -15,18 +15,12 @@ _Z: Final = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)
 
 @dataclass(frozen=True)
 class Share:
-    """Of `measured` hammers something holds for `holds`.
-
-    Attributes
-    ----------
-    measured : int
-        Number of hammers, at least one.
-    holds : int
-        Number of those for which it holds.
-    """
+    """Of `measured` hammers something holds for `holds`."""
 
     measured: int
+    """Number of hammers, at least one."""
     holds: int
+    """Number of those for which it holds."""
 
     @property
     def rate(self) -> float:
@@ -52,10 +46,4 @@ class Share:
     def as_dict(self) -> dict[str, Any]:
         """Return what goes to `claims.json`."""
         low, high = self.interval
-        return {
-            "rate": self.rate,
-            "low": low,
-            "high": high,
-            "measured": self.measured,
-            "holds": self.holds,
-        }
+        return {"rate": self.rate, "low": low, "high": high, "measured": self.measured, "holds": self.holds}

@@ -8,8 +8,9 @@ import numpy as np
 
 from printhammer.claims import claims
 from printhammer.claims.verdicts import printed_verdicts
-from printhammer.reconstruction.judging.judged import FIGURE_11, STATED, row_of
-from printhammer.reconstruction.judging.log import append, joined, key_of, mend, read_judged
+from printhammer.reconstruction.judging.judged import FIGURE_11, STATED, row_of, text_of
+from printhammer.reconstruction.judging.log import joined, key_of, mend, read_judged
+from printhammer.reconstruction.lines import append
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -100,7 +101,7 @@ def judge_candidates(
         some = tasks[start : start + _TOGETHER]
         found = map(_judge, some) if pool is None else pool.map(_judge, some)
         for done, row in enumerate(found, start + 1):
-            append(path, row)
+            append(path, text_of(row))
             key = key_of(row["constants"])
             known[key] = joined(known.get(key), row)
             if tell is not None:

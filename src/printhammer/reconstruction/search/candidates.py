@@ -46,24 +46,15 @@ _LONGEST: Final = math.log(30.0)
 
 @dataclass(frozen=True)
 class Candidate:
-    """A hammer of the search space with the printed stroke.
-
-    Attributes
-    ----------
-    point : array
-        Shares of the ranges of the variables.
-    constants : dict
-        Of the hammer file, SI.
-    hammer : Hammer
-        The hammer.
-    rest : float
-        Displacement at rest, m.
-    """
+    """A hammer of the search space with the printed stroke."""
 
     point: FloatArray
+    """Shares of the ranges of the variables."""
     constants: dict[str, float]
+    """Of the hammer file, SI."""
     hammer: Hammer
     rest: float
+    """Displacement at rest, m."""
 
     @property
     def waveform(self) -> Waveform:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.reconstruction.lines import append, read_object, read_text
 from printhammer.support.constants import shown
 
 if TYPE_CHECKING:
@@ -28,19 +29,11 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     InputError
         The file cannot be read, or is no such log.
     """
-    try:
-        lines = path.read_text(encoding="utf-8").split("\n")[:-1]
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8"
-        raise InputError(f"{path}: the log cannot be read ({reason})") from None
     rows = []
-    for number, line in enumerate(lines, 1):
-        try:
-            row = json.loads(line)
-        except ValueError:
-            row = None
+    for number, line in enumerate(read_text(path, "log", required=True).split("\n")[:-1], 1):
+        row = read_object(line)
         wanted = _HEADING if number == 1 else _CANDIDATE
-        if not isinstance(row, dict) or not wanted <= set(row):
+        if row is None or not wanted <= set(row):
             what = "the heading" if number == 1 else "a candidate"
             raise InputError(
                 f"{path}, line {number}: expected {what} of the log of a search, not {line[:40]!r}"
@@ -77,10 +70,10 @@ class Log:
         self.path = path
         self._rows: list[dict[str, Any]] = []
         first = json.dumps(heading)
-        text = self._text()
+        text = read_text(path, "log")
         if first.startswith(text):
             # Nothing yet, or stopped inside the heading.
-            self._write("w", first + "\n")
+            append(path, first + "\n", "log", kept="")
             return
         whole, _, broken = text.rpartition("\n")
         try:
@@ -94,28 +87,14 @@ class Log:
                 told = f"{key} = {_short(rows[0].get(key))}, expected {_short(value)}"
                 raise InputError(f"{path}: the log of another search: {told}")
         if broken:
-            self._write("w", whole + "\n")
+            append(path, "", "log", kept=whole + "\n")
         self._rows = rows[1:]
-
-    def _text(self) -> str:
-        try:
-            return self.path.read_text(encoding="utf-8") if self.path.exists() else ""
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise InputError(f"{self.path}: the log cannot be read ({reason})") from None
-
-    def _write(self, mode: str, text: str) -> None:
-        try:
-            with self.path.open(mode, encoding="utf-8") as file:
-                file.write(text)
-        except OSError as error:
-            raise InputError(f"{self.path}: the log cannot be written ({error.strerror})") from None
 
     def append(self, rows: Sequence[dict[str, Any]]) -> None:
         """Add candidates."""
         if rows:
             self._rows += rows
-            self._write("a", "".join(json.dumps(row) + "\n" for row in rows))
+            append(self.path, "".join(json.dumps(row) + "\n" for row in rows), "log")
 
     def known(self, place: int, points: Sequence[FloatArray]) -> list[dict[str, Any]]:
         """Return the candidates from a place on, as far as they are there.

@@ -82,18 +82,12 @@ def hinge(excess: float, scale: float) -> float:
 
 @dataclass
 class Score:
-    """What is known of a candidate.
-
-    Attributes
-    ----------
-    losses : dict
-        Loss of each claim looked at so far.
-    measured : dict
-        Numbers behind them, for the log.
-    """
+    """What is known of a candidate."""
 
     losses: Losses = field(default_factory=dict)
+    """Loss of each claim looked at so far."""
     measured: dict[str, Any] = field(default_factory=dict)
+    """Numbers behind them, for the log."""
 
     def total(self, weights: dict[str, float]) -> float:
         """Return the weighted sum; what was not looked at counts in full."""

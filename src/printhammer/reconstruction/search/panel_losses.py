@@ -148,9 +148,7 @@ def _closest(states: FloatArray, period: int) -> FloatArray:
 
 
 def _multipliers(
-    some: Sequence[Candidate],
-    periods: Sequence[float],
-    wandering: Sequence[tuple[int, int, int, FloatArray]],
+    some: Sequence[Candidate], periods: Sequence[float], wandering: Sequence[tuple[int, int, int, FloatArray]]
 ) -> list[float]:
     """Return the largest multiplier of each orbit, by absolute value; NaN where none is found.
 

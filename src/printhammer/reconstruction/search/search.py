@@ -53,24 +53,16 @@ STARTS: Final = 64
 
 @dataclass(frozen=True)
 class Plan:
-    """What decides on a search.
-
-    Attributes
-    ----------
-    aim : str
-        Which claims lead: "stated" or "all".
-    seed : int
-        Of everything random.
-    sample : int
-        Points of the wide sample.
-    starts : tuple of tuple of float
-        Further points from which islands may begin, such as the best of another search.
-    """
+    """What decides on a search."""
 
     aim: Aim
+    """Which claims lead: "stated" or "all"."""
     seed: int
+    """Of everything random."""
     sample: int = SAMPLE
+    """Points of the wide sample."""
     starts: tuple[tuple[float, ...], ...] = ()
+    """Further points from which islands may begin, such as the best of another search."""
 
     def heading(self) -> dict[str, Any]:
         """Return the first line of the log."""

@@ -40,28 +40,19 @@ _SOURCE: Final = "found by search for the behaviour that the paper tells"
 
 @dataclass(frozen=True)
 class Variable:
-    """One number of the search.
-
-    Attributes
-    ----------
-    name : str
-        What it is called in the log.
-    low, high : float
-        Ends of the range of plausible values, SI.
-    logarithmic : bool
-        Whether values are spread evenly over the logarithm.
-    unit : str
-        SI unit, empty for a ratio.
-    meaning : str
-        What it is.
-    """
+    """One number of the search."""
 
     name: str
+    """What it is called in the log."""
     low: float
     high: float
+    """Ends of the range of plausible values, SI."""
     logarithmic: bool
+    """Whether values are spread evenly over the logarithm."""
     unit: str
+    """SI unit, empty for a ratio."""
     meaning: str
+    """What it is."""
 
     def value(self, share: FloatArray) -> FloatArray:
         """Return the values at shares of the range, from 0 to 1."""

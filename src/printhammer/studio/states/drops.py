@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from typing import Final
 
@@ -13,6 +11,7 @@ from printhammer.errors import InputError
 from printhammer.studio.bounds import MOST_SAMPLES
 from printhammer.studio.frames import frame
 from printhammer.studio.states.state import dropped_hammer
+from printhammer.support.sheets import sheet_of, split_heading
 from printhammer.units import to_si
 
 _COLUMNS: Final = {"displacement": "m", "current": "A", "force": "N"}
@@ -50,11 +49,7 @@ def read_curve(text: str, where: str) -> tuple[str, np.ndarray, np.ndarray]:
     InputError
         It is no such table.
     """
-    try:
-        read = list(csv.reader(io.StringIO(text), strict=True))
-    except csv.Error as error:
-        raise InputError(f"{where}: expected comma-separated values ({error})") from None
-    rows = [row for row in read if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")]
+    rows = [cells for _line, cells in sheet_of(text, where).rows]
     if not rows:
         raise InputError(f"{where}: the file is empty, expected the heading {_EXPECTED}")
     names, units = zip(*(_heading(cell, where) for cell in rows[0]), strict=True)
@@ -72,13 +67,12 @@ def read_curve(text: str, where: str) -> tuple[str, np.ndarray, np.ndarray]:
 
 
 def _heading(cell: str, where: str) -> tuple[str, str]:
-    name, opened, rest = cell.strip().partition("[")
-    unit, closed, tail = rest.partition("]")
-    if not (opened and closed and unit.strip()) or tail.strip():
+    name, unit = split_heading(cell)
+    if not unit:
         raise InputError(
             f"{where}: heading {cell.strip()!r} is expected to carry a unit, such as 'time [us]'"
         )
-    return name.strip().lower(), unit.strip()
+    return name.lower(), unit
 
 
 def _numbers(row: list[str], where: str) -> list[float]:

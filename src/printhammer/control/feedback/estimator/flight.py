@@ -14,37 +14,33 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.control.feedback.interpolation import bilinear, blend
 from printhammer.hammer.static_force import StaticForce
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from printhammer.control.feedback.estimator.sensor import Samples
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
     Accelerations = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
-_ROUNDS: Final = 3
-_NODES: Final = 65
-_SLOWEST: Final = 1e-2
-_SHORTEST: Final = 1e-6
+_ROUNDS: Final = 3  # Iterations: of a path, of a fit, and of the time of a touch
+_NODES: Final = 65  # Nodes of a path in time
+_SLOWEST: Final = 1e-2  # Least speed of a touch, m/s
+_SHORTEST: Final = 1e-6  # Least length of a flight, s
+# Differences from which derivatives are taken: of the speed in parts of it, and of the scale of currents
 _STEP: Final = 0.01
 _SCALE_STEP: Final = 0.02
-_BENDS: Final = 2
-_PLACES, _CURRENTS = 97, 129
+_BENDS: Final = 2  # Iterations of a path in a fit
+_PLACES, _CURRENTS = 97, 129  # Numbers of displacements and currents of the table of forces
 
 
 class FreeForce:
     """Force of magnet and spring of a hammer, N, read from a table over displacement and current.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    low, high : float
-        Displacements at the ends of the table, m.
-    largest : float
-        Largest absolute value of the current, A.
+    The table ends at the displacements `low` and `high`, m, and at currents of `largest`, A, of either sign.
     """
 
     def __init__(self, hammer: Hammer, low: float, high: float, largest: float) -> None:
@@ -64,26 +60,15 @@ class FreeForce:
         column = np.clip(0.5 + 0.5 * current / self._largest, 0.0, 1.0) * (_CURRENTS - 1)
         i = np.minimum(row.astype(np.int64), _PLACES - 2)
         j = np.minimum(column.astype(np.int64), _CURRENTS - 2)
-        p, q = row - i, column - j
-        values = self._table
-        found: FloatArray = (1.0 - p) * ((1.0 - q) * values[i, j] + q * values[i, j + 1]) + p * (
-            (1.0 - q) * values[i + 1, j] + q * values[i + 1, j + 1]
-        )
-        return found
+        return bilinear(self._table, i, row - i, j, column - j)
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What is expected of a touch before the samples are looked at.
+    """What is expected of touches (M,) before the samples are looked at.
 
-    Attributes
-    ----------
-    time, speed : array, shape (M,)
-        Of the touch, s and m/s.
-    scale : array, shape (M,)
-        By which part all currents are larger than they should be.
-    covariance : array, shape (M, 3, 3)
-        Of displacement at that time, m, speed, m/s, and scale.
+    Their time, s, and speed, m/s; `scale`, the part by which all currents are larger than they should be; and
+    the covariance (M, 3, 3) of displacement at that time, m, speed, m/s, and scale.
     """
 
     time: FloatArray
@@ -94,24 +79,14 @@ class Expected:
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight as the samples tell it.
+    """A flight as the samples tell it."""
 
-    Attributes
-    ----------
-    touch, speed : array, shape (M,)
-        Time, s, and speed, m/s, of the coming touch.
-    scale : array, shape (M,)
-        By which part all currents are larger than they should be.
-    reference : array, shape (M,)
-        Time, s, for which `state` and `covariance` hold.
-    state, covariance : array, shape (M, 3) and (M, 3, 3)
-        Displacement, m, speed, m/s, and scale, and their covariance.
-    """
-
+    # Time, s, and speed, m/s, of the coming touch, (M,)
     touch: FloatArray
     speed: FloatArray
-    scale: FloatArray
-    reference: FloatArray
+    scale: FloatArray  # By which part all currents are larger than they should be, (M,)
+    reference: FloatArray  # Time, s, for which `state` and `covariance` hold, (M,)
+    # Displacement, m, speed, m/s, and scale, and their covariance, (M, 3)
     state: FloatArray
     covariance: FloatArray
 
@@ -139,24 +114,14 @@ class Flight:
 
 
 def flight_from_samples(
-    times: FloatArray,
-    seen: FloatArray,
-    used: FloatArray,
-    error: float,
-    expected: Expected,
-    front: FloatArray,
-    accelerations: Accelerations,
+    samples: Samples, expected: Expected, front: FloatArray, accelerations: Accelerations
 ) -> Flight:
     """Return what samples tell of a flight and the coming touch of the pack.
 
     Parameters
     ----------
-    times, seen : array, shape (M, N)
-        Times of the samples, s, and what the sensor shows, m.
-    used : array, shape (M, N)
-        1 for a sample that counts, 0 for one that does not.
-    error : float
-        Standard deviation of a sample, m.
+    samples : Samples
+        What the sensor shows.
     expected : Expected
         What is expected before.
     front : array, shape (M,)
@@ -165,14 +130,15 @@ def flight_from_samples(
         Of a flying armature: displacements, m, times, s, and scales, all of shape (M, K) or such that they
         broadcast to it, to m/s².
     """
+    times, shown, used, error = samples
     reference = expected.time
     mean = np.stack([front, expected.speed, expected.scale], axis=1)
     state = mean.copy()
-    first = np.where(used > 0.0, times, np.inf).min(axis=1, initial=np.inf)
+    first = np.where(used, times, np.inf).min(axis=1, initial=np.inf)
     first = np.minimum(np.where(np.isfinite(first), first, reference), reference)
     grid = reference[:, np.newaxis] + np.linspace(-1.0, 0.0, _NODES) * (reference - first)[:, np.newaxis]
     curve = np.zeros_like(grid)
-    tau = np.where(used > 0.0, times - reference[:, np.newaxis], 0.0)
+    tau = np.where(used, times - reference[:, np.newaxis], 0.0)
     ways = [np.ones_like(grid), grid - reference[:, np.newaxis]]
     span = np.maximum(-ways[1][:, 0], _SHORTEST)
     quick = _STEP * np.maximum(np.abs(expected.speed), _SLOWEST)
@@ -199,7 +165,7 @@ def flight_from_samples(
         ]
         slopes[0] += 1.0
         slopes[1] += tau
-        rest = seen - state[:, :1] - state[:, 1:2] * tau - _interpolated(grid, curve, times)
+        rest = shown - state[:, :1] - state[:, 1:2] * tau - _interpolated(grid, curve, times)
         step, precision = least_squares(slopes, rest, used / error**2, prior, mean - state)
         state = state + step
     place, speed, scale = state.T
@@ -225,10 +191,8 @@ def least_squares(
     ----------
     slopes : sequence of array, shape (M, N)
         How the samples depend on each of U unknowns.
-    rest : array, shape (M, N)
-        What is left of the samples.
-    weight : array, shape (M, N)
-        Of the samples, 0 for those that do not count.
+    rest, weight : array, shape (M, N)
+        What is left of the samples, and their weights, 0 for those that do not count.
     prior : array, shape (M, U, U)
         Inverse of the covariance of what was expected.
     expected : array, shape (M, U)
@@ -275,7 +239,5 @@ def _interpolated(grid: FloatArray, values: FloatArray, times: FloatArray) -> Fl
     span = np.maximum(grid[:, -1:] - grid[:, :1], 1e-300)
     place = np.clip((times - grid[:, :1]) / span, 0.0, 1.0) * count
     below = np.minimum(place.astype(np.int64), count - 1)
-    share = place - below
     row = np.arange(len(grid))[:, np.newaxis]
-    found: FloatArray = (1.0 - share) * values[row, below] + share * values[row, below + 1]
-    return found
+    return blend(values[row, below], values[row, below + 1], place - below)

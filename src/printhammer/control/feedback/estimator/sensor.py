@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,29 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
     Words = npt.NDArray[np.uint64]
+
+
+# Least standard deviation that a sample counts with, in parts of the way from backstop to pack
+_LEAST_ERROR: Final = 1e-4
+# Part of an interval by which a sample may lie beyond a boundary, so that no rounding decides
+_SLACK: Final = 1e-6
+
+
+class Samples(NamedTuple):
+    """What a sensor shows of some runs: arrays of shape (M, N), one row a run.
+
+    Times of the samples, s; displacements that are shown, m, 0 for samples that are not used; whether they
+    are used; and the standard deviation of a sample, m.
+    """
+
+    times: FloatArray
+    shown: FloatArray
+    used: npt.NDArray[np.bool_]
+    error: float
+
+    def some(self, which: Any) -> Samples:
+        """Return some of the rows or columns."""
+        return Samples(self.times[which], self.shown[which], self.used[which], self.error)
 
 
 @dataclass(frozen=True)
@@ -60,42 +83,26 @@ class PositionSensor:
         if type(self.seed) is not int or self.seed < 0:
             raise InputError(f"sensor: seed = {self.seed!r} is expected to be a whole number not below 0")
 
+    @property
+    def error(self) -> float:
+        """Standard deviation of a sample, in parts of the way from backstop to pack."""
+        return max(float(np.hypot(self.noise, self.step / np.sqrt(12.0))), _LEAST_ERROR)
+
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> npt.NDArray[np.int64]:
-        """Return the numbers of the latest samples in some spans of time.
+        """Return the numbers of the latest samples in some spans of time (M,), s, shape (M, most).
 
-        Parameters
-        ----------
-        since, until : array, shape (M,)
-            First instant, and the one at which the samples are needed, s: what is in by then was taken the
-            delay before.
-        most : int
-            Number of samples at most.
-
-        Returns
-        -------
-        int array, shape (M, most)
-            Ascending; -1 in front where there are fewer.
+        `until` is the instant at which the samples are needed: what is in by then was taken the delay before.
+        The numbers ascend; -1 in front where there are fewer.
         """
-        # A sample on the boundary must not come and go with the last bit of a sum.
-        slack = 1e-6
-        last = np.floor((until - self.delay) / self.interval + slack).astype(np.int64)
-        first = np.ceil(since / self.interval - slack).astype(np.int64)
+        last = np.floor((until - self.delay) / self.interval + _SLACK).astype(np.int64)
+        first = np.ceil(since / self.interval - _SLACK).astype(np.int64)
         found = last[:, np.newaxis] - np.arange(most - 1, -1, -1)
         return np.where(found >= np.maximum(first, 0)[:, np.newaxis], found, -1)
 
     def read(self, x: FloatArray, numbers: npt.NDArray[np.int64], runs: Words, stroke: float) -> FloatArray:
-        """Return what the sensor shows.
+        """Return what the sensor shows of true displacements (M, N), m, at samples of some numbers (M, N).
 
-        Parameters
-        ----------
-        x : array, shape (M, N)
-            True displacements, m.
-        numbers : int array, shape (M, N)
-            Numbers of the samples.
-        runs : uint64 array, shape (M,)
-            What tells the noise of one run from that of another.
-        stroke : float
-            Way from backstop to pack, m.
+        `runs` (M,) tell the noise of one run from that of another; `stroke` is the way from backstop to pack.
         """
         seen = x + self.noise * stroke * normal(self.seed, runs[:, np.newaxis], numbers)
         if self.step > 0.0:

@@ -1,0 +1,213 @@
+"""Bifurcation diagrams by brute force: the states at the firings, against a parameter.
+
+For each value of a parameter a train is fired, the first firings are left out, and the states at the others
+are the column of the diagram above that value: one point for a train that repeats itself at every firing, two
+where it does at every second one, and many for a strange one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, Literal, SupportsIndex, Unpack, get_args
+
+import numpy as np
+
+from printhammer.chaos.bifurcation.builder import DiagramBuilder
+from printhammer.chaos.bifurcation.columns import FROM_REST, TOLERANCE
+from printhammer.chaos.bifurcation.diagram import Bifurcation
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.hammer.names import PERIOD, RATE
+from printhammer.run.problem import check_tolerance
+from printhammer.run.regime import Regime
+from printhammer.run.start import initial_state
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.run.regime import Firing
+    from printhammer.support.arrays import FloatArray
+    from printhammer.support.threads import Progress
+
+FIRINGS: Final = 300
+"""Firings of a train unless told otherwise."""
+
+TRANSIENT: Final = 100
+"""Of these, firings that are left out at the beginning."""
+
+REFINE: Final = 2
+"""Times that the steps between neighbours that differ are halved, unless told otherwise."""
+
+MOST_STATES: Final = 100_000_000
+"""Number of states above which a diagram is refused."""
+
+Direction = Literal["from rest", "up", "down", "both"]
+DIRECTIONS: Final = get_args(Direction)
+
+
+class InterruptedDiagram(KeyboardInterrupt):
+    """A diagram was interrupted.
+
+    Attributes
+    ----------
+    diagram : Bifurcation
+        What is done; the status of the others is "not run".
+    """
+
+    def __init__(self, diagram: Bifurcation) -> None:
+        super().__init__("interrupted")
+        self.diagram = diagram
+
+
+def bifurcation(
+    hammer: Hammer | Regime,
+    *,
+    periods: npt.ArrayLike | None = None,
+    rates: npt.ArrayLike | None = None,
+    parameter: str | None = None,
+    values: npt.ArrayLike | None = None,
+    firings: SupportsIndex = FIRINGS,
+    transient: SupportsIndex = TRANSIENT,
+    direction: Direction = "from rest",
+    state: tuple[float, float] | None = None,
+    refine: SupportsIndex = REFINE,
+    exponents: bool = False,
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    **firing: Unpack[Firing],
+) -> Bifurcation:
+    """Compute a bifurcation diagram of a hammer under a periodic drive.
+
+    Parameters
+    ----------
+    hammer : Hammer or Regime
+        The hammer; or the hammer with all that `firing` says of it.
+    periods, rates : array, optional
+        Times between firings, s, or firings per second, Hz, ascending.
+    parameter, values : str and array, optional
+        Instead: the name of any constant, such as "backstop.damping" or "waveform.amplitude", and its
+        values, SI, ascending; see `printhammer.run.regime.Regime.with_`.
+    firings, transient : int, optional
+        Firings at each value, and how many of these are left out at the beginning.
+    direction : str, optional
+        "from rest": every train begins at rest, with nothing fired before. "up", "down": it begins where the
+        train at the value before, or after, ended, with the pulses before under way; the first begins at
+        rest. "both": up and down. See `printhammer.chaos.bifurcation.carry`.
+    state : tuple of float, optional
+        Displacement, m, and velocity, m/s, that takes the place of rest, with the pulses before under way.
+    refine : int, optional
+        How often the step between neighbours whose periods differ, or whose orbits lie apart, is halved.
+    exponents : bool, optional
+        Compute the exponents of trains without a period, which tell strange ones from undecided ones; takes
+        many times as long.
+    tolerance : float, optional
+        As for `printhammer.simulate`; with one for pictures, trains that settle slowly pass for undecided.
+    threads : int, optional
+        By default as many as there are cores; the diagram does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of trains done and of all that are known of so far.
+    **firing
+        How the hammer is fired, as for `printhammer.Regime.of`; period or rate only with another parameter.
+
+    Returns
+    -------
+    Bifurcation
+        With a status for each train; a run that could not go on is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; a value that the parameter cannot have; a hammer without
+        a rest state where no state is given.
+    InterruptedDiagram
+        A KeyboardInterrupt, with what was done.
+    """
+    name, grid, regime = _parameter(hammer, (periods, rates, parameter, values), firing)
+    count, skipped = read_count(firings, "firings"), read_count(transient, "transient", least=0)
+    if count - skipped < 2:
+        raise InputError(f"transient = {transient!r}, expected at least 2 fewer than the {count} firings")
+    if direction not in DIRECTIONS:
+        raise InputError(f"direction = {direction!r}, expected one of {', '.join(DIRECTIONS)}")
+    halvings = read_count(refine, "refine", least=0)
+    check_tolerance(tolerance)
+    ways = ("up", "down") if direction == "both" else (direction,)
+    if len(grid) * len(ways) * (count - skipped) > MOST_STATES:
+        raise InputError(f"{len(grid)} values, expected at most {MOST_STATES} states in a diagram")
+    begin = FROM_REST
+    if state is not None:
+        begin = (*initial_state(regime.hammer, state), -1.0, 0.0)
+    work = DiagramBuilder(regime, name, ways, (count, skipped, tolerance), begin, threads, progress)
+    try:
+        work.base(grid)
+        for level in range(1, halvings + 1):
+            work.refine(level)
+        if exponents:
+            work.measure()
+    except KeyboardInterrupt:
+        raise InterruptedDiagram(_result(work)) from None
+    return _result(work)
+
+
+def _result(work: DiagramBuilder) -> Bifurcation:
+    """Return the diagram as far as it is."""
+    order = np.argsort(work.values, kind="stable")
+    rows = (len(work.ways) * order + np.arange(len(work.ways))[:, np.newaxis]).astype(np.int64)
+    table = work.table
+    firings, transient, tolerance = work.counts
+    return Bifurcation(
+        regime=work.regime,
+        parameter=work.name,
+        values=work.values[order],
+        directions=work.ways,
+        firing=np.arange(transient + 1, firings + 1),
+        x=table.columns.x[rows],
+        v=table.columns.v[rows],
+        branch=table.columns.branch[rows],
+        status=table.columns.status[rows],
+        cycles=table.cycles[rows],
+        distances=table.distances[rows],
+        exponents=work.exponents[rows],
+        standard_errors=work.errors[rows],
+        levels=work.levels[order],
+        carried=table.carried,
+        tolerance=tolerance,
+    )
+
+
+def _parameter(
+    hammer: Hammer | Regime,
+    given: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
+    firing: Firing,
+) -> tuple[str, FloatArray, Regime]:
+    """Return the name of the parameter, its values, and the regime in which it is changed."""
+    periods, rates, parameter, values = given
+    if sum(entry is not None for entry in (periods, rates, parameter)) != 1:
+        raise InputError("periods, rates and parameter: expected one of them")
+    if (parameter is None) != (values is None):
+        raise InputError("parameter and values: expected both of them, or neither")
+    name = parameter or (PERIOD if periods is not None else RATE)
+    grid = _ascending(values if values is not None else periods if periods is not None else rates, name)
+    if name in (PERIOD, RATE):
+        if firing.get("period") is not None or firing.get("rate") is not None:
+            raise InputError(f"period and rate: expected none of them beside the values of {name!r}")
+        if isinstance(hammer, Hammer) and firing.get("drive") is None:
+            first = float(grid[0])
+            firing = {**firing, "period": first} if name == PERIOD else {**firing, "rate": first}
+    regime = Regime.of(hammer, **firing)
+    regime.value(name)
+    return name, grid, regime
+
+
+def _ascending(values: npt.ArrayLike | None, name: str) -> FloatArray:
+    try:
+        found = np.atleast_1d(np.array(values, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected numbers in SI") from None
+    if found.ndim != 1 or found.size == 0 or not np.isfinite(found).all():
+        raise InputError(f"{name}: expected a list of at least one finite number in SI")
+    falling = np.flatnonzero(np.diff(found) <= 0.0)
+    if falling.size:
+        before, after = found[falling[0] : falling[0] + 2].tolist()
+        raise InputError(f"{name}: {after:.9g} follows {before:.9g}, expected ascending values")
+    return found

@@ -1,0 +1,45 @@
+"""The verbs of the command line, in the order of the help."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from printhammer.cli.verbs.chaos.basins import basins
+from printhammer.cli.verbs.chaos.bifurcation import bifurcation
+from printhammer.cli.verbs.chaos.continuation import continue_
+from printhammer.cli.verbs.chaos.lyapunov import lyapunov
+from printhammer.cli.verbs.chaos.orbits import orbits
+from printhammer.cli.verbs.chaos.strobe import strobe
+from printhammer.cli.verbs.laboratory import fit, hammer, reconstruct
+from printhammer.cli.verbs.laboratory.measure import measure
+from printhammer.cli.verbs.printing.energy import energy
+from printhammer.cli.verbs.printing.feedback import feedback
+from printhammer.cli.verbs.printing.print_ import print_
+from printhammer.cli.verbs.printing.quality import quality
+from printhammer.cli.verbs.printing.tune import tune
+from printhammer.cli.verbs.runs.bench import bench
+from printhammer.cli.verbs.runs.figure import figure
+from printhammer.cli.verbs.runs.map import map_
+from printhammer.cli.verbs.runs.paper import paper
+from printhammer.cli.verbs.runs.run import run
+from printhammer.cli.verbs.runs.studio import studio
+from printhammer.cli.verbs.runs.sweep import sweep
+
+if TYPE_CHECKING:
+    from printhammer.cli.runner import Verb
+
+VERBS: Final[tuple[Verb, ...]] = (
+    *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, lyapunov),
+    *(print_, energy, feedback, quality, tune, bench, studio, sweep, measure),
+    *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped),
+    *(fit.magnet, fit.spring, fit.pack, fit.backstop, fit.motion),
+    *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),
+    *(reconstruct.predictions, reconstruct.family, reconstruct.ship),
+)
+
+GROUPS: Final = {
+    "hammer": (hammer.GROUP, None),
+    "fit": (fit.GROUP, fit.EXAMPLE),
+    "reconstruct": (reconstruct.GROUP, reconstruct.EXAMPLE),
+}
+"""What the verbs of two words have in common, by their first word: help, and an example."""

@@ -1,0 +1,368 @@
+"""The one way in which every verb runs.
+
+A verb is a function of its options, and of a `Job` where it asks for one, declared with `verb`. The runner
+reads the options, checks before any work that every file can be written, loads the hammer, and has compiling
+announced; the verb computes and returns an `Answer`; the runner shows it, writes the files, complains, and
+sets the exit status.
+"""
+
+from __future__ import annotations
+
+import inspect
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+from printhammer.cli import progress
+from printhammer.cli.options import Option
+from printhammer.cli.screen import heading
+from printhammer.cli.terminal import complain, console, say, warn
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from contextlib import AbstractContextManager
+
+    from rich.console import RenderableType
+
+    from printhammer.cli.options import Files
+    from printhammer.hammer.hammer import Hammer
+
+Shown = TypeVar("Shown")
+
+INTERRUPTED: Final = 130
+PICTURES: Final = (".svg", ".png", ".pdf")
+"""Endings of the names of pictures."""
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a file holds: a picture where its name ends as one's does, else what `save` writes.
+
+    Attributes
+    ----------
+    save : callable, optional
+        Writes any file that is no picture; None where the work itself has written it.
+    plot : callable, optional
+        Returns a matplotlib figure.
+    """
+
+    save: Callable[[Path], Any] | None = None
+    plot: Callable[[], Any] | None = None
+
+    @classmethod
+    def text(cls, content: Callable[[], str]) -> Content:
+        """Return content that is a text, made when it is written."""
+        from printhammer.support.outputs import write_file
+
+        return cls(lambda path: write_file(path, content()))
+
+    @classmethod
+    def of(cls, result: Any, **options: Any) -> Content:
+        """Return a result as content; `options` go to its `plot`."""
+        return cls(result.save, lambda: result.plot(**options))
+
+    def write(self, path: Path) -> None:
+        """Write a file; InputError if it cannot be written."""
+        from printhammer.support.outputs import write_file
+
+        ending = path.suffix.lower()
+        if self.plot is not None and ending in PICTURES:
+            from printhammer.figures.elements.save import picture
+
+            write_file(path, picture(self.plot(), ending[1:]))
+        elif self.save is not None:
+            self.save(path)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a verb has to say at its end.
+
+    Attributes
+    ----------
+    shown : sequence of renderable
+        What is still to be shown; text is markup.
+    note : str
+        Line below the name of the hammer.
+    files : mapping of str to Content
+        What the files of an option hold.
+    complaints : sequence of str
+        Why the exit status is 1.
+    failed : bool
+        Whether it is 1 without a complaint.
+    interrupted : bool
+        Whether Ctrl-C ended the work, of which this much was done.
+    """
+
+    shown: Sequence[RenderableType] = ()
+    note: str = ""
+    files: Mapping[str, Content] = field(default_factory=dict)
+    complaints: Sequence[str] = ()
+    failed: bool = False
+    interrupted: bool = False
+
+
+class Job:
+    """One call of a verb.
+
+    Attributes
+    ----------
+    hammer : Hammer or None
+        The hammer that is worked on.
+    wanted : dict of str to list of Path
+        Files to write, by the name of their option.
+    inputs : list of Path
+        Files that are read.
+    screen : Console
+        The standard output.
+    seconds : float
+        How long the last work took whose progress was shown.
+    """
+
+    def __init__(self, declared: Mapping[str, Files], wanted: Mapping[str, list[Path]]) -> None:
+        self.hammer: Hammer | None = None
+        self.declared, self.wanted = declared, dict(wanted)
+        self.inputs: list[Path] = []
+        self.screen = console()
+        self.seconds = 0.0
+        self._headed = False
+
+    @property
+    def outputs(self) -> list[Path]:
+        """All files to write."""
+        return [path for paths in self.wanted.values() for path in paths]
+
+    def check(self, *inputs: Path) -> None:
+        """Make sure, before any work, that all files can be written, and are none that is read.
+
+        Errors as for `check_endings` and `check_outputs`.
+        """
+        from printhammer.results.files import need_for
+        from printhammer.support.outputs import check_outputs
+
+        for name, paths in self.wanted.items():
+            option = self.declared[name]
+            endings = (*option.endings, *(PICTURES if option.pictures else ()))
+            check_endings(paths, endings, name if option.argument else f"--{name}")
+        self.inputs += inputs
+        for path in self.outputs:
+            need_for(path)
+        # A Zarr store is a folder.
+        stores = {
+            path: path / "zarr.json"
+            for path in self.outputs
+            if path.suffix.lower() == ".zarr" and path.is_dir()
+        }
+        check_outputs([stores.get(path, path) for path in self.outputs], self.inputs)
+
+    def counting(
+        self, name: str, *, remaining: bool = True
+    ) -> AbstractContextManager[Callable[[int, int], None]]:
+        """Show a bar during work that is counted, and note its time; see `progress.counting`."""
+        return self._timed(progress.counting(name, remaining=remaining))
+
+    def telling(self, first: str = "…") -> AbstractContextManager[Callable[[str], None]]:
+        """Show a line during work whose end is not known, and note its time; see `progress.telling`."""
+        return self._timed(progress.telling(first))
+
+    @contextmanager
+    def _timed(self, shown: AbstractContextManager[Shown]) -> Iterator[Shown]:
+        begin = perf_counter()
+        try:
+            with shown as tell:
+                yield tell
+        finally:
+            self.seconds = perf_counter() - begin
+
+    def show(self, *parts: RenderableType, note: str = "") -> None:
+        """Print at once, below the name of the hammer; text is markup."""
+        if not self._headed and self.hammer is not None:
+            self.screen.print(heading(self.hammer))
+            if note:
+                self.screen.print(f"[dim]{note}[/dim]", soft_wrap=True)
+            self.screen.print()
+        self._headed = True
+        for part in parts:
+            self.screen.print(part, soft_wrap=isinstance(part, str))
+
+    def wrote(self, path: Path | str) -> None:
+        """Tell that a file was written."""
+        self.screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+
+    def end(self, answer: Answer) -> int:
+        """Show, write and complain; return the exit status."""
+        if answer.shown or answer.note:
+            self.show(*answer.shown, note=answer.note)
+        for name, content in answer.files.items():
+            for path in self.wanted.get(name, []):
+                content.write(path)
+                self.wrote(path)
+        for complaint in answer.complaints:
+            complain(complaint)
+        if answer.interrupted:
+            return INTERRUPTED
+        return int(bool(answer.complaints) or answer.failed)
+
+
+@dataclass(frozen=True)
+class Verb:
+    """A verb of the command line.
+
+    Attributes
+    ----------
+    name : str
+        What it is called, such as "strobe" or "fit magnet".
+    example : str
+        A command line that runs; it stands in the help.
+    call : callable
+        What typer calls, with texts; returns the exit status.
+    options : dict of str to Option
+        Options with their declarations, by the names of the parameters.
+    files : dict of str to Files
+        Options that name files to write.
+    """
+
+    name: str
+    example: str
+    call: Callable[..., int]
+    options: Mapping[str, Option]
+    files: Mapping[str, Files]
+
+
+def verb(
+    name: str, example: str, passed: Mapping[str, Option] | None = None, **files: Files
+) -> Callable[[Callable[..., Answer]], Verb]:
+    """Make a function the verb `name`.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    example : str
+        A command line that runs.
+    passed : dict of str to Option, optional
+        Options that the library takes under the same name. The function gets those that are given as further
+        keywords, to pass them on; the others have the defaults of the library.
+    **files : Files
+        Options that name files to write, in the order of writing.
+
+    Returns
+    -------
+    callable
+        A decorator of a function whose parameters have options as their defaults; the `Job` is passed too
+        where there is a parameter `job`.
+    """
+
+    def made(function: Callable[..., Answer]) -> Verb:
+        signature = inspect.signature(function)
+        own = [name for name, each in signature.parameters.items() if isinstance(each.default, Option)]
+        on = passed or {}
+        options: dict[str, Option] = {**{name: signature.parameters[name].default for name in own}, **on}
+        every = {**options, **files}
+
+        def call(**texts: Any) -> int:
+            job = Job(files, {option: _listed(texts.pop(option)) for option in files})
+            values = _values(job, options, texts)
+            words = {name: values[name] for name in own}
+            words |= {name: values[name] for name in on if values[name] is not None}
+            if "job" in signature.parameters:
+                words["job"] = job
+            return job.end(function(**words))
+
+        # What typer looks at.
+        typed: Any = call
+        typed.__doc__ = function.__doc__
+        typed.__signature__ = inspect.Signature(
+            [
+                inspect.Parameter(
+                    option,
+                    inspect.Parameter.KEYWORD_ONLY,
+                    default=inspect.Parameter.empty if each.default is ... else each.typer_default(),
+                    annotation=each.annotation(option),
+                )
+                for option, each in every.items()
+            ]
+        )
+        typed.__annotations__ = {option: each.annotation(option) for option, each in every.items()}
+        return Verb(name, example, call, options, files)
+
+    return made
+
+
+def _listed(paths: Path | list[Path] | None) -> list[Path]:
+    return [paths] if isinstance(paths, Path) else paths or []
+
+
+def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> dict[str, Any]:
+    """Check the files, read the options, load the hammer; return the values of the options."""
+    job.check(
+        *(
+            Path(path)
+            for name, option in options.items()
+            if option.is_input and texts[name] is not None
+            for path in (texts[name] if isinstance(texts[name], list) else [texts[name]])
+        )
+    )
+    values = dict(texts)
+    for name, option in options.items():
+        if option.read is not None and texts[name] is not None:
+            values[name] = option.read(texts[name], option.flag_of(name))
+    for name, option in options.items():
+        if option.hammer in ("loaded", "fired"):
+            values[name] = job.hammer = load_hammer(texts[name], fired=option.hammer == "fired")
+            job.check(*tables_beside(Path(texts[name]), job.hammer.magnet, job.hammer.waveform))
+            announce_compiling()
+    return values
+
+
+def load_hammer(name: str, *, fired: bool) -> Hammer:
+    """Load a hammer that is to be run; print what is odd about it as warnings.
+
+    InputError if there is none, it does not rest at its backstop, or has no waveform to be fired with.
+    """
+    from printhammer.hammer.hammer import load
+
+    hammer = load(name)
+    for warning in hammer.warnings():
+        warn(f"{hammer.path}: {warning}")
+    if fired and hammer.waveform is None:
+        raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")
+    return hammer
+
+
+def tables_beside(path: Path, *parts: object) -> list[Path]:
+    """Return the tables that parts read from a file name, which lie beside that file."""
+    names = [getattr(part, "file", None) for part in parts]
+    return [path.parent / name for name in names if name]
+
+
+def announce_compiling() -> None:
+    """Have the user told when machine code is made, which takes a while once."""
+    from printhammer.run.simulate import announce_compiling as announce
+
+    announce(say)
+
+
+def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "--out") -> None:
+    """Make sure that names end as what can be written there, if any end is named; else InputError."""
+    for path in paths:
+        if endings and path.suffix.lower() not in endings:
+            raise InputError(f"{option} {path}: expected a name that ends in one of {', '.join(endings)}")
+
+
+def check_new(paths: Iterable[Path], *, force: bool) -> None:
+    """Make sure that no file is there yet, unless it may be written over; else InputError."""
+    for path in paths:
+        if path.exists() and not force:
+            raise InputError(f"--out {path}: expected a new file, this one is there; --force writes over it")
+
+
+def ended_early(statuses: Iterable[object], total: int | None = None) -> list[str]:
+    """Return a complaint about the statuses that are not ok, of `total` runs or as many as there are."""
+    every = [str(status) for status in statuses]
+    failed = [status for status in every if status != "ok"]
+    kinds = ", ".join(sorted(set(failed)))
+    return [f"{len(failed)} of {total or len(every)} runs ended early: {kinds}"] if failed else []

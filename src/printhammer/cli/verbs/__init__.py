@@ -1,0 +1,1 @@
+"""The verbs, a folder each family."""

@@ -1,0 +1,159 @@
+"""The verb `bifurcation`: the states at the firings against a parameter, windows, and the way into chaos."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from rich.markup import escape
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
+from printhammer.cli.screen import Column, table
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from printhammer.chaos.bifurcation.diagram import Bifurcation
+    from printhammer.hammer.hammer import Hammer
+
+_RANGE: Final = ("0.8 ms", "1.35 ms")
+_PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
+_ROWS: Final = 12
+_of = partial(opt.text, panel=_PARAMETER)
+
+
+@verb(
+    "bifurcation",
+    "printhammer bifurcation hendriks-1983 --from '1.2 ms' --to '1.35 ms' --values 60"
+    " --direction both --out bifurcation.png",
+    {
+        "firings": opt.whole("Firings at each value.", default=300),
+        "transient": opt.whole("Of these, left out at the beginning.", default=100),
+        "refine": opt.whole("Halve the steps between neighbours that differ so often.", default=2),
+        "exponents": opt.switch("Tell strange trains from undecided ones; takes long."),
+        "overlap": opt.overlapping(_PARAMETER),
+        "tolerance": opt.TOLERANCE,
+        "threads": opt.THREADS,
+    },
+    out=opt.results("States and verdicts"),
+)
+def bifurcation(
+    job: Job,
+    hammer: Hammer = opt.FIRED,
+    parameter: str = _of("NAME", "period, rate, or any constant such as backstop.damping.", default="period"),
+    lowest: str | None = opt.LOWEST,
+    highest: str | None = opt.HIGHEST,
+    values: int = opt.whole("Number of values.", panel=_PARAMETER, default=500),
+    period: str | None = _of("TIME", "Time between firings, where another constant is changed."),
+    rate: str | None = _of("RATE", "Firings per second, likewise."),
+    direction: str = opt.choice(
+        "from-rest|up|down|both",
+        "Begin at rest (default), or where the train at the value before, or after, ended.",
+        default="from-rest",
+    ),
+    show: str = opt.choice("x|v", "What a picture shows.", default="x"),
+    **passed: Any,
+) -> Answer:
+    """Fire trains at many values of a parameter and tell which are periodic, and what leads to chaos.
+
+    Ends with status 1 where a run stopped before its end. Ctrl-C writes what is done.
+    """
+    from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
+    from printhammer.chaos.bifurcation.bifurcation import bifurcation as computed
+
+    start: Any = direction.replace("-", " ")
+    axis = _axis(hammer, parameter, (lowest, highest), values, period, rate)
+    interrupted = False
+    try:
+        with job.counting("trains") as tell:
+            result = computed(hammer, progress=tell, direction=start, **axis, **passed)
+    except InterruptedDiagram as interrupt:
+        interrupted, result = True, interrupt.diagram
+    done = int((result.status != "not run").sum())
+    windows = [summary(result, name) for name in result.directions]
+    return Answer(
+        [*windows, *map(escape, sentences(result))] if done else [],
+        note=f"{escape(result.parameter)}: {len(result.values)} values, {done} trains of"
+        f" {int(result.firing[-1])} firings, tolerance {result.tolerance:g}; computed in {job.seconds:.2g} s",
+        files={"out": Content.of(result, show=show)} if done else {},
+        complaints=[] if interrupted else ended_early(result.status.ravel()),
+        interrupted=interrupted,
+    )
+
+
+def _axis(
+    hammer: Hammer,
+    parameter: str,
+    ends: tuple[str | None, str | None],
+    count: int,
+    period: str | None,
+    rate: str | None,
+) -> dict[str, Any]:
+    """Return the parameter and its values as arguments of `printhammer.bifurcation`."""
+    import numpy as np
+
+    from printhammer.drive.input import read_number
+    from printhammer.run.regime import Regime
+
+    timed = parameter in ("period", "rate")
+    if timed and (period is not None or rate is not None):
+        raise InputError(f"--period and --rate: expected none of them where the {parameter} is changed")
+    regime = Regime.of(hammer, period=_RANGE[0] if timed else period, rate=rate)
+    regime.value(parameter)
+    unit = regime.quantity(parameter).si
+    first, last = ends
+    if parameter == "period":
+        first, last = first or _RANGE[0], last or _RANGE[1]
+    if first is None or last is None:
+        raise InputError(f"--from and --to: expected both of them for {parameter}, in {unit}")
+    low, high = (read_number(end, unit, name) for end, name in ((first, "--from"), (last, "--to")))
+    if count < 2 or not low < high:
+        raise InputError(
+            f"--from {first}, --to {last} and --values {count}: expected the second to be the higher"
+            " one, and at least 2 values"
+        )
+    grid = np.linspace(low, high, count)
+    if timed:
+        return {f"{parameter}s": grid}
+    return {"parameter": parameter, "values": grid, "period": period, "rate": rate}
+
+
+def summary(result: Bifurcation, direction: str) -> Table:
+    """Return the verdicts of one direction: how many windows, how wide together, the widest one."""
+    windows = result.windows(direction)
+    total = sum(window.width for window in windows) or 1.0
+    some = {
+        verdict: [window for window in windows if window.verdict == verdict]
+        for _period, verdict in sorted({(window.period or 1000, window.verdict) for window in windows})
+    }
+    widest = {verdict: max(same, key=lambda window: window.width) for verdict, same in some.items()}
+    columns: tuple[Column[str], ...] = (
+        Column("verdict", lambda verdict: verdict.replace("-", " "), left=True),
+        Column("windows", lambda verdict: len(some[verdict])),
+        Column(
+            "share", lambda verdict: 100.0 * sum(each.width for each in some[verdict]) / total, "", "%", ".2f"
+        ),
+        Column("widest from", lambda verdict: widest[verdict].low, format=".7g"),
+        Column("to", lambda verdict: widest[verdict].high, format=".7g"),
+    )
+    return table(columns, some, title=direction, most=_ROWS)
+
+
+def sentences(result: Bifurcation) -> list[str]:
+    """Return what the diagram tells: the routes to the first strange train, and hysteresis."""
+    from printhammer.chaos.bifurcation.diagram import hysteresis
+    from printhammer.chaos.bifurcation.windows import cells
+
+    lines = [""]
+    several = len(result.directions) > 1
+    for direction in result.directions:
+        lines += [
+            (f"{direction}: " if several else "") + route.sentence for route in result.routes(direction)
+        ]
+    if several:
+        widths = cells(result.values)
+        share = float(widths[hysteresis(result)].sum() / (widths.sum() or 1.0))
+        lines.append(f"Up and down lead to different attractors at {100.0 * share:.2f} % of the range.")
+    return lines

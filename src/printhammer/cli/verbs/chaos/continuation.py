@@ -1,0 +1,165 @@
+"""The verb `continue`: a periodic orbit followed through a constant, all regimes in the rate, or a chart."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from rich.markup import escape
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.screen import Column, multiplier, table
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from printhammer.chaos.continuation.branch import Branch
+    from printhammer.chaos.continuation.regimes import Branches
+    from printhammer.hammer.hammer import Hammer
+
+_START: Final = "Start (or --regimes)"
+_ALL: Final = "All regimes in the rate"
+_CHART: Final = "Chart of two constants"
+
+
+def read_state(written: str, name: str) -> tuple[float, float]:
+    """Read displacement, m, and velocity, m/s; InputError if they are none."""
+    from printhammer.drive.input import read_number
+
+    parts = [part.strip() for part in written.split(",")]
+    if len(parts) != 2:
+        raise InputError(
+            f"{name} {written!r}: expected displacement and velocity, such as '46.2 um, 12 mm/s'"
+        )
+    return read_number(parts[0], "m", name), read_number(parts[1], "m/s", name)
+
+
+@verb(
+    "continue",
+    "printhammer continue hendriks-1983 --period '1.3 ms' --parameter period"
+    " --from '1.27 ms' --to '1.34 ms' --out branch.png",
+    {
+        "most": opt.whole("Steps in either direction.", default=1000),
+        "overlap": opt.overlapping(),
+        "tolerance": opt.TOLERANCE,
+    },
+    out=opt.results("Branches"),
+)
+def continue_(
+    job: Job,
+    hammer: Hammer = opt.FIRED,
+    parameter: str = opt.text(
+        "NAME", "'rate', 'period' or a key such as 'backstop.damping'.", default="rate"
+    ),
+    lowest: str | None = opt.LOWEST,
+    highest: str | None = opt.HIGHEST,
+    period: str | None = opt.PERIOD,
+    rate: str | None = opt.RATE,
+    firings: int | None = opt.whole("Firings after which the orbit repeats.", panel=_START),
+    state: tuple[float, float] | None = opt.text(
+        "X,V", "State near the orbit, such as '46.2 um, 12 mm/s'.", panel=_START, read=read_state
+    ),
+    phase: float = opt.number(
+        "Part of the period between firing and section, from 0 to 1.", panel=_START, metavar="P", default=0.0
+    ),
+    doublings: int = opt.whole("How often period doublings are followed as well.", default=0),
+    regimes: bool = opt.switch("Search for orbits and follow all.", panel=_ALL),
+    longest: int = opt.whole("Most firings after which a motion repeats.", panel=_ALL, default=3),
+    seeds: int = opt.whole("Rates at which orbits are searched for.", panel=_ALL, default=6),
+    second: str | None = opt.text("NAME", "Second constant, such as 'backstop.damping'.", panel=_CHART),
+    second_from: str | None = opt.text("VALUE", "Its least value.", panel=_CHART),
+    second_to: str | None = opt.text("VALUE", "Its largest value.", panel=_CHART),
+    grid: int = opt.whole(
+        "Values of either constant at which trains from rest are judged.", panel=_CHART, default=32
+    ),
+    show: str = opt.choice("v|x|flight_time|peak_force", "What pictures show.", default="v"),
+    **passed: Any,
+) -> Answer:
+    """Follow a periodic motion, stable or not, through the values of a constant, to where it ends and why.
+
+    Ctrl-C keeps the branches that were followed by then. Ends with status 1 where there is none.
+    """
+    from printhammer.chaos.continuation import regimes as of_regimes
+    from printhammer.chaos.continuation.stability_chart import stability_chart
+
+    bounds = _both(lowest, highest, "--from", "--to", parameter)
+    if regimes and (period, rate, firings, state, second) != (None,) * 5:
+        raise InputError("--regimes: expected no --period, --rate, --firings, --state or --second beside it")
+    if regimes and parameter != "rate":
+        raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes")
+    if not regimes:
+        opt.need_one({"period": period, "rate": rate}, "--period '1.3 ms'")
+    ends = None if second is None else _both(second_from, second_to, "--second-from", "--second-to", second)
+    interrupted = False
+    try:
+        if regimes:
+            with job.counting("regimes", remaining=False) as tell:
+                result = of_regimes.regimes(
+                    hammer, bounds, longest=longest, seeds=seeds, doublings=doublings, progress=tell, **passed
+                )
+        else:
+            start = {"period": period, "rate": rate, "firings": firings, "state": state, "phase": phase}
+            result = _followed(job, hammer, parameter, bounds, doublings, **start, **passed)
+    except of_regimes.InterruptedBranches as interrupt:
+        interrupted, result = True, interrupt.branches
+    job.show(*described(result))
+    if second is not None and ends is not None and not interrupted:
+        with job.counting("curves", remaining=False) as tell:
+            chart = stability_chart(result[0], second, ends, grid=(grid, grid), progress=tell)
+        return Answer(
+            ["", escape(chart.message)],
+            files={"out": Content.of(chart)},
+        )
+    known = len(result) and second is None
+    nothing = "no branch was found; more --seeds or a larger --longest may find one"
+    return Answer(
+        files={"out": Content.of(result, show=show)} if known else {},
+        complaints=[] if len(result) or interrupted else [nothing],
+        interrupted=interrupted,
+    )
+
+
+def _both(low: str | None, high: str | None, first: str, last: str, parameter: str) -> tuple[str, str]:
+    if low is None or high is None:
+        raise InputError(f"{first if low is None else last} is missing, expected the range of {parameter}")
+    return low, high
+
+
+def _followed(
+    job: Job, hammer: Hammer, parameter: str, bounds: tuple[str, str], levels: int, **options: Any
+) -> Branches:
+    from printhammer.chaos.continuation.continuation import continuation
+    from printhammer.chaos.continuation.regimes import follow_doublings
+
+    if levels < 0:
+        raise InputError(f"doublings = {levels}, expected a whole number from 0 on")
+    with job.counting("orbits", remaining=False) as tell:
+        branch = continuation(hammer, parameter, bounds, progress=tell, **options)
+    return follow_doublings(branch, levels, most=options["most"])
+
+
+def described(result: Branches) -> list[RenderableType]:
+    """Return what branches were found, what happens on them, and why they end."""
+    parts: list[RenderableType] = []
+    for i, branch in enumerate(result):
+        parts.append(f"[bold]{i + 1}[/bold]  {escape(branch.message)}")
+        parts += [
+            f"   [green]stable[/green] from {low:.9g} to {high:.9g} {branch.unit}"
+            for low, high in branch.stable_ranges
+        ]
+        if branch.events:
+            parts.append(table(_columns(branch), branch.events))
+        parts.append("")
+    refused = [f"[yellow]not followed[/yellow] {escape(sentence)}" for sentence in result.refused]
+    return [*parts, escape(result.message), *refused]
+
+
+def _columns(branch: Branch) -> tuple[Column[Any], ...]:
+    unit = branch.unit if branch.unit != "1" else ""
+    return (
+        Column(branch.parameter, lambda event: event.value, unit=unit, format=".9g"),
+        Column("what happens", lambda event: event.message, left=True),
+        Column("multipliers", lambda event: "  ".join(multiplier(complex(m)) for m in event.multipliers)),
+        Column("", lambda event: "" if event.sharp else "between two orbits", left=True),
+    )

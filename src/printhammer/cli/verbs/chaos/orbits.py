@@ -1,0 +1,70 @@
+"""The verb `orbits`: the periodic motions of a train, stable and unstable."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.screen import Column, multiplier, table, train_line
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from printhammer.chaos.orbits.orbit import Orbit
+    from printhammer.cli.units import Units
+    from printhammer.hammer.hammer import Hammer
+
+_STYLES: Final = {"stable": "green", "saddle": "cyan", "unstable": "magenta", "undecided": "yellow"}
+_search = partial(opt.whole, panel="Search")
+
+
+def _energy(name: str, orbit: Orbit) -> float | None:
+    return None if orbit.energy is None else getattr(orbit.energy, name)
+
+
+_COLUMNS: Final[tuple[Column[Orbit], ...]] = (
+    Column("firings", lambda orbit: orbit.firings),
+    Column("kind", lambda orbit: f"[{_STYLES[orbit.kind]}]{orbit.kind}[/{_STYLES[orbit.kind]}]", left=True),
+    Column("multipliers", lambda orbit: "  ".join(map(multiplier, orbit.multipliers))),
+    Column("backstop\ncontacts", lambda orbit: orbit.backstop_contacts),
+    Column("dots", lambda orbit: orbit.printed),
+    Column("lost", lambda orbit: orbit.lost),
+    Column("coil work", partial(_energy, "coil_work"), "energy"),
+    Column("pack loss", partial(_energy, "pack_loss"), "energy"),
+    Column("backstop loss", partial(_energy, "backstop_loss"), "energy"),
+)
+
+
+@verb(
+    "orbits",
+    "printhammer orbits hendriks-1983 --period '1.05 ms' --longest 4 --out orbits.csv",
+    {
+        **opt.TRAIN,
+        "longest": _search("Most firings after which a motion repeats.", default=8),
+        "starts": _search("States from which motions are followed.", default=1024),
+        "guesses": _search("Guesses that are tried for each number of firings.", default=48),
+        "tolerance": opt.TOLERANCE,
+    },
+    out=opt.results("Orbits"),
+)
+def orbits(job: Job, hammer: Hammer = opt.FIRED, units: Units = opt.UNITS, **passed: Any) -> Answer:
+    """Search for the motions that repeat after some firings, stable or not, and tell what they do.
+
+    Ends with status 1 where none was found.
+    """
+    from printhammer.chaos.orbits.search import orbits as search
+
+    opt.need_one(passed, "--period '1.05 ms'")
+    with job.counting("orbits", remaining=False) as tell:
+        result = search(hammer, progress=tell, **passed)
+    regime = result.regime
+    shown: list[Table | str] = [table(_COLUMNS, result, units), ""] if len(result) else []
+    missing = "no periodic orbit was found; more --starts or --guesses may find one"
+    return Answer(
+        [*shown, result.message],
+        note=train_line(regime.fired.shape, regime.fired.quantity, regime.overlap, regime.period),
+        files={"out": Content.of(result)},
+        complaints=[] if len(result) else [missing],
+    )

@@ -1,0 +1,173 @@
+"""The verbs `hammer show`, `check`, `schema` and `list`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import typer
+from rich.markup import escape
+from rich.padding import Padding
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.screen import STATUS_STYLES, Column, coloured, facts, honesty, table
+from printhammer.cli.terminal import warn
+from printhammer.cli.units import Units, with_unit
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+
+    from printhammer.hammer.equilibrium import EquilibriumPicture
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.constants import Constant
+
+GROUP: Final = "Show and check hammer files."
+
+
+@verb("hammer show", "printhammer hammer show hendriks-1983")
+def show(
+    hammer: str = opt.NAMED,
+    units: Units = opt.UNITS,
+    toml: bool = opt.switch("Print the hammer file instead, to start one of your own from."),
+) -> Answer:
+    """Show every constant with its status and source, and where the armature can rest."""
+    from printhammer.hammer.equilibrium import equilibrium_picture
+    from printhammer.hammer.hammer import load
+
+    loaded = load(hammer)
+    if toml:
+        typer.echo(loaded.to_toml(), nl=False)
+        return Answer()
+    sources = list(dict.fromkeys(constant.source for constant in loaded.constants.values()))
+    picture = equilibrium_picture(loaded)
+    for warning in loaded.warnings() if picture.rest is not None else [picture.no_rest]:
+        warn(f"{loaded.path}: {warning}")
+    title = f"  {escape(loaded.title)}" if loaded.title else ""
+    note: list[RenderableType] = []
+    if loaded.note.strip():
+        words = escape(" ".join(loaded.note.split()))
+        note.append(Padding(f"[italic]{words}[/italic]", (0, 0, 1, 2)))
+    return Answer(
+        [
+            f"[bold]{escape(loaded.name)}[/bold]{title}",
+            f"[dim]{escape(loaded.path)}, fingerprint {loaded.fingerprint[:16]}[/dim]",
+            f"constants: {honesty(loaded)}\n",
+            *note,
+            constants_table(loaded, sources),
+            "\n[bold]sources[/bold]",
+            *(f"[dim]{number}  {escape(source)}[/dim]" for number, source in enumerate(sources, 1)),
+            "",
+            statics(loaded, picture, units),
+        ]
+    )
+
+
+@verb("hammer check", "printhammer hammer check hendriks-1983")
+def check(hammer: str = opt.NAMED) -> Answer:
+    """Check a hammer file: an error ends with status 2, a warning does not."""
+    from printhammer.hammer.hammer import load
+
+    loaded = load(hammer)
+    warnings = loaded.warnings()
+    for warning in warnings:
+        warn(f"{loaded.path}: {warning}")
+    count = f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}"
+    return Answer([f"{escape(hammer)}: {count if warnings else coloured(True, 'ok')}; {honesty(loaded)}"])
+
+
+@verb(
+    "hammer schema",
+    "printhammer hammer schema --out hammer.schema.json",
+    out=opt.file("Write it here instead."),
+)
+def schema(job: Job) -> Answer:
+    """Print the JSON schema of hammer files."""
+    import json
+
+    from printhammer.hammer.hammer import Hammer
+
+    text = json.dumps(Hammer.schema(), indent=2) + "\n"
+    if not job.outputs:
+        typer.echo(text, nl=False)
+    return Answer(files={"out": Content.text(lambda: text)})
+
+
+@verb("hammer list", "printhammer hammer list")
+def list_shipped() -> Answer:
+    """List the hammers that come with the program."""
+    from printhammer.hammer.hammer import load, shipped
+
+    columns: tuple[Column[str], ...] = (
+        Column("name", str, left=True),
+        Column("title", lambda name: escape(load(name).title), left=True),
+    )
+    return Answer([table(columns, shipped())])
+
+
+def constants_table(hammer: Hammer, sources: list[str]) -> Table:
+    """Return the constants, with the law of each part before its own."""
+    laws = {role: f"law {part.law}" for role, part in hammer.parts.items()}
+    if hammer.waveform is not None:
+        laws["waveform"] = f"shape {hammer.waveform.shape}"
+
+    def own(constant: Constant) -> bool:
+        return constant.unit == constant.si_unit
+
+    def status(constant: Constant) -> str:
+        style = STATUS_STYLES[constant.status]
+        return f"[{style}]{constant.status}[/{style}]"
+
+    columns: tuple[Column[Constant], ...] = (
+        Column("constant", lambda constant: constant.key.rpartition(".")[2], left=True),
+        Column("value", lambda constant: constant.value, format=".9g"),
+        Column("unit", lambda constant: escape(constant.unit), left=True),
+        Column("SI", lambda constant: "" if own(constant) else f"{constant.si:.6g}"),
+        Column("", lambda constant: "" if own(constant) else escape(constant.si_unit), left=True),
+        Column("status", status, left=True),
+        Column("source", lambda constant: f"[dim]{sources.index(constant.source) + 1}[/dim]"),
+        Column("meaning", lambda constant: f"[dim]{escape(constant.meaning)}[/dim]", left=True),
+    )
+    made = table(columns, ())
+    current = ""
+    for key, constant in hammer.constants.items():
+        section = key.rpartition(".")[0]
+        if section != current:
+            made.add_row("")
+            made.add_row(f"[bold]\\[{section}][/bold]", f"[dim]{laws.get(section, '')}[/dim]")
+            current = section
+        made.add_row(*(column.cell(constant, Units.SI) for column in columns))
+    return made
+
+
+def statics(hammer: Hammer, picture: EquilibriumPicture, units: Units) -> Table:
+    """Return rest state, equilibria, release current and holding margin."""
+    from printhammer.hammer.equilibrium import holding_margin
+
+    def force(margin: float) -> str:
+        text = with_unit(margin, "force", units)
+        return text if margin > 0.0 else f"[yellow]{text}[/yellow]"
+
+    rest = "[red]none[/red]"
+    if picture.rest is not None:
+        depth = None if hammer.position is None else hammer.position - picture.rest
+        deep = f", {with_unit(depth, 'length', units)} deep in the backstop" if depth else ""
+        rest = with_unit(picture.rest, "length", units) + deep
+    rows: list[tuple[str, str | None]] = [("rest state", rest)]
+    for point in picture.equilibria:
+        kind = coloured(point.stable, "stable" if point.stable else "unstable")
+        rate = f", {point.frequency / 1e3:.3f} kHz" if point.frequency is not None else ""
+        where = f", in the {point.surface}" if point.surface else ""
+        rows.append(("equilibrium", f"{with_unit(point.x, 'length', units)}  {kind}{rate}{where}"))
+    if hammer.magnet is not None and hammer.backstop is not None:
+        rows.append(("release current", with_unit(picture.release_current, "current", units)))
+    if hammer.magnet is not None or hammer.spring is not None:
+        places = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
+        rows += [
+            (f"held at the {name}", force(float(holding_margin(hammer, x))))
+            for name, x in places.items()
+            if x is not None
+        ]
+        x, margin = picture.weakest
+        rows.append(("held least", f"{force(margin)} at {with_unit(x, 'length', units)}"))
+    return facts(rows, "statics, no current")

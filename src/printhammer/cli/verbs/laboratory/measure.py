@@ -1,0 +1,169 @@
+"""The verb `measure`: synthetic measurements of a hammer, as a laboratory would hand them in."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from rich.markup import escape
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Job, check_new, verb
+from printhammer.cli.terminal import say
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.identify.bench.laboratory import Measurement
+
+ALL: Final = "all"
+_LISTS: Final = {"displacements": "m", "currents": "A", "peaks": "m", "speeds": "m/s"}
+_TIMES: Final = ("duration", "before")
+_SENSORS: Final = "Sensors (default: an ordinary bench)"
+_sensor = partial(opt.text, panel=_SENSORS)
+_bench = partial(opt.text, panel="Bench")
+
+
+@verb(
+    "measure",
+    "printhammer measure magnet hendriks-1983 --out magnet.csv --noise 'force=1 %' --outliers '2 %'",
+    {
+        "noise": _sensor(
+            "AMOUNT",
+            "Standard deviation, such as 'force=0.1 N', 'force=0.5 %' of full scale, or '0.2 um' for all"
+            " lengths; may be given repeatedly.",
+            many=True,
+        ),
+        "resolution": _sensor("AMOUNT", "Step of the readings, in the same form.", many=True),
+        "offset": _sensor("AMOUNT", "Reading at zero, in the same form.", many=True),
+        "sampling_rate": _sensor("RATE", "Of a record of motion (1 MHz)."),
+        "bandwidth": _sensor("RATE", "Of its sensors, first-order low-pass (200 kHz), or none."),
+        "outliers": _sensor("SHARE", "Of readings that are wrong, such as '2 %' (0)."),
+        "displacements": _bench("LIST", "Where the armature is held, '60 um, 100 um'."),
+        "currents": _bench("LIST", "Currents in the coil, '0 A, 1 A'."),
+        "peaks": _bench("LIST", "Largest indentations of the load cycles."),
+        "speeds": _bench("LIST", "Impact speeds on the backstop, '0.2 m/s, 1 m/s'."),
+        "duration": _bench("TIME", "Of the record after the firing (4 ms)."),
+        "before": _bench("TIME", "Of the record before the firing (100 us)."),
+    },
+)
+def measure(
+    job: Job,
+    kind: str = opt.argument("KIND", "magnet, spring, pack, backstop, motion, or all of them.", default=...),
+    hammer: Hammer = opt.HAMMER,
+    out: Path | None = opt.folder("Table to write, CSV; a folder for all.", metavar="FILE"),
+    exact: bool = opt.switch("Begin with sensors without any error.", panel=_SENSORS),
+    seed: int = opt.whole("Of the random numbers.", default=0),
+    force: bool = opt.FORCE,
+    **passed: Any,
+) -> Answer:
+    """Measure a hammer in a synthetic laboratory, with the errors of real sensors.
+
+    The tables are those that `printhammer fit` reads; what was done stands in their comments.
+    """
+    from printhammer.identify.bench.laboratory import measure as measured
+
+    kinds, paths = _places(kind, out, job.inputs, force)
+    bench = {name: passed.pop(name) for name in (*_LISTS, *_TIMES) if name in passed}
+    settings = _settings(kinds, {**passed, **opt.given(exact=exact or None)})
+    options = _options(kinds, bench)
+    if kind == ALL:
+        kinds = _possible(kinds, hammer)
+    tables = {
+        each: measured(each, hammer, sensor=settings[each], seed=seed, **options[each]) for each in kinds
+    }
+    if kind == ALL and out is not None:
+        from printhammer.support.outputs import make_folder
+
+        make_folder(out)
+    for each, table in tables.items():
+        table.write(paths[each])
+        job.screen.print(_described(table), soft_wrap=True)
+        job.wrote(paths[each])
+    return Answer()
+
+
+def _places(
+    kind: str, out: Path | None, inputs: list[Path], force: bool
+) -> tuple[list[str], dict[str, Path]]:
+    """Return what is to be measured, and the files to write."""
+    from printhammer.identify.bench.laboratory import KINDS
+    from printhammer.support.outputs import check_outputs
+
+    if kind not in (*KINDS, ALL):
+        raise InputError(f"KIND = {kind!r}, expected one of {', '.join((*KINDS, ALL))}")
+    if out is None:
+        what = "a folder" if kind == ALL else "a file"
+        raise InputError(f"--out is missing, expected {what} for the measurements")
+    if kind != ALL:
+        if out.suffix.lower() != ".csv":
+            raise InputError(f"--out {out}: expected a name that ends in .csv")
+        paths = {kind: out}
+        check_outputs(paths.values(), inputs)
+    else:
+        if out.exists() and not out.is_dir():
+            raise InputError(f"--out {out}: expected a folder, this is a file")
+        paths = {one: out / f"{one}.csv" for one in KINDS}
+        if out.is_dir():
+            check_outputs(paths.values(), inputs)
+    check_new(paths.values(), force=force)
+    return list(paths), paths
+
+
+def _settings(kinds: list[str], given: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the settings of the sensors of each kind; a setting must belong to one of them."""
+    from printhammer.identify.bench.laboratory import SENSORS, SI
+    from printhammer.identify.bench.sensor_settings import PARTS, applicable, by_quantity
+
+    known = {name: SI[name] for kind in kinds for name in SENSORS[kind].channels}
+    recorded = [kind for kind in kinds if SENSORS[kind].sampling_rate is not None]
+    for part in PARTS:
+        if part in given:
+            given[part] = by_quantity(given[part], part, known)
+    for name in ("sampling_rate", "bandwidth"):
+        if name in given and not recorded:
+            flag = name.replace("_", "-")
+            raise InputError(f"--{flag} {given[name]} is given with {kinds[0]}, expected it with motion only")
+    return {kind: applicable(SENSORS[kind], given) for kind in kinds}
+
+
+def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any]]:
+    """Return what is measured where, for each kind; an option must belong to one of them."""
+    from inspect import signature
+
+    from printhammer.drive.input import read_number
+    from printhammer.identify.bench.benches import BENCHES
+
+    accepted = {kind: set(signature(BENCHES[kind]).parameters) for kind in kinds}
+    options: dict[str, dict[str, Any]] = {kind: {} for kind in kinds}
+    for name, text in bench.items():
+        owners = [kind for kind in kinds if name in accepted[kind]]
+        if not owners:
+            right = ", ".join(kind for kind, make in BENCHES.items() if name in signature(make).parameters)
+            raise InputError(f"--{name} {text} is given with {kinds[0]}, expected it with {right} only")
+        value: Any = (
+            text
+            if name in _TIMES
+            else [read_number(part.strip(), _LISTS[name], f"--{name}") for part in text.split(",")]
+        )
+        for kind in owners:
+            options[kind][name] = value
+    return options
+
+
+def _possible(kinds: list[str], hammer: Hammer) -> list[str]:
+    """Return what the hammer has; say what it lacks."""
+    needed = {kind: hammer.waveform if kind == "motion" else hammer.parts.get(kind) for kind in kinds}
+    for kind, part in needed.items():
+        if part is None:
+            what = "waveform" if kind == "motion" else kind
+            say(f"{hammer.path}: the hammer has no {what}, {kind} is left out")
+    return [kind for kind, part in needed.items() if part is not None]
+
+
+def _described(table: Measurement) -> str:
+    rows = len(next(iter(table.values.values())))
+    wrong = f", {len(table.outliers)} of them wrong" if len(table.outliers) else ""
+    return f"[bold]{table.kind}[/bold]  {escape(table.comments['measured'])}: {rows} rows{wrong}"

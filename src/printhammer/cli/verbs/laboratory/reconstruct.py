@@ -1,0 +1,227 @@
+"""The verb `reconstruct`: the search for the hammer of the paper, and what is made of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
+from printhammer.errors import InputError
+
+GROUP: Final = (
+    "Search for hammers that do what the paper tells, judge them, and make tables of what was found."
+)
+EXAMPLE: Final = "printhammer reconstruct search all.jsonl --minutes 1"
+
+_WORKERS: Final = opt.bounded(1, "Processes to compute in.", default=2, metavar="N")
+_SEED: Final = opt.bounded(0, "Decides on everything random.", default=1)
+_LOG: Final = opt.argument("LOG", "Log of a search.", default=..., type=Path, is_input=True)
+_JUDGED: Final = opt.argument("JUDGED", "Log of judged candidates.", default=..., type=Path, is_input=True)
+
+
+def _written(what: str, metavar: str = "FILE") -> opt.Files:
+    return opt.Files(what, metavar, default=..., type=Path, argument=True, pictures=False)
+
+
+def _json(table: dict[str, Any]) -> str:
+    return json.dumps(table, indent=1, allow_nan=False) + "\n"
+
+
+@verb(
+    "reconstruct search",
+    EXAMPLE,
+    log=_written("JSON lines, one for each candidate; a search begun there goes on.", "LOG"),
+)
+def search(
+    job: Job,
+    aim: str = opt.choice("stated|all", "Claims that lead: stated ones alone, or shapes too.", default="all"),
+    seed: int = _SEED,
+    start_from: Path | None = opt.folder(
+        "Another search, from whose best candidates to begin too.", metavar="LOG", flag="--from"
+    ),
+    minutes: float = opt.bounded(0, "How long to search; 0: until interrupted.", default=60.0),
+    workers: int = _WORKERS,
+) -> Answer:
+    """Try candidates, led by the claims, and note every one of them; Ctrl-C loses nothing."""
+    from time import monotonic
+
+    from printhammer.cli.verbs.laboratory.workers import worker_pool
+    from printhammer.reconstruction.search.evaluation import WEIGHTS
+    from printhammer.reconstruction.search.search import Plan, starts_of
+    from printhammer.reconstruction.search.search import search as candidates
+
+    (log,) = job.outputs
+    leading: Literal["stated", "all"] = "stated" if aim == "stated" else "all"
+    plan = Plan(leading, seed, starts=() if start_from is None else starts_of(start_from, leading))
+    announce_compiling()
+    start = monotonic()
+    count: int = 0
+    best: dict[str, Any] | None = None
+    with job.telling("compiling and sampling") as say:
+
+        def tell(noted: int, least: float, row: dict[str, Any]) -> None:
+            nonlocal count, best
+            count, best = noted, row
+            panels = row["measured"].get("panels")
+            as_printed = "" if panels is None else f", {panels} panels of Fig. 11 as printed"
+            say(f"{noted} candidates, least loss {least:.3f}{as_printed}")
+
+        with worker_pool(workers) as pool:
+            for _row in candidates(plan, log, pool=pool, tell=tell):
+                if minutes and monotonic() - start > 60.0 * minutes:
+                    break
+    shown = []
+    if best is not None:
+        known = best["losses"]
+        left = ", ".join(f"{name} {known[name]:.3f}" for name in WEIGHTS[plan.aim] if known.get(name))
+        shown = [f"{count} candidates; least loss {best['total']:.4f}: {left or 'none left'}"]
+    return Answer(shown, files={"log": Content()})
+
+
+@verb(
+    "reconstruct judge",
+    "printhammer reconstruct judge all.jsonl judged.jsonl --best 20",
+    judged=_written("Log of judged candidates.", "JUDGED"),
+)
+def judge(
+    job: Job,
+    log: Path = _LOG,
+    best: int = opt.bounded(1, "Number of candidates to judge.", default=100),
+    every_claim: bool = opt.switch("Judge all claims, not the stated ones alone."),
+    workers: int = _WORKERS,
+) -> Answer:
+    """Judge the best candidates of a search by the claims themselves, at the default tolerance."""
+    from printhammer.claims import claims
+    from printhammer.cli.verbs.laboratory.workers import worker_pool
+    from printhammer.reconstruction.judging.judged import STATED
+    from printhammer.reconstruction.judging.shortlist import judge_candidates, rounded, shortlist
+    from printhammer.reconstruction.search.log import read_search
+
+    _heading, rows = read_search(log)
+    chosen = [rounded(row["constants"]) for row in shortlist(rows, best)]
+    if not chosen:
+        raise InputError(f"{log}: expected candidates that print, and there are none")
+    announce_compiling()
+    names = list(claims()) if every_claim else list(STATED)
+    (judged,) = job.outputs
+    with job.counting("judging") as count, worker_pool(workers) as pool:
+
+        def tell(done: int, of: int, _row: dict[str, Any]) -> None:
+            count(len(chosen) - of + done, len(chosen))
+
+        result = judge_candidates(chosen, judged, names=names, pool=pool, tell=tell)
+    complete = sum(all(row["verdicts"].get(name) for name in STATED) for row in result)
+    panels = max((row["panels"] or 0 for row in result), default=0)
+    return Answer(
+        [
+            (
+                f"{len(result)} candidates judged: {complete} meet all stated claims outside Fig. 11; up to"
+                f" {panels} panels of Fig. 11 as printed"
+            )
+        ],
+        files={"judged": Content()},
+    )
+
+
+@verb(
+    "reconstruct base-rates",
+    "printhammer reconstruct base-rates base_rates.json --hammers 10",
+    out=_written("JSON file to write."),
+)
+def base_rates(
+    job: Job,
+    hammers: int = opt.bounded(1, "Number of random hammers.", default=100),
+    slow: int = opt.bounded(0, "For how many of them slow claims are judged too.", default=3),
+    seed: int = _SEED,
+    workers: int = _WORKERS,
+) -> Answer:
+    """Count for how many random plausible hammers each claim holds."""
+    from printhammer.cli.verbs.laboratory.workers import worker_pool
+    from printhammer.reconstruction.judging.base_rates import base_rates as count
+
+    announce_compiling()
+    with job.counting("random hammers") as tell, worker_pool(workers) as pool:
+        table = count(hammers, seed, slow=slow, pool=pool, tell=tell)
+    return Answer(
+        [f"{name}: {entry['holds']} of {entry['measured']}" for name, entry in table["claims"].items()],
+        files={"out": Content.text(partial(_json, table))},
+    )
+
+
+@verb(
+    "reconstruct predictions",
+    "printhammer reconstruct predictions stated.jsonl judged.jsonl predictions.json",
+    out=_written("JSON file to write."),
+)
+def predictions(log: Path = _LOG, judged: Path = _JUDGED) -> Answer:
+    """Tell what hammers found on the stated claims alone say about the claims that did not lead."""
+    from printhammer.reconstruction.judging.log import read_judged
+    from printhammer.reconstruction.judging.predictions import predictions as count
+    from printhammer.reconstruction.search.log import read_search
+
+    heading, rows = read_search(log)
+    if heading["aim"] != "stated":
+        raise InputError(f"{log}: aim = {heading['aim']!r}, expected the log of a search on stated claims")
+    table = count(read_judged(judged, some=True), heading["seed"], len(rows))
+    return Answer(files={"out": Content.text(partial(_json, table))})
+
+
+@verb("reconstruct family", "printhammer reconstruct family judged.jsonl --out family")
+def family(
+    job: Job,
+    judged: list[Path] = opt.argument(
+        "JUDGED...", "Logs of judged candidates.", type=Path, is_input=True, many=True, default=...
+    ),
+    out: Path = opt.folder("Where to write.", default=Path("build/family")),
+) -> Answer:
+    """Choose clearly different hammers that do equally well, and tell which conclusions hold for all."""
+    from printhammer.reconstruction.family.family import write_family
+
+    announce_compiling()
+    members = write_family(judged, out, lambda text: job.show(f"[dim]{text}[/dim]"))
+    return Answer([f"{len(members)} hammers; [dim]wrote[/dim] {out}"])
+
+
+@verb("reconstruct ship", "printhammer reconstruct ship judged.jsonl all.jsonl --out build/hammer")
+def ship(
+    job: Job,
+    judged: Path = _JUDGED,
+    logs: list[Path] = opt.argument(
+        "LOG...", "Logs of the searches.", type=Path, is_input=True, many=True, default=...
+    ),
+    out: Path = opt.folder("Where to write.", default=Path("build/hammer")),
+    name: str = opt.text("TEXT", "Name of the hammer.", default="hendriks-1983"),
+    core_hours: float = opt.bounded(0, "Time that the searches took.", default=0.0),
+) -> Answer:
+    """Write the best judged candidate as a hammer file, and for each claim that fails the best for it."""
+    from printhammer.claims import claims
+    from printhammer.reconstruction.judging.log import read_judged
+    from printhammer.reconstruction.search.log import read_search
+    from printhammer.reconstruction.shipping import best_of, search_json, shipped_hammer
+    from printhammer.support.outputs import check_outputs, make_folder, write_file
+
+    if not math.isfinite(core_hours):
+        raise InputError(f"--core-hours = {core_hours}, expected a finite number")
+    if not name or Path(name).name != name:
+        raise InputError(f"--name = {name!r}, expected a short name of the hammer, which names its file too")
+    rows = read_judged(judged, some=True)
+    searches = [{**heading, "candidates": len(tried)} for heading, tried in map(read_search, logs)]
+    hammer = shipped_hammer(best_of(rows)["constants"], name)
+    folder = make_folder(out)
+    check_outputs([folder / f"{name}.toml", folder / "search.json"], job.inputs)
+    announce_compiling()
+    hammer.save(folder / f"{name}.toml")
+    with job.telling("judging") as say:
+
+        def tell(claim: str) -> None:
+            say(f"judging {claim.replace('_', ' ')}, {list(claims()).index(claim) + 1} of {len(claims())}")
+
+        table = search_json(hammer, rows, searches=searches, core_hours=core_hours, progress=tell)
+    write_file(folder / "search.json", _json(table))
+    job.wrote(folder / "search.json")
+    job.wrote(f"{folder / name}.toml; failing: {', '.join(table['failing']) or 'none'}")
+    return Answer()

@@ -1,0 +1,1 @@
+"""Verbs of what is printed, how well, and how to drive better."""

@@ -1,0 +1,116 @@
+"""The verb `feedback`: a drive that sees the hammer, beside the open loop."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.screen import Column, table
+from printhammer.cli.units import Units, with_unit
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rich.table import Table
+
+    from printhammer.control.feedback.comparison import Feedback
+    from printhammer.hammer.hammer import Hammer
+
+
+@verb(
+    "feedback",
+    "printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png",
+    {
+        "current": opt.text("CURRENT", "Largest current of either sign, such as '2 A'.", default="2 A"),
+        "edge": opt.text("TIME", "Time constant of the driver (the hammer's own decay)."),
+        "tolerance": opt.TOLERANCE,
+        "threads": opt.THREADS,
+    },
+    out=opt.results("Deviations"),
+    run=opt.files(
+        "Picture of one run (.svg, .png, .pdf), or its drive (.toml); may be given repeatedly.",
+        ".toml",
+        panel="The run that is shown",
+    ),
+)
+def feedback(
+    job: Job,
+    hammer: Hammer = opt.HAMMER,
+    rate: str = opt.text("RATE", "Slots per second.", default="1.6 kHz"),
+    noise: float | None = opt.number("Noise of a sample, in parts of the way to the pack (0.01)."),
+    delay: float | None = opt.quantity("s", "TIME", "Delay of the sensor ('20 us')."),
+    interval: float | None = opt.quantity("s", "TIME", "Between samples ('2 us').", positive=True),
+    step: float | None = opt.number("Quantisation, in parts of the way to the pack (1/1024)."),
+    seed: int | None = opt.whole("Of the noise (0)."),
+    supply: float = opt.number("Current of the hammer driven, in parts of the nominal one.", default=1.0),
+    travel: float | None = opt.quantity(
+        "m", "LENGTH", "By how much its pack lies farther away, such as '10 um' (0)."
+    ),
+    beside: Path | None = opt.source(
+        "Compensation table to compare with, from `printhammer tune`.", flag="--table"
+    ),
+    units: Units = opt.UNITS,
+    **passed: Any,
+) -> Answer:
+    """Drive a hammer with feedback: all patterns of eight slots, and two dots at all distances.
+
+    Ends with status 1 where a pattern is not printed within limits with feedback.
+    """
+    from printhammer.control.feedback.comparison import feedback as compared
+    from printhammer.control.feedback.estimator.sensor import PositionSensor
+    from printhammer.control.table.compensation import TableStrategy, load_table
+    from printhammer.drive.file import save_drive
+    from printhammer.drive.input import read_positive
+    from printhammer.printing.rates.perturbation import Perturbation, perturbed
+
+    if beside is not None:
+        passed["beside"] = [TableStrategy(load_table(beside), hammer)]
+    change = Perturbation(current=read_positive(supply, "1", "supply") - 1.0, travel=travel or 0.0)
+    sensor = PositionSensor(**opt.given(noise=noise, delay=delay, interval=interval, step=step, seed=seed))
+    with job.telling("tables, closed loops, comparisons"):
+        result = compared(hammer, rate, driven=perturbed(hammer, change), sensor=sensor, **passed)
+    bad, patterns = int((~result.passed[-1]).sum()), result.passed.shape[1]
+    complaint = f"{bad} of {patterns} patterns are not printed within limits with feedback"
+    return Answer(
+        [compared_ways(result, units)],
+        files={
+            "out": Content.of(result),
+            "run": Content(partial(save_drive, result.run.motion.drive), result.plot_run),
+        },
+        complaints=[complaint] if bad else [],
+    )
+
+
+def compared_ways(result: Feedback, units: Units) -> Table:
+    """Return for each way to drive how many patterns are within limits, and how far dots are off."""
+    import numpy as np
+
+    def off(row: int) -> str | None:
+        force = 100.0 * result.force[row]
+        if not np.isfinite(force).any():
+            return None
+        return f"{np.nanmin(force):+.1f} to {np.nanmax(force):+.1f} %"
+
+    def late(row: int) -> str | None:
+        times = result.arrival[row]
+        if not np.isfinite(result.force[row]).any():
+            return None
+        return " to ".join(
+            with_unit(float(end), "time", units) for end in (np.nanmin(times), np.nanmax(times))
+        )
+
+    columns: tuple[Column[int], ...] = (
+        Column("", lambda row: result.strategies[row], left=True),
+        Column(
+            "patterns within limits",
+            lambda row: f"{int(result.passed[row].sum())} of {result.passed.shape[1]}",
+        ),
+        Column("force off", off),
+        Column("arrival off", late),
+        Column("lost", lambda row: int(result.lost[row])),
+        Column("extra", lambda row: int(result.extra_contacts[row])),
+        Column("peak current", lambda row: float(result.peak_current[row]), "current"),
+    )
+    return table(columns, range(len(result.strategies)), units)

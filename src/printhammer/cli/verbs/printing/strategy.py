@@ -1,0 +1,45 @@
+"""Ways to drive a hammer that verbs offer beside the open loop: a compensation table, or feedback."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.cli import options as opt
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from printhammer.cli.runner import Job
+    from printhammer.control.table.compensation import CompensationTable
+    from printhammer.hammer.hammer import Hammer
+
+TABLE: Final = opt.source("Compensation table to drive by (.csv, .json), from `printhammer tune`.")
+FEEDBACK: Final = opt.switch("Drive with feedback, see `printhammer feedback`; takes a while.")
+
+
+def chosen_strategy(
+    job: Job, hammer: Hammer, table: Path | None, feedback: bool
+) -> tuple[dict[str, Any], CompensationTable | None]:
+    """Return the argument `strategy` of what prints, empty for an open loop, and the table if there is one.
+
+    Raises
+    ------
+    InputError
+        Table and feedback are asked for at once, or the table cannot be used for this hammer.
+    """
+    if feedback and table is not None:
+        raise InputError(f"--table {table} and --feedback: expected one of them")
+    if table is not None:
+        from printhammer.control.table.compensation import load_table
+
+        loaded = load_table(table)
+        return {"strategy": loaded.strategy(hammer)}, loaded
+    if not feedback:
+        return {}, None
+    from printhammer.control.feedback.comparison import FeedbackStrategy
+    from printhammer.control.feedback.controller import Controller
+    from printhammer.control.feedback.driver import driver_of
+
+    with job.telling("tables of the controller"):
+        return {"strategy": FeedbackStrategy(Controller(hammer, driver_of(hammer)))}, None

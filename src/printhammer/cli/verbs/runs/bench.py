@@ -1,0 +1,74 @@
+"""The verb `bench`: this machine's figures, beside those of the solvers that are installed on it."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
+from printhammer.cli.screen import Column, table
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from printhammer.bench.report import Report, Rows
+
+
+@verb(
+    "bench",
+    "printhammer bench --quick --json build/bench.json",
+    json=opt.file("Write the figures as JSON."),
+    markdown=opt.file("Write the tables as Markdown."),
+)
+def bench(
+    job: Job,
+    quick: bool = opt.switch("Short runs, one round: to see that everything works."),
+    threads: int | None = opt.whole("Largest number of threads of ensembles (2)."),
+) -> Answer:
+    """Measure speed and error against other solvers, one run at a time and in ensembles."""
+    from printhammer import bench as benchmark
+
+    announce_compiling()
+    with job.telling() as say:
+        report = benchmark.run(quick=quick, threads=threads, say=say)
+    return Answer(
+        described(report),
+        files={"json": Content.text(report.to_json), "markdown": Content.text(report.to_markdown)},
+    )
+
+
+def described(report: Report) -> list[RenderableType]:
+    """Return the tables of a report, and what they say of this machine."""
+    from printhammer.bench.report import FRAME_HEADS, MASS_HEADS, SOLVER_HEADS
+
+    machine = ", ".join(f"{name} {value}" for name, value in report.machine.items())
+    shown: list[RenderableType] = [f"[dim]{escape(machine)}[/dim]\n"]
+    for title, ensembles in (("One run at a time", False), ("Ensembles, one thread", True)):
+        shown += _table(title, SOLVER_HEADS, report.solvers(ensembles=ensembles))
+        shown.append(escape(report.least_lead(ensembles=ensembles)) + "\n")
+    shown += [f"[yellow]absent[/yellow] {escape(n)}: {escape(why)}" for n, why in report.absent.items()]
+    figures = report.figures
+    title = (
+        f"Figure 9: {figures.rates} rates x {figures.pulses} pulses, {figures.times} times, errors in strokes"
+    )
+    return [
+        *shown,
+        *_table(title, FRAME_HEADS, report.frames()),
+        *map(escape, report.frame_sentences()),
+        *(f"compiling, {engine} engine: {seconds:.0f} s" for engine, seconds in report.compiling.items()),
+        *_table("\nLong trains", MASS_HEADS, report.masses()),
+        *_table("Growth with members", MASS_HEADS, report.growth()),
+    ]
+
+
+def _cell(column: int, row: tuple[str, ...]) -> str:
+    return escape(row[column])
+
+
+def _table(title: str, heads: tuple[str, ...], rows: Rows) -> list[RenderableType]:
+    text = {"solver", "engine", "ours as exact"}
+    columns = [Column(escape(head), partial(_cell, k), left=head in text) for k, head in enumerate(heads)]
+    return [table(columns, rows, title=title), ""]

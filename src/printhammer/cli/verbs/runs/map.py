@@ -1,0 +1,182 @@
+"""The verb `map`: displacement against time and firing rate, computed, or beside a measured one."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import PICTURES, Answer, Content, Job, check_new, verb
+from printhammer.cli.screen import facts
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+_BURST: Final = "Bursts"
+_FEW: Final = 6
+_count = partial(opt.whole, panel=_BURST)
+
+
+@verb(
+    "map",
+    "printhammer map hendriks-1983 --from '500 Hz' --to '2 kHz' --rates 64 --times 256",
+    {
+        "pulses": _count("Firings at each rate.", default=9),
+        "overlap": opt.overlapping(_BURST),
+        "tolerance": opt.TOLERANCE,
+        "threads": opt.THREADS,
+    },
+    out=opt.results("Data"),
+)
+def map_(
+    job: Job,
+    hammer: Hammer = opt.FIRED,
+    lowest: float | None = opt.quantity(
+        "Hz", "RATE", "Lowest rate (500 Hz).", flag="--from", panel=_BURST, positive=True
+    ),
+    highest: float | None = opt.quantity(
+        "Hz", "RATE", "Highest rate (2 kHz).", flag="--to", panel=_BURST, positive=True
+    ),
+    rates: int | None = _count("Number of rates (512)."),
+    times: int | None = _count("Number of times (512)."),
+    measured: Path | None = opt.source(
+        "Displacement records to compare with, CSV or NetCDF; rates and times are then theirs unless given."
+    ),
+    figure: str | None = opt.choice("8|9", "Which figure of the paper a picture is like (9)."),
+    force: bool = opt.FORCE,
+    **passed: Any,
+) -> Answer:
+    """Fire bursts at many rates and map the displacement against time and rate, as Figs. 8 and 9.
+
+    Ends with status 1 where a run stopped before its end; its rate is named.
+    """
+    from printhammer.maps.frequency import frequency_map
+    from printhammer.maps.measured import load_measured_map
+    from printhammer.results.files import save_dataset
+
+    check_new(job.outputs, force=force)
+    drawn = _number_of(figure, job.outputs, measured)
+    beside = None if measured is None else load_measured_map(measured)
+    grid, moments = _axes(beside, lowest, highest, rates, times)
+    with job.counting("rates") as tell:
+        chart = frequency_map(hammer, grid, times=moments, progress=tell, **passed)
+    return Answer(
+        [facts(summary(chart, beside, job.seconds))],
+        files={"out": Content(partial(save_dataset, chart), partial(_drawn, hammer, chart, beside, drawn))},
+        complaints=_complaints(chart),
+    )
+
+
+def _number_of(figure: str | None, outputs: list[Path], measured: Path | None) -> int:
+    """Return the number of the figure that is drawn."""
+    if figure is None:
+        return 9
+    if not any(path.suffix.lower() in PICTURES for path in outputs):
+        raise InputError(f"--figure {figure}: expected a picture among the files of --out")
+    if measured is not None:
+        raise InputError(
+            f"--figure {figure} is given beside --measured {measured}, expected one or the other"
+        )
+    return int(figure)
+
+
+def _axes(
+    beside: xr.Dataset | None, low: float | None, high: float | None, rates: int | None, times: int | None
+) -> tuple[FloatArray, FloatArray | int]:
+    """Return the rates, Hz, and the times, s, or their number; those of a measured map unless given."""
+    import numpy as np
+
+    from printhammer.maps.frequency import HIGHEST, LOWEST, MOST_CELLS, RATES, TIMES
+
+    moments: FloatArray | int = TIMES if times is None else times
+    if beside is not None and times is None:
+        known = beside["time"].values
+        moments = known[known >= 0.0]
+        if len(moments) < 2:
+            raise InputError(
+                f"--measured {beside.attrs['source']}: {len(moments)} times from the first firing on,"
+                " expected at least 2"
+            )
+    if beside is not None and low is None and high is None and rates is None:
+        return beside["rate"].values, moments
+    low, high = LOWEST if low is None else low, HIGHEST if high is None else high
+    count = RATES if rates is None else rates
+    if not 1 <= count <= MOST_CELLS:
+        raise InputError(f"--rates {count}: expected a whole number from 1 to {MOST_CELLS}")
+    if high < low or (high == low and count > 1):
+        raise InputError(
+            f"--from {low:.9g} Hz and --to {high:.9g} Hz: expected the second to be the higher one"
+        )
+    return np.linspace(low, high, count), moments
+
+
+def summary(chart: xr.Dataset, beside: xr.Dataset | None, seconds: float) -> list[tuple[str, str | None]]:
+    """Return what was computed: size, dots, the first lost one, the difference from a measured map."""
+    import numpy as np
+
+    rates, time = chart["rate"].values, chart["time"].values
+    fired = np.isfinite(chart["fired_at"].values)
+    lost = fired & ~chart["struck"].values
+    dots = f"{int(fired.sum())} fired, {int((fired & ~lost).sum())} struck, {int(lost.sum())} lost"
+    if lost.any():
+        row = int(np.argmax(lost.any(axis=1)))
+        dots += f"; the first at {rates[row]:.6g} Hz, firing {int(np.argmax(lost[row])) + 1}"
+    failed = int((chart["status"].values != 0).sum())
+    return [
+        (
+            "map",
+            (
+                f"{rates.size} rates from {rates[0]:g} to {rates[-1]:g} Hz, {chart.attrs['pulses']} pulses,"
+                f" {time.size} times up to {1e3 * float(time[-1]):.4g} ms; computed in {seconds:.2g} s"
+            ),
+        ),
+        ("dots", dots),
+        ("status", f"{failed} of {rates.size} runs did not reach their end" if failed else "ok"),
+        ("measured", None if beside is None else _difference(chart, beside)),
+    ]
+
+
+def _difference(chart: xr.Dataset, beside: xr.Dataset) -> str:
+    import numpy as np
+
+    from printhammer.maps.frequency import rms_difference
+
+    both, difference = rms_difference(chart, beside)
+    known = difference[np.isfinite(difference)]
+    said = "not known, no rate is in both maps"
+    if known.size:
+        said = (
+            f"RMS {1e6 * float(np.median(known)):.3g} µm (median of {known.size} rates),"
+            f" {1e6 * float(known.max()):.3g} µm at {both[np.nanargmax(difference)]:.6g} Hz"
+        )
+    return f"{beside['rate'].size} rates; difference {said}"
+
+
+def _complaints(chart: xr.Dataset) -> list[str]:
+    """Name the runs that did not reach their end."""
+    from printhammer.maps.layout import failed_rates
+
+    complaints = []
+    for status, rates in failed_rates(chart).items():
+        named = ", ".join(f"{rate:.6g} Hz" for rate in rates[:_FEW])
+        more = f" and {len(rates) - _FEW} more" if len(rates) > _FEW else ""
+        count = f"{len(rates)} of {chart['rate'].size}"
+        complaints.append(f"{status}: {count} runs did not reach their end, at {named}{more}")
+    return complaints
+
+
+def _drawn(hammer: Hammer, chart: xr.Dataset, beside: xr.Dataset | None, number: int) -> Figure:
+    from printhammer.figures import FIGURES
+
+    if beside is None:
+        return FIGURES[number].draw(hammer, chart=chart)
+    from printhammer.figures.map_comparison import compare_maps
+
+    return compare_maps(chart, beside)

@@ -1,0 +1,51 @@
+"""The verb `paper`: every figure and claim of the paper, in one report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from rich.markup import escape
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Job, verb
+from printhammer.cli.screen import Column, table
+
+if TYPE_CHECKING:
+    from printhammer.hammer.hammer import Hammer
+
+_STYLES: Final = {"holds": "green", "fails": "red", "not yet": "yellow"}
+
+
+def _verdict(verdict: str, said: object) -> str:
+    return f"[{_STYLES[verdict]}]{said}[/{_STYLES[verdict]}]"
+
+
+_COLUMNS: Final[tuple[Column[Any], ...]] = (
+    Column("claim", lambda result: result.claim.name, left=True),
+    Column("kind", lambda result: result.claim.kind, left=True),
+    Column("verdict", lambda result: _verdict(result.verdict, result.verdict), left=True),
+    Column("measured", lambda result: escape(result.detail), left=True),
+)
+
+
+@verb("paper", "printhammer paper hendriks-1983 --out build/paper")
+def paper(
+    job: Job,
+    hammer: Hammer = opt.HAMMER,
+    out: Path = opt.folder("Where to write the report.", default=Path("build/paper")),
+    pdf: bool = opt.switch("Write the report as report.pdf too."),
+    strict: bool = opt.switch("End with status 1 if a claim fails."),
+) -> Answer:
+    """Draw the figures, judge the claims, and write one HTML report, the figures and claims.json."""
+    from printhammer.report import write_report
+
+    with job.telling() as say:
+        report = write_report(hammer, out, progress=say, pdf=pdf)
+    counts = ", ".join(_verdict(verdict, f"{report.count(verdict)} {verdict}") for verdict in _STYLES)
+    job.show(table(_COLUMNS, report.results), "", f"{len(report.results)} claims: {counts}")
+    reports = [path for path in report.files if path.parent == out]
+    for path in reports:
+        job.wrote(path)
+    job.wrote(f"{out / 'figures'}, {len(report.files) - len(reports)} files")
+    return Answer(failed=strict and report.count("fails") > 0)

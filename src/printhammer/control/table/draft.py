@@ -1,0 +1,198 @@
+"""A compensation table in the making, and how far off the last dots of patterns are with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.control.table.compensation import CompensationTable
+from printhammer.control.table.drive import COLUMNS, Settings, pulses_of, sequence
+from printhammer.control.table.histories import (
+    REST,
+    entries_of,
+    histories,
+    histories_of,
+    number_of,
+    pattern_of,
+    plain,
+    shared_numbers,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.control.table.histories import History
+    from printhammer.control.table.task import Task
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.support.arrays import FloatArray
+
+    Cells = Sequence[tuple[int, History]]
+    """Entries by row and history."""
+
+    IntArray = npt.NDArray[np.int64]
+
+VALUES: Final = (*COLUMNS, "deviation")
+"""Names of the arrays of a table."""
+
+# Length of the row of dots in every slot before a history, where it has to be right in long patterns too
+_DENSE: Final = 6
+
+
+@dataclass(frozen=True)
+class Draft:
+    """What is known of a table so far: `values` of shape (5, rates, entries), named by `VALUES`."""
+
+    task: Task
+    rates: FloatArray
+    values: FloatArray
+
+    @property
+    def timing(self) -> FloatArray:
+        """Advance and width of all entries, s, shape (2, rates, entries); a view."""
+        return self.values[:2]
+
+    @property
+    def brakes(self) -> FloatArray:
+        """Delay and width of the brake pulses, s, shape (2, rates, entries); a view."""
+        return self.values[2:4]
+
+    @property
+    def deviation(self) -> FloatArray:
+        """How far off the entries are, in parts of the limits, shape (rates, entries); a view."""
+        return np.asarray(self.values[4])
+
+    @property
+    def worst(self) -> FloatArray:
+        """Largest deviation at each rate, shape (rates,)."""
+        return np.asarray(self.deviation.max(axis=1))
+
+    def rows(self, which: IntArray) -> Draft:
+        """Return some rows, as a copy."""
+        return Draft(self.task, self.rates[which], self.values[:, which])
+
+    def table(self) -> CompensationTable:
+        """Return this as a table.
+
+        Raises
+        ------
+        InputError
+            The values make no table.
+        """
+        task = self.task
+        shared = shared_numbers(task.gaps, task.reach)
+        return CompensationTable(
+            hammer=task.hammers[0].name,
+            fingerprint=task.hammers[0].fingerprint,
+            rates=self.rates,
+            gaps=task.gaps,
+            reach=task.reach,
+            largest_current=task.largest,
+            **dict(zip(VALUES, self.values[:, :, shared], strict=True)),
+        )
+
+    def places(self, cells: Cells) -> tuple[IntArray, IntArray]:
+        """Return rows and columns of some entries."""
+        columns = [number_of(history, self.task.reach) for _row, history in cells]
+        return np.array([row for row, _history in cells]), np.array(columns)
+
+    def judge(self, level: Sequence[History] | None = None) -> None:
+        """Put down how far off histories are at all rates; by default all of them."""
+        task = self.task
+        levels = [level] if level is not None else [level_of(task, n) for n in range(1, task.gaps + 1)]
+        for some in levels:
+            cells = [(row, history) for row in range(self.rates.size) for history in some]
+            places = self.places(cells)
+            off = self.last_dots(cells, self.timing[:, *places].T, np.zeros((1, 2)), whole=True)
+            size = off.max(axis=(1, 2))
+            self.deviation[places] = np.where(np.isnan(size), np.inf, size)
+
+    def last_dots(
+        self,
+        cells: Cells,
+        values: FloatArray,
+        shifts: FloatArray,
+        *,
+        dense: bool = True,
+        whole: bool = False,
+    ) -> FloatArray:
+        """Return deviations of force and arrival of last dots of patterns, in parts of the limits.
+
+        Parameters
+        ----------
+        cells : sequence of tuple
+            The entries.
+        values : array, shape (cells, 2)
+            Advance and width of the last dot, s.
+        shifts : array, shape (shifts, 2)
+            Changes of these to be tried, s.
+        dense : bool, optional
+            Whether to take several patterns for each entry, as `befores` says.
+        whole : bool, optional
+            Whether to return the largest deviations of all dots of a pattern that have the history instead.
+
+        Returns
+        -------
+        array, shape (cells, shifts, deviations)
+            Over hammers, patterns, force and arrival; NaN for a lost dot or a pattern with extra contacts.
+            Where an entry has fewer patterns than others, its first one is repeated.
+        """
+        task = self.task
+        gaps = [befores(history, task.reach) if dense else [()] for _row, history in cells]
+        most = max(map(len, gaps))
+        drives: list[Drive] = []
+        due: list[FloatArray] = []
+        alike: list[npt.NDArray[np.bool_]] = []
+        known: dict[tuple[float, float, float], Waveform] = {}
+        for (row, history), value, before in zip(cells, values, gaps, strict=True):
+            settings, rate = Settings(*self.values[:4, row]), float(self.rates[row])
+            patterns = [pattern_of(plain(history), more) for more in before]
+            patterns += [patterns[0]] * (most - len(patterns))
+            for shift in shifts:
+                for slots in patterns:
+                    pulses = pulses_of(settings, task.gaps, task.reach, slots, rate)
+                    advance, pulses.width[-1] = value + shift
+                    pulses.fired[-1] = pulses.due[-1] - advance
+                    pulses.offset[-1] += advance - pulses.advance[-1]
+                    drives.append(sequence(pulses, task.pulse, known))
+                    due.append(pulses.due)
+                    numbers = histories_of(slots, task.gaps, task.reach)[:-1]
+                    alike.append(numbers == numbers[-1])
+        ends = np.array([times[-1] for times in due]) + task.single.nominal.flight_time
+        slots_of_all = np.full((len(drives), max(map(len, due))), np.nan)
+        asked = np.zeros(slots_of_all.shape, np.bool_)
+        for place, (times, same) in enumerate(zip(due, alike, strict=True)):
+            slots_of_all[place, : len(times)] = times
+            asked[place, : len(times)] = same
+        last = np.arange(len(drives)), [len(times) - 1 for times in due]
+        found = []
+        for hammer in task.hammers:
+            off, crowded = task.deviations(hammer, drives, slots_of_all, ends)
+            off = np.where(asked[:, :, np.newaxis], np.abs(off), 0.0).max(axis=1) if whole else off[last]
+            off[crowded.any(axis=1)] = np.nan
+            found.append(off.reshape(len(cells), len(shifts), most, 2))
+        return np.concatenate(found, axis=2).reshape(len(cells), len(shifts), -1)
+
+
+def blank(task: Task, rates: FloatArray) -> Draft:
+    """Return a draft of zeros."""
+    return Draft(task, rates, np.zeros((len(VALUES), rates.size, entries_of(task.gaps, task.reach))))
+
+
+def level_of(task: Task, known: int) -> list[History]:
+    """List the histories that hold a number of gaps before they are rest."""
+    every = histories(task.gaps, task.reach)
+    return [history for history in every if task.gaps - history.count(REST) == known]
+
+
+def befores(history: History, reach: int) -> list[tuple[int, ...]]:
+    """Return gaps before a history: none, and those of patterns that it comes late in."""
+    late = (reach + 1,)
+    if REST in history:
+        return [(), late]
+    row = (1,) * _DENSE
+    return [(), late, (*row, reach), (*row, *late), (reach, 1, reach, 1)]

@@ -1,0 +1,326 @@
+"""Compensation tables as text: CSV and JSON, which are read back, and a C header for the firmware.
+
+The formats are described in docs/howto/tables.md. Times are in seconds with all their digits, so that what is
+read back is the same table to the last bit; in the C header they are whole nanoseconds.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.control.table.drive import COLUMNS
+from printhammer.control.table.histories import (
+    REST,
+    checked_size,
+    entries_of,
+    gap_text,
+    histories,
+    history_text,
+    number_of,
+    plain,
+    shared_numbers,
+)
+from printhammer.errors import InputError
+from printhammer.support.constants import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from printhammer.support.arrays import FloatArray
+
+    Head = dict[str, Any]
+    Rows = list[dict[str, Any]]
+
+FORMAT: Final = 1
+"""Version of the CSV format, and of the JSON files of former versions."""
+
+KIND: Final = "printhammer compensation table"
+"""What the first line of a CSV file says."""
+
+NANOSECOND: Final = 1e-9
+"""Unit of the times in a C header, s."""
+
+DEVIATION: Final = "deviation"
+"""Name of the array that is no time."""
+
+HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "largest_current": float}
+"""What a file says of the whole table."""
+
+_FIRST: Final = f"# {KIND}, format {FORMAT}"
+_UNITS: Final = {"rate": "Hz", **dict.fromkeys(COLUMNS, "s")}
+_ATTRIBUTE: Final = re.compile(r"# \w+: ")  # A line of provenance in a CSV file
+
+
+def columns(gaps: int) -> list[str]:
+    """Return the heading of a CSV file."""
+    times = [f"{name} [s]" for name in COLUMNS]
+    return ["rate [Hz]", *[f"gap {number}" for number in range(1, gaps + 1)], *times, DEVIATION]
+
+
+def csv_head(head: Mapping[str, Any]) -> str:
+    """Return the first lines of a CSV file: what it is, and what it is about."""
+    lines = [_FIRST, *(f"# {key} = {json.dumps(head[key], ensure_ascii=False)}" for key in HEAD)]
+    return "\n".join(lines) + "\n"
+
+
+def read_table(text: str, suffix: str) -> dict[str, Any]:
+    """Read the text of a table, as the arguments of a `CompensationTable`; `suffix` is ".csv" or ".json".
+
+    Raises
+    ------
+    InputError
+        It is no such table; the sentence names key, value and what was expected.
+    """
+    head, rows = _of_json(text) if suffix == ".json" else _of_csv(text)
+    return _built(head, rows)
+
+
+def _of_csv(text: str) -> tuple[Head, Rows]:
+    """Read head and rows of a CSV file."""
+    lines = text.splitlines()
+    if not lines or lines[0].strip() != _FIRST:
+        first = shown(lines[0] if lines else "")
+        raise InputError(f"first line = {first}, expected {_FIRST!r}")
+    head: Head = {}
+    body = []
+    for line in lines[1:]:
+        if not line.startswith("#"):
+            body.append(line)
+            continue
+        if _ATTRIBUTE.match(line):
+            continue
+        key, mark, value = line[1:].partition("=")
+        if not mark:
+            raise InputError(f"{shown(line)}: expected '# key = value'")
+        if key.strip() in head:
+            raise InputError(f"{key.strip()} is given twice, expected once")
+        try:
+            head[key.strip()] = json.loads(value)
+        except ValueError:
+            raise InputError(f"{key.strip()} = {shown(value.strip())}: expected a text or a number") from None
+    _check_head(head)
+    gaps, wanted = head["gaps"], columns(head["gaps"])
+    table = [row for row in csv.reader(body) if row]
+    if not table or table[0] != wanted:
+        raise InputError(
+            f"columns = {shown(','.join(table[0]) if table else '')}, expected {','.join(wanted)}"
+        )
+    rows = []
+    for number, cells in enumerate(table[1:], 1):
+        if len(cells) != len(wanted):
+            raise InputError(f"row {number}: {len(cells)} cells, expected {len(wanted)}")
+        texts = {"rate": cells[0], **dict(zip((*COLUMNS, DEVIATION), cells[1 + gaps :], strict=True))}
+        values = {
+            name: _csv_number(cell, f"row {number}: {name}") if cell or name != DEVIATION else None
+            for name, cell in texts.items()
+        }
+        rows.append({"gaps": cells[1 : 1 + gaps], **values})
+    return head, rows
+
+
+def _csv_number(text: str, where: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{where} = {shown(text)}, expected a number") from None
+
+
+def _of_json(text: str) -> tuple[Head, Rows]:
+    """Read head and rows of a JSON file: as results are written, or as tables were by former versions."""
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"expected JSON ({' '.join(str(error).split())})") from None
+    if isinstance(data, dict) and isinstance(data.get("columns"), dict):
+        head = {key: data[key] for key in HEAD if key in data}
+        head |= {"fingerprint": data["hammer_fingerprint"]} if "hammer_fingerprint" in data else {}
+        _check_head(head)
+        entries: Any = _entries(data["columns"])
+    else:
+        if not isinstance(data, dict) or data.get("kind") != KIND:
+            raise InputError(
+                f"kind = {shown(data.get('kind') if isinstance(data, dict) else data)}, expected {KIND!r}"
+            )
+        if data.get("format") != FORMAT or isinstance(data["format"], bool):
+            raise InputError(f"format = {shown(data.get('format'))}, expected {FORMAT}")
+        if data.get("units") != _UNITS:
+            raise InputError(f"units = {shown(data.get('units'))}, expected {json.dumps(_UNITS)}")
+        head = {key: data[key] for key in data if key not in ("kind", "format", "units", "entries")}
+        _check_head(head)
+        entries = data.get("entries")
+    if not isinstance(entries, list):
+        raise InputError(f"entries = {shown(entries)}, expected a list")
+    for number, entry in enumerate(entries, 1):
+        where = f"entry {number}"
+        if not isinstance(entry, dict):
+            raise InputError(f"{where} = {shown(entry)}, expected an object")
+        _check_keys(entry, ["rate", "gaps", *COLUMNS, DEVIATION], f"{where}: ")
+        for name in ("rate", *COLUMNS, DEVIATION):
+            if entry[name] is None and name == DEVIATION:
+                continue
+            if isinstance(entry[name], bool) or not isinstance(entry[name], int | float):
+                raise InputError(f"{where}: {name} = {shown(entry[name])}, expected a number")
+    return head, entries
+
+
+def _entries(arrays: Mapping[str, Any]) -> Rows:
+    """Return the entries of a JSON file that holds arrays over rates and histories."""
+    wanted = ("rate", "history", *COLUMNS, DEVIATION)
+    _check_keys(arrays, wanted, "columns: ")
+    for name in wanted:
+        if not isinstance(arrays[name], dict) or not isinstance(arrays[name].get("values"), list):
+            raise InputError(f"columns: {name} = {shown(arrays[name])}, expected an array with its values")
+    rates, texts = arrays["rate"]["values"], arrays["history"]["values"]
+    values = {name: arrays[name]["values"] for name in (*COLUMNS, DEVIATION)}
+    for name, table in values.items():
+        if [len(row) if isinstance(row, list) else None for row in table] != [len(texts)] * len(rates):
+            raise InputError(f"columns: {name}: expected {len(rates)} rows of {len(texts)} numbers")
+    return [
+        {"rate": rate, "gaps": str(text).split("-"), **{name: values[name][i][j] for name in values}}
+        for i, rate in enumerate(rates)
+        for j, text in enumerate(texts)
+    ]
+
+
+def _check_head(head: Mapping[str, Any]) -> None:
+    _check_keys(head, list(HEAD), "")
+    for key, kind in HEAD.items():
+        value = head[key]
+        good = isinstance(value, int | float) if kind is float else isinstance(value, kind)
+        if isinstance(value, bool) or not good:
+            expected = {str: "a text", int: "a whole number", float: "a number"}[kind]
+            raise InputError(f"{key} = {shown(value)}, expected {expected}")
+    checked_size(head["gaps"], head["reach"])
+    if not 0.0 < head["largest_current"] < np.inf:
+        raise InputError(f"largest_current = {head['largest_current']!r} A, expected a positive number")
+
+
+def _check_keys(given: Mapping[str, Any], wanted: Sequence[str], where: str) -> None:
+    for key in given:
+        if key not in wanted:
+            raise InputError(f"{where}{shown(key)} is not known, expected one of {', '.join(wanted)}")
+    for key in wanted:
+        if key not in given:
+            raise InputError(f"{where}{key} is missing")
+
+
+def _built(head: Head, rows: Rows) -> dict[str, Any]:
+    """Put the rows where they belong, each history at each rate exactly once."""
+    gaps, reach = head["gaps"], head["reach"]
+    for number, row in enumerate(rows, 1):
+        if not (np.isfinite(row["rate"]) and row["rate"] > 0.0):
+            raise InputError(f"row {number}: rate = {row['rate']!r} Hz, expected a positive number")
+    rates = np.unique([float(row["rate"]) for row in rows])
+    if not rates.size:
+        raise InputError("the table has no rows, expected one for each history")
+    shape = rates.size, entries_of(gaps, reach)
+    arrays = {name: np.full(shape, np.nan) for name in (*COLUMNS, DEVIATION)}
+    filled = np.zeros(shape, np.bool_)
+    for number, row in enumerate(rows, 1):
+        history = _history(row["gaps"], gaps, reach, f"row {number}: ")
+        place = int(np.searchsorted(rates, row["rate"])), number_of(history, reach)
+        if filled[place]:
+            raise InputError(f"row {number}: the history {history_text(history)} is given twice")
+        filled[place] = True
+        for name, values in arrays.items():
+            values[place] = np.nan if row[name] is None else row[name]
+    for history in histories(gaps, reach):
+        lacking = ~filled[:, number_of(history, reach)]
+        if lacking.any():
+            raise InputError(
+                f"the history {history_text(history)} at {rates[lacking][0]:g} Hz is missing, expected a row"
+                " for it"
+            )
+    shared = shared_numbers(gaps, reach)
+    given = {**head, "largest_current": float(head["largest_current"])}
+    return {**given, "rates": rates, **{name: values[:, shared] for name, values in arrays.items()}}
+
+
+def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
+    if not isinstance(texts, list) or len(texts) != gaps:
+        raise InputError(f"{where}gaps = {shown(texts)}, expected {gaps} of them")
+    known = {gap_text(gap): gap for gap in range(REST, reach + 1)}
+    for text in texts:
+        if not isinstance(text, str) or text not in known:
+            raise InputError(
+                f"{where}gap = {shown(text)}, expected 'rest' or a whole number from 1 to {reach}"
+            )
+    found = tuple(known[text] for text in texts)
+    if found != plain(found):
+        raise InputError(f"{where}gaps = {'-'.join(texts)}, expected only rest after a rest")
+    return found
+
+
+def header_text(head: Mapping[str, Any], rates: FloatArray, times: Mapping[str, FloatArray]) -> str:
+    """Return a C header (C99) with the table as whole nanoseconds and a function for the number of a history.
+
+    Every number of a history is there, so that the firmware needs no search.
+
+    Parameters
+    ----------
+    head : mapping
+        What is said of the whole table, see `HEAD`.
+    rates : array, shape (R,)
+        Slots per second, Hz.
+    times : mapping
+        Arrays (R, entries) by name, s.
+    """
+    gaps, reach = head["gaps"], head["reach"]
+    prefix = re.sub(r"\W+", "_", f"printhammer_{head['hammer']}", flags=re.ASCII).lower()
+    guard, upper = f"{prefix}_table_h".upper(), prefix.upper()
+    entries, fingerprint = entries_of(gaps, reach), re.sub(r"[^0-9a-zA-Z]", "", head["fingerprint"])
+    name = head["hammer"].encode("ascii", "replace").decode().replace("*/", "* /").replace("\\", "/")
+    name = "".join(letter if letter.isprintable() else " " for letter in name)
+    arrays = ""
+    for column, values in times.items():
+        rows = "\n".join(f"  {{\n{_numbers(row)}\n  }}," for row in np.rint(values / NANOSECOND))
+        arrays += f"\nstatic const int32_t {prefix}_{column}[{rates.size}][{entries}] = {{\n{rows}\n}};\n"
+    return f"""\
+#ifndef {guard}
+#define {guard}
+
+/* Compensation table for the hammer {name},
+   fingerprint {fingerprint}.
+   Times are in nanoseconds. [rate][history]; a history is the gaps in slots to the dots before,
+   the latest first, 0 (rest) where a gap is longer than REACH. A dot is fired `advance` before its
+   slot with a pulse of `width`; a brake pulse of `brake_width`, where not 0, comes `brake_delay`
+   after the slot of the dot before. */
+
+#include <stdint.h>
+
+#define {upper}_RATES {rates.size}
+#define {upper}_GAPS {gaps}
+#define {upper}_REACH {reach}
+#define {upper}_HISTORIES {entries}
+#define {upper}_FINGERPRINT "{fingerprint}"
+
+/* Slots per second, in millihertz. */
+static const uint32_t {prefix}_rate[{rates.size}] = {{
+{_numbers(np.rint(1e3 * rates))}
+}};
+{arrays}
+/* Number of a history; what lies before a rest does not count. */
+static inline unsigned {prefix}_history(const unsigned *gaps)
+{{
+  unsigned number = 0, rested = 0;
+  for (unsigned i = 0; i < {gaps}u; i++) {{
+    unsigned gap = gaps[i] > {reach}u ? 0u : gaps[i];
+    rested |= gap == 0u;
+    number = number * {reach + 1}u + (rested ? 0u : gap);
+  }}
+  return number;
+}}
+
+#endif
+"""
+
+
+def _numbers(values: FloatArray) -> str:
+    """Write whole numbers, ten a line."""
+    texts = [str(int(value)) for value in values]
+    return ",\n".join("    " + ", ".join(texts[at : at + 10]) for at in range(0, len(texts), 10))

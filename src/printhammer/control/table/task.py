@@ -1,0 +1,172 @@
+"""What a compensation table is asked to do, what the single pulse does, and how far dots are off from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.control.table.drive import fading
+from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.chain import TAIL
+from printhammer.errors import InputError
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.printing.dots.nominal import Nominal, nominal
+from printhammer.run.ensemble import Ensemble
+from printhammer.run.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.support.arrays import FloatArray
+
+QUIET: Final = 2e-4
+"""Distance from rest below which the hammer counts as settled, in parts of the way to the pack."""
+
+_LONGEST: Final = 20e-3  # Time in which the hammer has to settle after a single pulse, s
+_SAMPLE: Final = 2e-6  # Between the instants at which this is looked at, s
+# By how much the pulse before a brake pulse may be late or wider than the hammer's own, s
+_WIDE: Final = 50e-6
+_TAIL: Final = 1e-3  # How long runs go on after the last slot, s: until the last contact is over
+_PIECE: Final = 4096  # Number of runs of one ensemble, which bounds the memory
+
+
+@dataclass(frozen=True)
+class Single:
+    """The single pulse from rest: its dot, and when the armature leaves the pack and stays at rest, s."""
+
+    nominal: Nominal
+    left: float
+    settled: float
+
+
+def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
+    """Fire a hammer once from rest.
+
+    Raises
+    ------
+    InputError
+        It makes no dot, or does not come back to rest.
+    """
+    known = nominal(hammer, pulse, tolerance=tolerance)
+    times = np.arange(0.0, _LONGEST, _SAMPLE)
+    motion = simulate(hammer, PulseTrain(pulse), duration=_LONGEST, times=times, tolerance=tolerance)
+    dot = next(contact for contact in motion.contacts if contact.surface == "pack")
+    back = any(contact.surface == "backstop" and not contact.initial for contact in motion.contacts)
+    rest, front = rest_state(hammer), hammer.front
+    assert front is not None
+    away = np.flatnonzero(np.abs(motion.x - rest) > QUIET * (front - rest))
+    if dot.t_out is None or not back or not motion.ok or away[-1] == len(motion.x) - 1:
+        raise InputError(
+            f"{hammer.path}: the hammer is not at rest {1e3 * _LONGEST:g} ms after a single pulse, expected"
+            " one that settles on its backstop"
+        )
+    return Single(known, float(dot.t_out), float(motion.t[away[-1] + 1]))
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is asked of a table.
+
+    It is tuned on `hammers`, the one it is made for first; those of `spread` differ a little from that one.
+    No pulse is wider than `widest`, and none begins earlier than `wait` after a brake pulse, s.
+    """
+
+    gaps: int
+    reach: int
+    hammers: Sequence[Hammer]
+    spread: Sequence[Hammer]
+    pulse: Waveform
+    largest: float
+    widest: float
+    wait: float
+    single: Single
+    limits: Limits
+    brake: bool
+    tolerance: float
+    threads: int | None
+
+    @property
+    def width(self) -> float:
+        """Width of the pulse of the hammer, s."""
+        own: Any = self.pulse
+        return float(own.width)
+
+    @cached_property
+    def _faded(self) -> float:
+        """Time after its width in which the pulse has decayed to what a chain may cut off, s."""
+        return fading(self.pulse, 0.5 * TAIL)
+
+    @property
+    def brake_from(self) -> float:
+        """How long after the slot of the dot before a brake pulse may begin, s.
+
+        By then the armature has left the pack, and the pulse of the dot has decayed, even where it is late or
+        wide by `_WIDE`.
+        """
+        return float(max(self.single.left, self.width + _WIDE + self._faded))
+
+    def earliest(self, delay: FloatArray, brake: FloatArray) -> FloatArray:
+        """Return how long after the slot of the dot before a dot may be fired first, s.
+
+        By then the armature has left the pack, so that no dot draws on what the pack of the one before gives
+        back, and so much of a brake pulse has decayed that the current keeps to its bound.
+        """
+        return np.asarray(np.where(brake > 0.0, delay + brake + self.wait, self.single.left))
+
+    def latest(self, width: FloatArray) -> FloatArray:
+        """Return how long after its slot a dot of a width may be fired, s, so that it may be braked."""
+        return np.asarray(self.brake_from - self._faded - width)
+
+    def deviations(
+        self, hammer: Hammer, drives: Sequence[Drive], slots: FloatArray, ends: FloatArray
+    ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+        """Run drives, and compare all dots with that of the single pulse.
+
+        Parameters
+        ----------
+        hammer : Hammer
+            What is driven.
+        drives : sequence of Drive
+            One firing for each slot.
+        slots : array, shape (drives, dots)
+            Slot times, s; NaN beyond the last one.
+        ends : array, shape (drives,)
+            Times of the last dots, after which a run goes on for `_TAIL`, s.
+
+        Returns
+        -------
+        off : array, shape (drives, dots, 2)
+            Deviations of force and arrival, in parts of the limits; NaN for a lost dot, and for all dots of a
+            run that did not come to its end.
+        crowded : bool array, shape (drives, dots)
+            Whether a dot has more extra contacts than the limits allow.
+        """
+        single = self.single.nominal
+        off, crowded = np.full((*slots.shape, 2), np.nan), np.zeros(slots.shape, np.bool_)
+        for start in range(0, len(drives), _PIECE):
+            rows = slice(start, start + _PIECE)
+            ensemble = Ensemble(hammer, list(drives[rows]), ends[rows] + _TAIL, tolerance=self.tolerance)
+            result = ensemble.run(dots=True, threads=self.threads)
+            dots = result.dots
+            assert dots is not None
+            own = rows, slice(dots.fired_at.shape[1])
+            touched = dots.fired_at + dots.flight_time
+            off[own] = np.stack(
+                [
+                    (dots.peak_force / single.force - 1.0) / self.limits.force,
+                    (touched - (slots[own] + single.flight_time)) / self.limits.arrival,
+                ],
+                axis=2,
+            )
+            off[rows][~result.ok] = np.nan
+            crowded[own] = dots.extra_contacts > self.limits.extra_contacts
+        return off, crowded

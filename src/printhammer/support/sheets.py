@@ -1,0 +1,117 @@
+"""CSV tables whose heading gives every column its unit: cells, lines and comments, before they mean anything.
+
+Blank lines and lines that begin with # are passed over; a comment such as ``# sampling rate: 1 MHz`` is kept
+as a key and its text.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Cells of a CSV table.
+
+    Attributes
+    ----------
+    where : str
+        Name of the file, for messages.
+    rows : list of (int, list of str)
+        Line of the file, counted from 1, and cells; the heading first.
+    comments : dict of str to str
+        Comments of the form ``# key: value``; of a key given twice, the last.
+    """
+
+    where: str
+    rows: list[tuple[int, list[str]]]
+    comments: dict[str, str]
+
+
+def read_sheet(path: Path, what: str, *, gaps: bool = False) -> Sheet:
+    """Read a CSV table; `what` names it in messages, such as "the force table".
+
+    With `gaps`, a row of nothing but empty cells is a row.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is not UTF-8, or holds no comma-separated values.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: {what} is expected to be UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: {what} cannot be read ({reason})") from None
+    return sheet_of(text, str(path), gaps=gaps)
+
+
+def sheet_of(text: str, where: str, *, gaps: bool = False) -> Sheet:
+    """Split the text of a CSV table as `read_sheet` does; `where` stands in messages.
+
+    Raises
+    ------
+    InputError
+        It holds no comma-separated values.
+    """
+    comments: dict[str, str] = {}
+    reader = csv.reader(_uncommented(text, comments), strict=True)
+    rows = []
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row) or (gaps and len(row) > 1):
+                rows.append((reader.line_num, row))  # noqa: PERF401
+    except csv.Error as error:
+        raise InputError(
+            f"{where}: line {reader.line_num}: expected comma-separated values ({error})"
+        ) from None
+    return Sheet(where, rows, comments)
+
+
+def split_heading(cell: str) -> tuple[str, str]:
+    """Split a heading such as "time [us]" into name and unit; the unit is empty where it is none."""
+    name, _, rest = cell.strip().partition("[")
+    unit, closed, tail = rest.partition("]")
+    return name.strip(), unit.strip() if closed and not tail.strip() else ""
+
+
+def finite(cell: str, where: str) -> float:
+    """Read a finite number.
+
+    Raises
+    ------
+    InputError
+        It is none; `where` stands in the message.
+    """
+    try:
+        number = float(cell)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(f"{where}: {cell.strip()!r} is expected to be a finite number")
+    return number
+
+
+def _uncommented(text: str, comments: dict[str, str]) -> Iterator[str]:
+    """Give the lines, empty ones in place of comments; keep the comments that have a key."""
+    for line in io.StringIO(text):
+        bare = line.strip()
+        if not bare.startswith("#"):
+            yield line
+            continue
+        key, colon, value = bare.lstrip("#").partition(":")
+        if colon and key.strip():
+            comments[key.strip()] = value.strip()
+        yield "\n"

@@ -1,0 +1,54 @@
+"""One small result of every class of `printhammer.chaos` and `printhammer.derivatives`, by its name."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+import printhammer as ph
+from printhammer.chaos import Branch, Branches, lyapunovs, strobe
+from printhammer.derivatives.sensitivities import Sensitivities
+from printhammer.results import Result
+
+PERIOD = 1.3e-3
+
+
+def branch(hammer: ph.Hammer) -> Branch:
+    return ph.continuation(hammer, "period", (2.95e-3, 3.05e-3), period=3e-3, most=4)
+
+
+def damping(hammer: ph.Hammer) -> Result:
+    own = hammer.constants["backstop.damping"].si
+    bounds = (0.95 * own, 1.05 * own)
+    return ph.stability_chart(branch(hammer), "backstop.damping", bounds, grid=(2, 3), most=2)
+
+
+def sensitivities(hammer: ph.Hammer) -> Sensitivities:
+    drive = ph.PulseTrain(hammer.waveform)
+    return ph.sensitivities(hammer, drive, constants=["mass", "pack.stiffness"])
+
+
+CHAOS: dict[str, Callable[[ph.Hammer], Result]] = {
+    "Basins": lambda hammer: ph.basins(
+        hammer, period=PERIOD, x=(30e-6, 80e-6, 3), v=(-0.2, 0.2, 2), firings=40, rounds=1
+    ),
+    "Bifurcation": lambda hammer: ph.bifurcation(
+        hammer, periods=[1.2e-3, PERIOD], firings=20, transient=10, direction="both", refine=0
+    ),
+    "Branch": branch,
+    "Branches": lambda hammer: Branches((branch(hammer),)),
+    "ImpactTrain": lambda hammer: ph.impact_train(ph.section(hammer, period=PERIOD, touches=12)),
+    "Lyapunov": lambda hammer: ph.lyapunov(hammer, period=PERIOD, firings=20, transient=2),
+    "LyapunovChart": lambda hammer: lyapunovs(hammer, [1.2e-3, PERIOD], firings=10, transient=0),
+    "Orbit": lambda hammer: ph.orbits(hammer, period=PERIOD, longest=1, starts=60, guesses=6)[0],
+    "Orbits": lambda hammer: ph.orbits(hammer, period=PERIOD, longest=2, starts=60, guesses=6),
+    "QuenchMap": lambda hammer: ph.quench_map(
+        hammer, gaps=("650 us", "710 us", 2), widths=("300 us", "400 us", 3)
+    ),
+    "Recurrence": lambda _hammer: ph.recurrence(np.arange(12.0) % 3.0),
+    "Section": lambda hammer: ph.section(hammer, period=PERIOD, touches=5),
+    "Sensitivities": sensitivities,
+    "Spread": lambda hammer: sensitivities(hammer).spread({"mass": 0.01}),
+    "StabilityChart": damping,
+    "Strobe": lambda hammer: strobe(hammer, period=PERIOD, points=5, verdict=False),
+    "ZeroOne": lambda _hammer: ph.zero_one(np.sin(np.arange(100.0)), angles=5),
+}

@@ -1,0 +1,79 @@
+"""The verb tune: tables, the report, and what is refused."""
+
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.hammers import CRUDE
+
+import printhammer as ph
+
+
+@pytest.fixture
+def quick(tmp_path: Path) -> Path:
+    """A hammer file whose pulse is over before the touch."""
+    path = tmp_path / "quick.toml"
+    hammer = ph.load(CRUDE).replace({"waveform.amplitude": 1.3, "waveform.width": 200e-6})
+    hammer.save(path)
+    return path
+
+
+def test_tables_and_pictures(cli: Callable, quick: Path, tmp_path: Path) -> None:
+    names = [tmp_path / f"table.{kind}" for kind in ("csv", "json", "h", "nc", "png")]
+    out = [word for name in names for word in ("--out", name)]
+    done = cli("tune", quick, "--rate", "1.85kHz", "--history", 1, "--no-judge", *out)
+    assert done.status == 0
+    assert "Table for 1850 Hz" in done.out
+    assert ph.load_table(names[0]).fingerprint == ph.load(quick).fingerprint
+    assert ph.load_table(names[1]).rates.tolist() == [1850.0]
+    assert "int32_t" in names[2].read_text()
+    assert names[4].read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_what_is_gained_and_lost(cli: Callable, quick: Path, tmp_path: Path) -> None:
+    report = tmp_path / "report.svg"
+    done = cli("tune", quick, "--rates", "1.84 kHz, 1.86 kHz, 2", "--history", 1, "--report", report)
+    assert done.status == 0
+    assert "current +10 %" in done.out
+    assert "damping -20 %" in done.out
+    assert b"<svg" in report.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ("--rate 0Hz", "rate"),
+        ("--rate 1mm", "rate"),
+        ("--rate 1kHz --rates '1 kHz, 2 kHz, 3'", "expected one of them"),
+        ("--rates '1 kHz, 2 kHz'", "expected two rates and a number"),
+        ("--rates '2 kHz, 1 kHz, 3'", "expected the lower rate first"),
+        ("--rate 1kHz --history 9", "history = 9, expected a whole number from 1 to 4"),
+        ("--rate 1kHz --reach 0", "reach"),
+        ("--rate 1kHz --largest-current 0.1A", "the waveform peaks at"),
+        ("--rate 1kHz --report report.nc --no-judge", "expected none beside --no-judge"),
+    ],
+)
+def test_bad_input_is_one_sentence(refused: Callable, words: str, sentence: str) -> None:
+    refused("tune", CRUDE, *shlex.split(words), said=sentence)
+
+
+@pytest.mark.slow
+def test_a_page_is_printed_with_a_table(cli: Callable, quick: Path, tmp_path: Path) -> None:
+    table, dots = tmp_path / "table.json", tmp_path / "dots.csv"
+    ph.tune(ph.load(quick), rate=1850.0, history=1).save(table)
+    words = ("print", "HI", "--hammer", quick, "--rate", "1.85kHz", "--out", dots)
+    done, without = cli(*words, "--table", table), cli(*words)
+    assert done.status == without.status == 0
+    good, plain = (re.search(r"within limits +(\d+) of (\d+) dots", one.out) for one in (done, without))
+    assert good is not None
+    assert plain is not None
+    assert int(good[1]) == int(good[2]) > int(plain[1])
+    refused = cli("print", "HI", "--hammer", CRUDE, "--rate", "1.85kHz", "--out", dots, "--table", table)
+    assert refused.status == 2
+    assert "the table is made for another hammer" in refused.err
+    beyond = cli("print", "HI", "--hammer", quick, "--rate", "2kHz", "--out", dots, "--table", table)
+    assert beyond.status == 2
+    assert "is made for 1850 Hz" in beyond.err

@@ -1,0 +1,166 @@
+"""What holds for every verb: its help, its example, and that bad input is told in one sentence."""
+
+import shlex
+import subprocess
+import sysconfig
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+import printhammer as ph
+from printhammer.cli.main import app
+from printhammer.cli.options import read_plain, read_whole
+from printhammer.cli.registry import VERBS
+from printhammer.cli.runner import Verb
+
+SCRIPTS = Path(sysconfig.get_path("scripts"))
+NAMES = [verb.name for verb in VERBS]
+# What a verb cannot do without, so that it comes to see what is wrong beside it.
+NEEDED = {
+    "figure": ("3",),
+    "measure": ("magnet",),
+    "fit magnet": ("t.csv",),
+    "fit spring": ("t.csv",),
+    "fit pack": ("t.csv",),
+    "fit motion": ("t.csv",),
+    "reconstruct search": ("new.jsonl",),
+    "reconstruct judge": ("a.jsonl", "new.jsonl"),
+    "reconstruct base-rates": ("new.json",),
+    "reconstruct predictions": ("a.jsonl", "b.jsonl", "new.json"),
+    "reconstruct family": ("a.jsonl",),
+    "reconstruct ship": ("a.jsonl", "b.jsonl"),
+}
+# Examples that take more than a few seconds.
+LONG = {"bifurcation", "continue", "orbits", "energy", "feedback", "tune", "sweep"}
+# Examples that are part of other tests, or do not end.
+ELSEWHERE = {
+    "paper": "takes minutes; test_paper.py writes the whole report",
+    "studio": "ends with Ctrl-C only, in test_studio.py",
+    "bench": "takes minutes; test_bench.py",
+    **{verb.name: "follow each other; test_reconstruct.py" for verb in VERBS if "reconstruct" in verb.name},
+}
+
+
+def words_of(verb: Verb, *more: object) -> list[object]:
+    return [*verb.name.split(), *NEEDED.get(verb.name, ()), *more]
+
+
+def test_names_are_told_apart() -> None:
+    assert len(set(NAMES)) == len(NAMES)
+
+
+@pytest.mark.parametrize("verb", VERBS, ids=NAMES)
+def test_help_carries_an_example_that_can_be_read(cli: Callable[..., Any], verb: Verb) -> None:
+    done = cli(*verb.name.split(), "--help")
+    assert done.status == 0
+    assert f"Example: {verb.example}" in " ".join(done.out.split())
+    program, *words = shlex.split(verb.example.rpartition("&&")[2])
+    assert program == "printhammer"
+    command: Any = typer.main.get_command(app)
+    for name in verb.name.split():
+        assert words.pop(0) == name
+        command = command.commands[name]
+    command.make_context(verb.name, words)
+
+
+def examples() -> Iterator[Any]:
+    for verb in VERBS:
+        if verb.name not in ELSEWHERE:
+            yield pytest.param(verb, id=verb.name, marks=[pytest.mark.slow] if verb.name in LONG else [])
+
+
+@pytest.mark.parametrize("verb", list(examples()))
+def test_the_example_in_the_help_runs(
+    cli: Callable[..., Any], verb: Verb, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if verb.name.startswith("fit "):
+        assert cli("measure", "all", "--out", ".").status == 0
+    before = set(tmp_path.iterdir())
+    if "&&" in verb.example:
+        shell = verb.example.replace("printhammer", str(SCRIPTS / "printhammer"))
+        done = subprocess.run(shell, shell=True, capture_output=True, text=True, check=True)
+        assert done.stdout
+    else:
+        outcome = cli(*shlex.split(verb.example)[1:])
+        assert outcome.status == 0, outcome.err
+        assert outcome.out
+    wanted = any(f" --{name} " in verb.example for name in ("out", "json", "plot"))
+    assert (set(tmp_path.iterdir()) > before) == wanted
+
+
+@pytest.mark.parametrize("verb", VERBS, ids=NAMES)
+def test_an_option_that_is_none_is_refused(refused: Callable[..., None], verb: Verb) -> None:
+    refused(*words_of(verb, "--no-such-option", "1"), said="--no-such-option")
+
+
+def numbers() -> Iterator[Any]:
+    for verb in VERBS:
+        for name, option in verb.options.items():
+            if option.read in (read_whole, read_plain):
+                flag = option.flag or f"--{name.replace('_', '-')}"
+                yield pytest.param(verb, flag, id=f"{verb.name} {flag}")
+
+
+@pytest.mark.parametrize(("verb", "flag"), list(numbers()))
+def test_what_is_no_number_is_refused(refused: Callable[..., None], verb: Verb, flag: str) -> None:
+    refused(*words_of(verb, flag, "many"), said=f"{flag} = 'many': expected a ")
+
+
+def outputs() -> Iterator[Any]:
+    for verb in VERBS:
+        for name, files in verb.files.items():
+            if not files.argument:
+                yield pytest.param(verb, f"--{name}", id=f"{verb.name} --{name}")
+
+
+@pytest.mark.parametrize(("verb", "flag"), list(outputs()))
+def test_a_file_that_cannot_be_written_is_refused(
+    refused: Callable[..., None], verb: Verb, flag: str, tmp_path: Path
+) -> None:
+    files = verb.files[flag.removeprefix("--")]
+    name = f"result{(*files.endings, '.png')[0]}"
+    if files.endings or files.pictures:
+        refused(*words_of(verb, flag, "result.txt"), said=f"{flag} result.txt: expected a name that ends in")
+    refused(*words_of(verb, flag, f"nowhere/{name}"), said=f"nowhere/{name}")
+    if files.many:
+        refused(*words_of(verb, flag, name, flag, name), said=(name, "twice"))
+    (tmp_path / name).mkdir()
+    refused(*words_of(verb, flag, name), said=(name, "folder"))
+
+
+HAMMERED = [verb for verb in VERBS if any(option.hammer for option in verb.options.values())]
+
+
+def hammer_words(verb: Verb, path: object) -> list[object]:
+    (option,) = [option for option in verb.options.values() if option.hammer]
+    return [path] if option.argument else ["--hammer", path]
+
+
+@pytest.mark.parametrize("verb", HAMMERED, ids=[verb.name for verb in HAMMERED])
+def test_a_hammer_that_is_none_is_refused(refused: Callable[..., None], verb: Verb) -> None:
+    refused(*words_of(verb, *hammer_words(verb, "nobody.toml")), said=("nobody.toml", "no such file"))
+
+
+@pytest.mark.parametrize("verb", HAMMERED, ids=[verb.name for verb in HAMMERED])
+def test_a_hammer_is_never_written_over(refused: Callable[..., None], verb: Verb, tmp_path: Path) -> None:
+    for name, files in verb.files.items():
+        ending = (*files.endings, ".png")[0]
+        path = tmp_path / f"hammer{ending}"
+        ph.load("hendriks-1983").save(path)
+        refused(*words_of(verb, *hammer_words(verb, path)), f"--{name}", path, said="this one is read")
+
+
+FIRED = [verb for verb in HAMMERED if any(option.hammer == "fired" for option in verb.options.values())]
+
+
+@pytest.mark.parametrize("verb", FIRED, ids=[verb.name for verb in FIRED])
+def test_a_hammer_without_a_waveform_is_not_fired(
+    refused: Callable[..., None], verb: Verb, tmp_path: Path
+) -> None:
+    path = tmp_path / "bare.toml"
+    ph.load("hendriks-1983").replace("waveform", None).save(path)
+    refused(*words_of(verb, *hammer_words(verb, path)), said=("bare.toml", "has no [waveform] to fire"))
