@@ -130,7 +130,7 @@ def carry_columns(
             problem.constants,
             problem.scales,
             problem.bounds,
-            forcing or _NOTHING,
+            forcing or (),
             np.ascontiguousarray(marks, np.float64),
             np.asarray(nodes, dtype=np.int64),
             renormalise,
@@ -145,20 +145,6 @@ def carry_columns(
             passed,
         )
     return Flow(states, changes, growth, passed, columns, bool(track[SMOOTH]), status)
-
-
-_NOTHING: Final = tuple(
-    Forcing(
-        varied=np.zeros((0, VARIED, 0)),
-        moves=np.zeros((0, 0)),
-        of_hammer=np.zeros(0, np.int64),
-        fire_moves=np.zeros((0, 0)),
-        piece_moves=np.zeros((0, 0, 0)),
-        live_moves=np.zeros((0, 0)),
-        memories=np.zeros((0, VARIED)),
-        value_spacing=0.0,
-    )
-)
 
 
 def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, ...]:

@@ -142,7 +142,7 @@ def flow(
     bounds : tuple of float
         As in :func:`printhammer.kernel.single.run.run`.
     forced_by : tuple
-        A plain tuple of the fields of :class:`printhammer.kernel.variational.layout.Forcing`.
+        A plain tuple of the fields of `printhammer.kernel.variational.layout.Forcing`; else an empty one.
     marks : float64 array, shape (m,)
         Ascending times [s]; at an instant of a switch: after it.
     wanted : int64 array, shape (q,)
@@ -168,7 +168,10 @@ def flow(
         The columns at the wanted nodes before the switch there and after it.
     """
     train = Train(*train)
-    forcing = Forcing(*forced_by)
+    # Without forcing nothing of it may travel through the calls: that alone would cost a tenth.
+    forcing: Any = ()
+    if FORCED:
+        forcing = Forcing(*forced_by)
     setting = Setting(scales, bounds, hammer, train.live, forcing)
     count = nodes.shape[0]
     asked = 0

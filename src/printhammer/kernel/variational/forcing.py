@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
     END,
@@ -86,7 +86,7 @@ def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> Non
             j += DELAYED
 
 
-@compiled
+@inlined
 def drive_change(t: float, drive: Drive, delayed: Any) -> float:
     """Return the change of the drive [A or N] at a fixed time; `delayed` is a row of `live_moves`."""
     total = 0.0
@@ -100,7 +100,7 @@ def drive_change(t: float, drive: Drive, delayed: Any) -> float:
     return total
 
 
-@compiled
+@inlined
 def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forcing: Forcing) -> float:
     """Return the slope of magnet and drive force with the drive: N/A, or 1 for a drive that is a force."""
     if drive[0] == 0.0:
@@ -119,7 +119,7 @@ def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forci
     return math.nan
 
 
-@compiled
+@inlined
 def field_changes(
     t: float, x: float, value: float, with_value: float, k: int, drive: Drive, forcing: Forcing
 ) -> tuple[float, float, float]:
@@ -153,7 +153,7 @@ def note_changed_memories(peak: float, forcing: Forcing) -> None:
                 memories[k, j] = pack_memory(varied[k, j][PACK:BACKSTOP_PART], at)
 
 
-@compiled
+@inlined
 def pack_change(x: float, v: float, mode: int, k: int, forcing: Forcing) -> float:
     """Return the change [N] of the force of the pack at a fixed depth."""
     varied, moves, of_hammer, memories = forcing.varied, forcing.moves, forcing.of_hammer, forcing.memories
@@ -176,7 +176,7 @@ def pack_change(x: float, v: float, mode: int, k: int, forcing: Forcing) -> floa
     return float(total / SPACING)
 
 
-@compiled
+@inlined
 def contact_changes(w: float, v: float, k: int, forcing: Forcing) -> tuple[float, float]:
     """Return the changes [N] of the force of the backstop and of its viscous part, at a fixed compression."""
     varied, of_hammer = forcing.varied, forcing.of_hammer

@@ -49,7 +49,7 @@ DELAYED = 5
 
 
 class Forcing(NamedTuple):
-    """What n constants change, and working space for it; no columns where nothing forces the equations.
+    """What n constants change, and working space for it; an empty tuple stands for it where nothing does.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Setting(NamedTuple):
     bounds: Any
     hammer: Any
     drive: Any
-    forcing: Forcing
+    forcing: Any
 
 
 def changing(forced: bool) -> int:

@@ -184,7 +184,8 @@ def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[flo
         if FORCED:
             viscous_w += WEIGHTS[side, k] * backstop_viscous(c, at, v)
     with_w /= spacing
-    viscous_w /= spacing
+    if FORCED:
+        viscous_w /= spacing
     spacing = SPEED_SPACING * scales[1]
     side = CENTRAL
     if not BACKSTOP_PULLS:
@@ -198,4 +199,6 @@ def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[flo
         with_v += WEIGHTS[side, k] * contact_force(w, at, hammer)
         if FORCED:
             viscous_v += WEIGHTS[side, k] * backstop_viscous(c, w, at)
-    return with_w, with_v / spacing, viscous_w, viscous_v / spacing
+    if FORCED:
+        viscous_v /= spacing
+    return with_w, with_v / spacing, viscous_w, viscous_v
