@@ -225,7 +225,7 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
     """Fit, and return what is shown and written."""
     from printhammer.cli.verbs.laboratory.fit_report import described
     from printhammer.hammer.hammer import load
-    from printhammer.identify.fragment import covariance_table
+    from printhammer.identify.result import covariance_table
 
     for path in job.wanted["into"]:
         if hammer is None:

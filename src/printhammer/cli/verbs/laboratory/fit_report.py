@@ -28,7 +28,7 @@ _COLUMNS: Final[tuple[Column[FittedConstant], ...]] = (
 
 def described(fit: Fit) -> list[RenderableType]:
     """Return what a fit tells."""
-    from printhammer.identify.fragment import outliers
+    from printhammer.identify.result import outliers
 
     files = f"  [dim]{escape(' and '.join(fit.source))}[/dim]" if fit.source else ""
     scale = f"residual scale {fit.residual_scale:.3g} {fit.axes[1][1]}"
