@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 
+from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, coordinate, part, scalar
 
 if TYPE_CHECKING:
@@ -20,6 +22,17 @@ if TYPE_CHECKING:
 
 CONFIDENCE: Final = 0.95
 """Probability with which an interval is meant to contain the constant."""
+
+LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
+"""Laws whose constants are fitted, by role."""
+
+_REPLACED: Final = {
+    # A stiffness found takes the place of the bodies, a damping that of the rebound.
+    "backstop.stiffness": (
+        *("radius1", "radius2", "youngs_modulus1", "youngs_modulus2", "poisson_ratio1", "poisson_ratio2"),
+    ),
+    "backstop.damping": ("restitution", "restitution_speed"),
+}
 
 
 @dataclass(frozen=True)
@@ -209,16 +222,48 @@ class Fit(Result):
 
     @property
     def for_file(self) -> dict[str, dict[str, str | float]]:
-        """The constants that a hammer file has, as tables that `Hammer.replace` takes."""
-        from printhammer.identify.fragment import constants
+        """The constants that a hammer file has, as tables for `Hammer.replace`, with status and source."""
+        return {
+            key: {
+                "value": constant.value,
+                "unit": constant.unit,
+                "status": "derived",
+                "source": self._source(constant),
+            }
+            for key, constant in self.constants.items()
+            if constant.in_file
+        }
 
-        return constants(self)
+    def _source(self, constant: FittedConstant) -> str:
+        """Return the source of a constant, such as "fitted to magnet.csv, standard error 0.02 N"."""
+        how = constant.how or f"fitted to {' and '.join(self.source)}"
+        error = constant.standard_error
+        return f"{how}, standard error {error:.2g} {constant.unit}" if error else how
 
     def fragment(self) -> str:
-        """Return the constants as TOML text for a hammer file."""
-        from printhammer.identify.fragment import fragment
+        """Return the constants as TOML text for a hammer file, with comments on what they hold for."""
+        from printhammer.hammer.edit import changed_text
 
-        return fragment(self)
+        files = f", fitted to {' and '.join(self.source)}" if self.source else ""
+        remarks = [f"Constants of a hammer file{files}"]
+        remarks += [f"taken as known: {name} = {value}" for name, value in self.given.items()]
+        remarks += self.indistinct
+        if self.rejected:
+            remarks.append(f"the data reject the law: {self.rejected}")
+        found = self.for_file
+        sections = {key.rpartition(".")[0]: None for key in found}
+        laws = [(f"{section}.law", LAWS[section]) for section in sections if section in LAWS]
+        comments = "".join(f"# {' '.join(remark.split())}\n" for remark in remarks)
+        # Tables come last, or the constants at the top would become theirs.
+        return changed_text(comments, sorted([*laws, *found.items()], key=lambda edit: "." in edit[0]))
+
+    def covariance_table(self) -> str:
+        """Return the covariance as CSV: a row and a column for each constant, SI, units in comments."""
+        lines = [f"# unit of {key}: {self.constants[key].unit}" for key in self.keys]
+        lines.append(",".join(["constant", *self.keys]))
+        for key, row in zip(self.keys, self.covariance, strict=True):
+            lines.append(",".join([key, *(repr(float(entry)) for entry in row)]))
+        return "\n".join(lines) + "\n"
 
     def into(self, hammer: Hammer) -> Hammer:
         """Return a hammer with the constants replaced by those found.
@@ -228,16 +273,57 @@ class Fit(Result):
         InputError
             The hammer has another law for the part, or takes as different what the fit took as known.
         """
-        from printhammer.identify.fragment import into
-
-        return into(self, hammer)
+        found = self.for_file
+        sections = {key.rpartition(".")[0] for key in found} & set(LAWS)
+        for section in sorted(sections):
+            part = hammer.parts.get(section)
+            if part is None or part.law != LAWS[section]:
+                law = "is missing" if part is None else f"has the law {part.law!r}"
+                raise InputError(f"{hammer.path}: the {section} {law}, expected the law {LAWS[section]!r}")
+        for key, text in self.given.items():
+            _agrees(hammer, key, text)
+        gone = [f"{key.rpartition('.')[0]}.{name}" for key in found for name in _REPLACED.get(key, ())]
+        taken = {key: None for key in gone if key in hammer.constants}
+        return hammer.replace({**taken, **found})
 
     @property
     def report(self) -> list[str]:
         """What there is to say, line by line."""
-        from printhammer.identify.fragment import report
+        lines = []
+        for constant in self.constants.values():
+            low, high = constant.interval
+            lines.append(
+                f"{constant.key} = {constant.value:.6g} {constant.unit}, standard error"
+                f" {constant.standard_error:.2g}, 95 % interval {low:.6g} to {high:.6g}"
+            )
+        used = int((~self.outliers).sum())
+        if used:
+            lines.append(
+                f"{used} data, {self.degrees_of_freedom:g} degrees of freedom, residual scale"
+                f" {self.residual_scale:.3g} {self.axes[1][1]}, condition number {self.condition_number:.3g}"
+            )
+        if self.outliers.any():
+            lines.append(self.outlier_lines())
+        if math.isfinite(self.p_value):
+            lines.append(f"test of the law: p = {self.p_value:.3g}")
+        if self.rejected:
+            lines.append(f"the data reject the law: {self.rejected}")
+        return [*lines, *self.indistinct, *self.remarks]
 
-        return report(self)
+    def outlier_lines(self, most: int = 20) -> str:
+        """Say which rows were left out; of several files, also to which series each belongs."""
+        rows = [int(row) for row in np.flatnonzero(self.outliers)]
+        told = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
+        if not len(self.lines):
+            return told
+        listed = [str(self.lines[row]) for row in rows[:most]]
+        if len(self.source) > 1:
+            listed = [
+                f"{line} ({self.series_names[self.series[row]]})"
+                for line, row in zip(listed, rows, strict=False)
+            ]
+        more = ", …" if len(rows) > most else ""
+        return f"{told}: line{'s' if len(rows) > 1 else ''} {', '.join(listed)}{more}"
 
 
 def student(degrees_of_freedom: float) -> float:
@@ -245,3 +331,16 @@ def student(degrees_of_freedom: float) -> float:
     from scipy.stats import t
 
     return float(t.ppf(0.5 + 0.5 * CONFIDENCE, degrees_of_freedom))
+
+
+def _agrees(hammer: Hammer, key: str, text: str) -> None:
+    """Refuse a hammer whose constant is another than the one that the fit took as known."""
+    from printhammer.units import parse
+
+    known = hammer.constants.get(key)
+    if known is None:
+        return
+    value = parse(text, known.si_unit)
+    if not math.isclose(value, known.si, rel_tol=1e-9, abs_tol=0.0):
+        written = f"{key} = {known.value!r} {known.unit}"
+        raise InputError(f"{hammer.path}: {written}, expected {text}, which the fit took as known")

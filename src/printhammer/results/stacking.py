@@ -50,6 +50,7 @@ def _filled_up(arrays: list[Any], dims: int) -> Any:
     dtype = np.result_type(*arrays)
     nothing: Any = {"U": "", "i": -1, "b": False}.get(dtype.kind, np.nan)
     table = np.full((len(arrays), *shape), nothing, dtype=dtype)
-    for row, array in zip(table, arrays, strict=True):
-        row[tuple(slice(length) for length in array.shape)] = array
+    for place, array in enumerate(arrays):
+        where: tuple[Any, ...] = (place, *(slice(length) for length in array.shape))
+        table[where] = array
     return table

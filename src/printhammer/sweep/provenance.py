@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.results.provenance import provenance
 
 if TYPE_CHECKING:
     from printhammer.sweep.spec import Spec
 
+FORMAT: Final = "1"
+"""Version of the layout of stores."""
+
 
 def identity(spec: Spec) -> dict[str, str]:
     """Return what must be the same for results to lie in one store; the readable first."""
-    from printhammer.sweep.plan import FORMAT
-
     return {
         "store_format": FORMAT,
         **provenance(hammer=spec.base.hammer, tolerance=spec.base.tolerance),
