@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from printhammer.chaos.continuation.arclength import Curve, Follower, MapFamily, MapValue, Steps, follow
+from printhammer.chaos.continuation.arclength import Corrector, Curve, MapFamily, MapValue, Steps, follow
 from printhammer.chaos.continuation.branch_points import birth_of, follow_doubled, iterated, points_of
 
 STEPS = Steps(precision=1e-12, most=200)
@@ -90,7 +90,7 @@ def test_logistic_map_doubled() -> None:
 
 
 def test_a_doubled_orbit_ends_where_it_is_born() -> None:
-    half = Follower(logistic, [1.0, 1.0], STEPS.precision)
+    half = Corrector(logistic, [1.0, 1.0], STEPS.precision)
     twice = iterated(logistic, 2)
     p = 3.4
     x = (p + 1.0 + math.sqrt((p - 3.0) * (p + 1.0))) / (2.0 * p)

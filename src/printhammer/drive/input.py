@@ -79,14 +79,14 @@ def read_start(value: float | str) -> float:
     return number
 
 
-def read_count(value: SupportsIndex | None, name: str) -> int:
-    """Read a whole number of firings or bursts; InputError below 1 and above `MOST_PULSES`."""
+def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
+    """Read a whole number, such as that of firings; InputError below `least` and above `MOST_PULSES`."""
     try:
-        count = 0 if value is None or isinstance(value, bool) else operator.index(value)
+        count = least - 1 if value is None or isinstance(value, bool) else operator.index(value)
     except TypeError:
-        count = 0
-    if not 1 <= count <= MOST_PULSES:
-        raise InputError(f"{name} = {value!r} is expected to be a whole number from 1 to {MOST_PULSES}")
+        count = least - 1
+    if not least <= count <= MOST_PULSES:
+        raise InputError(f"{name} = {value!r} is expected to be a whole number from {least} to {MOST_PULSES}")
     return count
 
 

@@ -35,7 +35,7 @@ def stacked(found: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
     every = [one.entries() for one in found]
     entries: Entries = {}
     for name, (note, nothing) in (every[0] if every else none).items():
-        arrays = [np.asarray(entry[name][1]) for entry in every]
+        arrays = [np.asarray(entry[name][1], dtype=note.dtype) for entry in every]
         if note.kind == "coordinate":
             entries[name] = (note, max(arrays, key=len, default=nothing))
             continue
@@ -49,8 +49,7 @@ def _filled_up(arrays: list[Any], dims: int) -> Any:
     shape = [max(array.shape[axis] for array in arrays) for axis in range(dims)]
     dtype = np.result_type(*arrays)
     nothing: Any = {"U": "", "i": -1, "b": False}.get(dtype.kind, np.nan)
-    table = np.full((len(arrays), *shape), nothing, dtype=dtype)
-    for place, array in enumerate(arrays):
-        where: tuple[Any, ...] = (place, *(slice(length) for length in array.shape))
-        table[where] = array
+    table: Any = np.full((len(arrays), *shape), nothing, dtype=dtype)
+    for k, array in enumerate(arrays):
+        table[(k, *(slice(length) for length in array.shape))] = array
     return table

@@ -6,10 +6,12 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from typing import Final
+from typing import Final, TypeVar
 
 from printhammer.errors import InputError
 
+A = TypeVar("A")
+B = TypeVar("B")
 Progress = Callable[[int, int], None]
 Piece = Callable[[int, int], None]
 
@@ -32,6 +34,28 @@ def thread_count(threads: int | None) -> int:
     if threads < 1:
         raise InputError(f"threads = {threads}, expected at least 1")
     return int(threads)
+
+
+def mapped(
+    function: Callable[[A], B],
+    items: Sequence[A],
+    threads: int | None = None,
+    progress: Progress | None = None,
+    *,
+    length: int | None = None,
+) -> list[B]:
+    """Return the values of a function at some items, in their order, computed in threads.
+
+    Arguments as for `in_threads`, `threads` by default as many as there are cores.
+    """
+    found: dict[int, B] = {}
+
+    def work(begin: int, end: int) -> None:
+        for i in range(begin, end):
+            found[i] = function(items[i])
+
+    in_threads([work], [len(items)], thread_count(threads), progress, None if length is None else [length])
+    return [found[i] for i in range(len(items))]
 
 
 def in_threads(

@@ -183,7 +183,7 @@ def test_json_holds_what_is_infinite_or_not_known(found: Lyapunov, tmp_path: Pat
         (lambda h: ph.lyapunov(h, period=1e-3, tolerance=1.0, **FEW), "tolerance"),
         (lambda h: ph.lyapunov(h.replace("waveform", None), period=1e-3), "waveform"),
         (lambda h: lyapunovs(h, []), "at least one"),
-        (lambda h: lyapunovs([h, h], [1e-3]), "hammers: 2"),
+        (lambda h: lyapunovs([h, h], [1e-3] * 3), "hammers: 2"),
         (lambda h: LyapunovChart.of([]), "at least one"),
     ],
 )

@@ -116,7 +116,7 @@ def test_a_chart(cli: Callable, tmp_path: Path) -> None:
         ((*SLOW, "--doublings", "-1"), "doublings"),
         ((*SLOW, "--second", "mass"), "--second-from is missing"),
         ((*SLOW, "--second", "mass", "--second-from", "1 g"), "--second-to is missing"),
-        ((*SLOW, "--second", "mass", "--out", "chart.csv"), "--out chart.csv"),
+        ((*SLOW, "--second", "mass", "--out", "chart.txt"), "--out chart.txt"),
         ((*SLOW, "--show", "nothing", "--out", "branch.png"), "--show = 'nothing'"),
     ],
 )

@@ -224,12 +224,18 @@ def files(here: Path) -> Path:
             "family judged.jsonl search.jsonl",
             "search.jsonl, line 1: constants = None, expected the constants",
         ),
-        ("family judged.jsonl --out notes.txt", "notes.txt: expected a folder"),
     ],
 )
 @pytest.mark.usefixtures("files")
 def test_bad_input_is_one_sentence(refused: Callable, words: str, said: str) -> None:
     refused("reconstruct", *shlex.split(words), said=said)
+
+
+@pytest.mark.usefixtures("files")
+def test_a_family_needs_a_folder(cli: Callable) -> None:
+    done = cli("reconstruct", "family", "judged.jsonl", "--out", "notes.txt")
+    assert done.status == 2
+    assert "notes.txt: expected a folder" in done.err
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
-from printhammer.maps.layout import save_map
+from printhammer.results import save_dataset
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -74,7 +74,9 @@ def test_the_rates_and_times_of_a_measured_map(
 ) -> None:
     rates = np.array([520.0, 700.0, 910.0])
     chart = ph.frequency_map(hammer, rates, times=200)
-    save_map(chart.assign(displacement=chart["displacement"] + np.float32(1e-6)), tmp_path / "measured.nc")
+    save_dataset(
+        chart.assign(displacement=chart["displacement"] + np.float32(1e-6)), tmp_path / "measured.nc"
+    )
     outcome = cli("map", "--measured", tmp_path / "measured.nc", "--out", tmp_path / "both.png")
     assert (outcome.status, outcome.err) == (0, "")
     assert "3 rates from 520 to 910 Hz" in told(outcome.out)

@@ -20,7 +20,7 @@ parts = [
 
 
 def test_a_sequence_runs_from_a_file(cli, tmp_path: Path) -> None:
-    path, crude = tmp_path / "sequence.toml", Path(__file__).parents[1] / "data" / "hendriks-1983.toml"
+    path, crude = tmp_path / "sequence.toml", Path(__file__).parents[2] / "data" / "hendriks-1983.toml"
     path.write_text(FILE)
     outcome = cli("run", str(crude), "--drive", str(path))
     assert (outcome.status, outcome.err) == (0, "")

@@ -124,12 +124,12 @@ def bifurcation(
         A KeyboardInterrupt, with what was done.
     """
     name, grid, regime = _parameter(hammer, (periods, rates, parameter, values), firing)
-    count, skipped = read_count(firings, "firings"), _whole(transient, "transient")
+    count, skipped = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     if count - skipped < 2:
         raise InputError(f"transient = {transient!r}, expected at least 2 fewer than the {count} firings")
     if direction not in DIRECTIONS:
         raise InputError(f"direction = {direction!r}, expected one of {', '.join(DIRECTIONS)}")
-    halvings = _whole(refine, "refine")
+    halvings = read_count(refine, "refine", least=0)
     check_tolerance(tolerance)
     ways = ("up", "down") if direction == "both" else (direction,)
     if len(grid) * len(ways) * (count - skipped) > MOST_STATES:
@@ -211,13 +211,3 @@ def _ascending(values: npt.ArrayLike | None, name: str) -> FloatArray:
         before, after = found[falling[0] : falling[0] + 2].tolist()
         raise InputError(f"{name}: {after:.9g} follows {before:.9g}, expected ascending values")
     return found
-
-
-def _whole(value: SupportsIndex, name: str) -> int:
-    try:
-        count = -1 if isinstance(value, bool) else value.__index__()
-    except AttributeError:
-        count = -1
-    if count < 0:
-        raise InputError(f"{name} = {value!r}, expected a whole number, not negative")
-    return count

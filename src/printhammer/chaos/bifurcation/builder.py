@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.carry import Strand, Table, carry, strands_of
+from printhammer.chaos.bifurcation.carry import Strand, Trains, carry, strands_of
 from printhammer.chaos.bifurcation.columns import (
     OK,
     blank_columns,
@@ -53,7 +53,7 @@ class DiagramBuilder:
         self.values = np.zeros(0)
         self.levels = np.zeros(0, np.int64)
         none = np.zeros(0)
-        self.table = Table([], blank_columns(0, self.points), np.zeros(0, np.int64), none, np.zeros((0, 3)))
+        self.table = Trains([], blank_columns(0, self.points), np.zeros(0, np.int64), none, np.zeros((0, 3)))
         self.exponents, self.errors = none.copy(), none.copy()
         self.done = 0
         self.known = 0
@@ -68,7 +68,7 @@ class DiagramBuilder:
         put(longer, np.arange(len(table.regimes)), table.columns)
         scales = np.repeat(scales_of_columns(regimes), len(self.ways), axis=0)
         nothing = np.full(len(every), np.nan)
-        self.table = Table(
+        self.table = Trains(
             [*table.regimes, *every],
             longer,
             np.concatenate([table.cycles, np.zeros(len(every), np.int64)]),

@@ -54,7 +54,7 @@ class Strand:
 
 
 @dataclass
-class Table:
+class Trains:
     """All trains of a diagram: what is run, and what is found.
 
     Attributes
@@ -86,7 +86,7 @@ def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
 
 
 def carry(
-    table: Table,
+    table: Trains,
     strands: Sequence[Strand],
     start: State,
     run: Callable[[list[int], FloatArray], None],
@@ -96,7 +96,7 @@ def carry(
 
     Parameters
     ----------
-    table : Table
+    table : Trains
         Where the results go.
     strands : sequence of Strand
         Those of one or several directions.
@@ -150,12 +150,12 @@ def _row_before(strands: Sequence[Strand], number: int, place: int) -> int:
     return strands[strand.before].rows[-1]
 
 
-def _from(table: Table, before: int, row: int) -> State:
+def _from(table: Trains, before: int, row: int) -> State:
     x, v, branch, memory = table.columns.last[before].tolist()
     return usable(table.regimes[row], (x, v, branch, memory))
 
 
-def same_attractor(table: Table, row: int, columns: Columns, place: int, cycle: int) -> bool:
+def same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle: int) -> bool:
     """Tell whether a train that was run again came to the attractor on which it was before.
 
     Periodic trains did if their orbits agree within `SAME`. Of trains without a period it is asked that the

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.chaos.strobe.train import HELD_BRANCHES
+from printhammer.chaos.strobe.train import HELD_BRANCHES, pack_branches
 from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
 from printhammer.errors import InputError
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
@@ -288,7 +288,7 @@ def cycles_of(
     distances : array, shape (M,)
         How far these are from each other at most, in half-widths of the window; NaN where there is no q.
     """
-    branch = pack_branches(columns, fronts)
+    branch = pack_branches(columns.x, columns.branch, fronts[:, np.newaxis])
     states = np.stack([columns.x, columns.v, columns.memory], axis=2) / scales[:, np.newaxis]
     cycles = np.zeros(len(states), np.int64)
     distances = np.full(len(states), np.nan)
@@ -304,14 +304,6 @@ def cycles_of(
         distances[near[agree]] = apart[agree]
         left = left[cycles[left] == 0]
     return cycles, distances
-
-
-def pack_branches(columns: Columns, fronts: FloatArray) -> npt.NDArray[np.int8]:
-    """Return the branches of the pack on which the states lie, 0 outside of it."""
-    branch = np.where(columns.x > fronts[:, np.newaxis], columns.branch, 0).astype(np.int8)
-    for held, part_of in HELD_BRANCHES.items():
-        branch[branch == held] = part_of
-    return branch
 
 
 def orbit_distance(one: FloatArray, other: FloatArray) -> float:

@@ -51,7 +51,6 @@ class Bifurcation(Result, rows="direction column"):
         more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where a run did not get",
         codes=MODE_NAMES,
     )
-    status: npt.NDArray[np.str_] = column("", "how the run ended", "direction column")
     cycles: npt.NDArray[np.int64] = column(
         "1",
         "firings after which states repeat, 0 for none",
@@ -82,6 +81,7 @@ class Bifurcation(Result, rows="direction column"):
         name="standard_error",
         head="standard error",
     )
+    status: npt.NDArray[np.str_] = column("", "how the run ended", "direction column")
     levels: npt.NDArray[np.int64] = column(
         "1",
         "refinement, 0 for a given value",
@@ -132,7 +132,7 @@ class Bifurcation(Result, rows="direction column"):
         of = self.regime.quantity(self.parameter)
         note = replace(own["value"][0], unit=of.si, meaning=of.meaning, head=self.parameter)
         own["value"] = replace(note, attrs={"parameter": self.parameter}), self.values
-        return own
+        return {"verdict": own.pop("verdict"), **own}
 
     def windows(self, direction: str | None = None) -> list[Window]:
         """Return the intervals of the parameter with one verdict, of one direction."""

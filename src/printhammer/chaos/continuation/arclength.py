@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.continuation.fixed_points import Follower, MapFamily, MapValue, Node, between
+from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, MapValue, Node, between
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 __all__ = [
+    "Corrector",
     "Curve",
-    "Follower",
     "MapFamily",
     "MapValue",
     "Node",
@@ -185,7 +185,7 @@ def follow(
     low, high = (float(bound) for bound in bounds)
     if not (math.isfinite(low) and math.isfinite(high) and low <= parameter <= high and low < high):
         raise InputError(f"parameter = {parameter:g}, expected one within the bounds {low:g} to {high:g}")
-    follower = Follower(family, scales, chosen.precision)
+    follower = Corrector(family, scales, chosen.precision)
     z = follower.scaled(state, parameter)
     given = None if row is None else np.asarray(row, dtype=np.float64)
     start = follower.onto(z) if given is None else follower.correct(z, given)
@@ -222,7 +222,7 @@ def _reversed(nodes: list[Node]) -> list[Node]:
 
 
 def _half(
-    follower: Follower, start: Node, bounds: tuple[float, float], steps: Steps, watch: Watch | None
+    follower: Corrector, start: Node, bounds: tuple[float, float], steps: Steps, watch: Watch | None
 ) -> tuple[list[Node], Stop]:
     """Follow a curve along the tangent of its start; nodes after it."""
     nodes: list[Node] = []
@@ -270,7 +270,7 @@ def _half(
     return nodes, Stop("length", here.parameter, here.state, told)
 
 
-def _joined(follower: Follower, here: Node, ahead: Node, length: float) -> bool:
+def _joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
     """Return whether a corrected point lies on the same curve, as far as its distance and tangent tell."""
     z = follower.scaled(ahead.state, ahead.parameter)
     predicted = follower.scaled(here.state, here.parameter) + length * here.tangent
@@ -309,7 +309,7 @@ def _bound_stop(node: Node, bound: float) -> Stop:
     return Stop("bound", bound, node.state, f"the bound {bound:.9g} of the parameter is reached")
 
 
-def _at_parameter(follower: Follower, here: Node, ahead: Node, parameter: float) -> Node | None:
+def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float) -> Node | None:
     """Return the point between two nodes at a parameter, its tangent in the direction of travel."""
     share = (parameter - here.parameter) / (ahead.parameter - here.parameter)
     one, other = (follower.scaled(node.state, node.parameter) for node in (here, ahead))
@@ -327,7 +327,7 @@ def _at_parameter(follower: Follower, here: Node, ahead: Node, parameter: float)
     return _turned(exact, tangent, here.arc + float(np.linalg.norm(where - one)))
 
 
-def _passes(follower: Follower, here: Node, ahead: Node, home: FloatArray, start: Node) -> bool:
+def _passes(follower: Corrector, here: Node, ahead: Node, home: FloatArray, start: Node) -> bool:
     """Return whether the curve goes through its start between two nodes."""
     one, other = (follower.scaled(node.state, node.parameter) for node in (here, ahead))
     along = other - one

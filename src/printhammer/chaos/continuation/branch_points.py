@@ -2,7 +2,8 @@
 
 Each kind has a test function that changes sign there (W. J. F. Govaerts, *Numerical Methods for Bifurcations
 of Dynamical Equilibria*, SIAM 2000; Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer
-2004, section 10.2). With J = dG/du, its eigenvalues mu_i, the multipliers, and the tangent t of the curve:
+2004, section 10.2). With J = dG/du, its eigenvalues mu_i, the Floquet multipliers, and the tangent t of the
+curve:
 
 | kind | test function |
 |---|---|
@@ -24,7 +25,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.continuation.arclength import Follower, MapValue, Stop, between, follow
+from printhammer.chaos.continuation.arclength import Corrector, MapValue, Stop, between, follow
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
@@ -136,7 +137,7 @@ def points_of(
     list of BranchPoint
         Ordered along the curve.
     """
-    follower = Follower(family, scales, precision)
+    follower = Corrector(family, scales, precision)
 
     def branching_test(node: Node) -> float:
         return float(np.linalg.det(np.vstack([follower.derivative(node.value), node.tangent])))
@@ -200,7 +201,7 @@ def _has_pair(node: Node) -> bool:
 
 
 def _crossing(
-    follower: Follower, here: Node, ahead: Node, test: Callable[[Node], float]
+    follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
     """Return where between two nodes a test function is zero, as a share of the way, and the node there.
 
@@ -236,7 +237,7 @@ def _crossing(
 
 
 def _branching(
-    follower: Follower, here: Node, ahead: Node, test: Callable[[Node], float]
+    follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
     """Return where two curves cross, as `_crossing`.
 
@@ -262,7 +263,7 @@ def _branching(
 
 
 def _changes(
-    follower: Follower, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
+    follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
     """Return the places between two nodes at which the label changes."""
     found: list[tuple[float, Kind, BranchPoint]] = []
@@ -291,7 +292,7 @@ def _changes(
 
 
 def _change(
-    follower: Follower,
+    follower: Corrector,
     here: Node,
     ahead: Node,
     start: tuple[float, Node],
@@ -406,7 +407,7 @@ def follow_doubled(
     )
 
 
-def birth_of(half: Follower, here: Node, ahead: Node) -> Stop | None:
+def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
     """Return the period doubling at which an orbit of even period ends, where its curve passes one.
 
     There the states half a period apart become one, and the curve goes on as its own mirror image, the same
@@ -414,7 +415,7 @@ def birth_of(half: Follower, here: Node, ahead: Node) -> Stop | None:
 
     Parameters
     ----------
-    half : Follower
+    half : Corrector
         Of the map over half the period.
     here, ahead : Node
         Successive nodes of the curve over the whole period.
@@ -448,7 +449,7 @@ def birth_of(half: Follower, here: Node, ahead: Node) -> Stop | None:
     return Stop(BIRTH, node.parameter, node.state, told, last)
 
 
-def doubling_near(follower: Follower, node: Node) -> Node | None:
+def doubling_near(follower: Corrector, node: Node) -> Node | None:
     """Return the period doubling near a fixed point on its curve, by the secant method; None if not found."""
     step = 1e-3
     z = follower.scaled(node.state, node.parameter)

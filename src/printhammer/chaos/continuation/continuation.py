@@ -1,10 +1,10 @@
 """Continuation: a periodic orbit followed through the values of a constant, stable or not, to where it ends.
 
-A branch is a curve of periodic orbits. Along it the multipliers tell where the orbit loses its stability and
-how; the sequence of contacts tells where one appears or vanishes, a grazing. The contact forces of the
-paper's pack and backstop begin smoothly, with the powers 2.7 and 1.5 of the depth, so that the strobe map has
-a derivative at a grazing and the branch goes on. On a rigid backstop it has none: there a branch ends at its
-first grazing, and the stop says so.
+A branch is a curve of periodic orbits. Along it the Floquet multipliers tell where the orbit loses its
+stability and how; the sequence of contacts tells where one appears or vanishes, a grazing. The contact forces
+of the paper's pack and backstop begin smoothly, with the powers 2.7 and 1.5 of the depth, so that the strobe
+map has a derivative at a grazing and the branch goes on. On a rigid backstop it has none: there a branch ends
+at its first grazing, and the stop says so.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ class Node:
         return bool(np.abs(self.multipliers).max() < 1.0)
 
 
-class Follower:
+class Corrector:
     """Corrects points onto the curves of one map family.
 
     Parameters
@@ -202,7 +202,7 @@ class Follower:
         return np.asarray(tangent / length) if math.isfinite(length) and length > 0.0 else None
 
 
-def between(follower: Follower, here: Node, ahead: Node, share: float) -> Node | None:
+def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node | None:
     """Return the point of a curve at a share, 0 to 1, of the way between two nodes; None if not found.
 
     The way is measured along the tangent of the first; the guess is the cubic through both.

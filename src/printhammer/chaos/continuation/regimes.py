@@ -23,10 +23,10 @@ from printhammer.hammer.names import RATE
 from printhammer.results import Column, Result, part
 from printhammer.results.stacking import stacked
 from printhammer.run.regime import Regime
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     import pandas as pd
 
@@ -183,7 +183,7 @@ def regimes(
         raise InputError(f"rates = {rates!r}, expected the least and the largest rate") from None
     if not low < high:
         raise InputError(f"rates = {rates!r}, expected the least and the largest rate, ascending")
-    count, levels = read_count(seeds, "seeds"), _levels(doublings)
+    count, levels = read_count(seeds, "seeds"), read_count(doublings, "doublings", least=0)
     steps = Steps(most=read_count(most, "most"), precision=PRECISION)
     collected = _Collected((low, high), steps, tolerance, threads)
     many = read_count(longest, "longest")
@@ -224,16 +224,6 @@ def follow_doublings(
     return collected.result()
 
 
-def _levels(doublings: SupportsIndex) -> int:
-    try:
-        found = -1 if isinstance(doublings, bool) else doublings.__index__()
-    except AttributeError:
-        found = -1
-    if found < 0:
-        raise InputError(f"doublings = {doublings!r}, expected a whole number from 0 on")
-    return found
-
-
 class _Collected:
     """Branches found so far."""
 
@@ -263,32 +253,20 @@ class _Collected:
         while left:
             left = [orbit for orbit in left if not self.known(orbit)]
             now, left = left[:_TOGETHER], left[_TOGETHER:]
-            for orbit, branch in zip(now, self.followed(now), strict=True):
+            for orbit, branch in zip(now, mapped(self.followed, now, self.threads, length=1), strict=True):
                 if isinstance(branch, str):
                     self.refused.append(branch)
                 elif not self.known(orbit):
                     self.found.append(branch)
 
-    def followed(self, orbits: Sequence[Orbit]) -> list[Branch | str]:
-        """Return the branches through some orbits, or why there is none."""
-        results: dict[int, Branch | str] = {}
-
-        def work(begin: int, end: int) -> None:
-            for i in range(begin, end):
-                orbit = orbits[i]
-                bounds = read_bounds(orbit.regime, RATE, self.bounds)
-                try:
-                    branch = Tracer(orbit.regime, RATE, bounds, self.tolerance, 1).branch(
-                        np.array(orbit.section), orbit.firings, self.steps, None
-                    )
-                except InputError as error:
-                    told = f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
-                    results[i] = told
-                else:
-                    results[i] = branch
-
-        in_threads([work], [len(orbits)], thread_count(self.threads), lengths=[1])
-        return [results[i] for i in range(len(orbits))]
+    def followed(self, orbit: Orbit) -> Branch | str:
+        """Return the branch through an orbit, or why there is none."""
+        bounds = read_bounds(orbit.regime, RATE, self.bounds)
+        tracer = Tracer(orbit.regime, RATE, bounds, self.tolerance, 1)
+        try:
+            return tracer.branch(np.array(orbit.section), orbit.firings, self.steps, None)
+        except InputError as error:
+            return f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
 
     def known(self, orbit: Orbit) -> bool:
         """Return whether an orbit lies on a branch that was found."""

@@ -28,7 +28,7 @@ from printhammer.chaos.strobe.verdict import period_of
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, derived, part, provenance, scalar
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -272,15 +272,7 @@ class _Chart:
             left = [event for event in left if not any(self.on(curve, event) for curve in found)]
             # As many at once whatever the number of threads, so that the outcome is the same.
             now, left = left[:2], left[2:]
-            results: dict[int, LossCurve | str] = {}
-
-            def work(begin: int, end: int, now: list[BranchEvent] = now, results: Any = results) -> None:
-                for i in range(begin, end):
-                    results[i] = self.curve(now[i])
-
-            in_threads([work], [len(now)], threads, lengths=[1])
-            for i, event in enumerate(now):
-                curve = results[i]
+            for event, curve in zip(now, mapped(self.curve, now, threads, length=1), strict=True):
                 if isinstance(curve, str):
                     refused.append(curve)
                 elif not any(self.on(other, event) for other in found):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.continuation.arclength import Curve, Follower, Node, Steps, Stop, follow
+from printhammer.chaos.continuation.arclength import Corrector, Curve, Node, Steps, Stop, follow
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.branch_points import (
     BIRTH,
@@ -22,11 +22,11 @@ from printhammer.chaos.continuation.events import event_of
 from printhammer.chaos.continuation.family import RegimeFamily, rigid_backstop
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from printhammer.chaos.continuation.events import BranchEvent
-    from printhammer.chaos.continuation.family import Course, Passage
+    from printhammer.chaos.continuation.family import Passage
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
@@ -143,7 +143,7 @@ class Tracer:
             watch=self.watch(2 * firings, steps, None),
         )
         value, state = event.value, event.point.node.state
-        told = f"the orbit is born at {self.told(value)}, where one of half its period doubles"
+        told = f"the orbit is born at {self.at_value(value)}, where one of half its period doubles"
         born = Stop(BIRTH, value, state, told)
         nodes = curve.nodes
         at_birth = family(state, value)
@@ -155,13 +155,13 @@ class Tracer:
 
     def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
         """Return the orbit near a state at one value of the constant; None if there is none."""
-        follower = Follower(self.family(firings), self.scales, PRECISION)
+        follower = Corrector(self.family(firings), self.scales, PRECISION)
         row = np.zeros(3)
         row[-1] = 1.0
         found = follower.correct(follower.scaled(state, value), row)
         return None if found is None else np.asarray(found.state)
 
-    def told(self, value: float) -> str:
+    def at_value(self, value: float) -> str:
         """Return a value of the constant with name and unit."""
         return f"{self.parameter} = {value:{_DIGITS}} {self.regime.quantity(self.parameter).si}"
 
@@ -169,7 +169,7 @@ class Tracer:
         """Return what is asked between any two nodes: whether the branch ends there."""
         half, whole = None, self.family(firings)
         if firings % 2 == 0:
-            half = Follower(self.family(firings // 2), self.scales, steps.precision)
+            half = Corrector(self.family(firings // 2), self.scales, steps.precision)
         rigid = rigid_backstop(self.regime)
         parts = [self.family(firings // k) for k in range(2, firings + 1) if firings % k == 0]
         taken = 0
@@ -207,7 +207,7 @@ class Tracer:
         other.
         """
         longest = max(shorter, key=lambda part: part.firings)
-        half = Follower(longest, self.scales, PRECISION)
+        half = Corrector(longest, self.scales, PRECISION)
         row = np.zeros(3)
         row[-1] = 1.0
         single = half.correct(half.scaled(ahead.state, ahead.parameter), row)
@@ -223,13 +223,7 @@ class Tracer:
     def described(self, family: RegimeFamily, curve: Curve, steps: Steps) -> Branch:
         """Return a branch with all about its orbits."""
         nodes = curve.nodes
-        courses: dict[int, Course] = {}
-
-        def work(begin: int, end: int) -> None:
-            for i in range(begin, end):
-                courses[i] = family.course(nodes[i].state, nodes[i].parameter)
-
-        in_threads([work], [len(nodes)], thread_count(self.threads))
+        courses = mapped(lambda node: family.course(node.state, node.parameter), nodes, self.threads)
         count = len(nodes)
         passages: list[Passage] = [node.value.extra for node in nodes]
         dots = [passage.dots for passage in passages]
@@ -239,7 +233,7 @@ class Tracer:
             return np.array(rows, dtype=np.float64).reshape(count, family.firings)
 
         def of_courses(name: str) -> FloatArray:
-            return np.array([getattr(courses[i], name) for i in range(count)], dtype=np.float64)
+            return np.array([getattr(course, name) for course in courses], dtype=np.float64)
 
         states = of_courses("states").reshape(count, family.firings, 2)
         found = points_of(
@@ -276,14 +270,14 @@ class Tracer:
             residual=np.array([node.residual for node in nodes]),
             contacts=tuple(row.sequence for row in passages),
             events=tuple(event_of(point) for point in found),
-            stops=(self.retold(stops[0]), self.retold(stops[1])),
+            stops=(self.in_words(stops[0]), self.in_words(stops[1])),
             curve=curve,
             follow_doubled=partial(self.doubled, family.firings),
         )
 
-    def retold(self, stop: Stop) -> Stop:
+    def in_words(self, stop: Stop) -> Stop:
         """Return a stop whose sentence names the constant and its unit."""
-        at = self.told(stop.parameter)
+        at = self.at_value(stop.parameter)
         why = stop.sentence.rpartition(": ")[2]
         sentences = {
             "bound": f"{at} is the bound",

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 import numpy as np
 
 from printhammer.chaos.exponents.lyapunov import EXPONENT, FIRINGS, PER_FIRING, TRANSIENT, exponents_of_train
-from printhammer.chaos.strobe.points import transient_of
 from printhammer.chaos.strobe.train import Train
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, coordinate, part, provenance, scalar
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import regimes_of
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from printhammer.chaos.exponents.lyapunov import Lyapunov
-    from printhammer.chaos.strobe.points import Strobe
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
@@ -82,7 +80,9 @@ class LyapunovChart(Result, rows="period"):
         """
         if not found:
             raise InputError("periods: expected at least one train")
-        return _chart(found[0].points, [_row(one) for one in found])
+        points = found[0].points
+        firings = int(points.firing[0]), int(points.firing[-1])
+        return _chart(points.hammer, points.drive, firings, points.tolerance, [_row(one) for one in found])
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
         """Return all columns over `period`, and both exponents side by side."""
@@ -132,22 +132,13 @@ def lyapunovs(
     InputError
         As for `lyapunov`, or numbers of hammers and periods that do not fit together.
     """
-    counts = read_count(firings, "firings"), transient_of(transient)
+    counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
     trains = [Train.of(regime.at_firings, sum(counts) + 1) for regime in regimes]
     # Only a row is kept of each train, so that memory does not grow with their length.
-    rows: dict[int, dict[str, Any]] = {}
-    begun: dict[int, Strobe] = {}
-
-    def work(begin: int, end: int) -> None:
-        for i in range(begin, end):
-            found = exponents_of_train(trains[i], counts, tolerance)
-            rows[i] = _row(found)
-            if i == 0:
-                begun[0] = found.points
-
-    in_threads([work], [len(trains)], thread_count(threads), progress)
-    return _chart(begun[0], [rows[i] for i in range(len(trains))])
+    rows = mapped(lambda train: _row(exponents_of_train(train, counts, tolerance)), trains, threads, progress)
+    first = counts[1] + 1
+    return _chart(trains[0].hammer, trains[0].drive, (first, first + counts[0]), tolerance, rows)
 
 
 def _row(found: Lyapunov) -> dict[str, Any]:
@@ -169,17 +160,13 @@ def _row(found: Lyapunov) -> dict[str, Any]:
     }
 
 
-def _chart(points: Strobe, rows: list[dict[str, Any]]) -> LyapunovChart:
+def _chart(
+    hammer: Hammer, drive: Drive, firings: tuple[int, int], tolerance: float, rows: list[dict[str, Any]]
+) -> LyapunovChart:
     named = ("verdict", "zero_one", "growth", "status")
     columns: dict[str, Any] = {
         name: tuple(row[name] for row in rows) if name in named else np.array([row[name] for row in rows])
         for name in rows[0]
     }
-    return LyapunovChart(
-        hammer=points.hammer,
-        drive=points.drive,
-        first=int(points.firing[0]),
-        last=int(points.firing[-1]),
-        tolerance=points.tolerance,
-        **columns,
-    )
+    first, last = firings
+    return LyapunovChart(hammer=hammer, drive=drive, first=first, last=last, tolerance=tolerance, **columns)

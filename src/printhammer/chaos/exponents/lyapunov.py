@@ -1,4 +1,4 @@
-"""Lyapunov exponents of the strobe map: how fast neighbouring motions part, or come together.
+"""Lyapunov exponents of the stroboscopic map: how fast neighbouring motions part, or come together.
 
 From firing to firing the tangent flow (docs/tangent.md) stretches one direction of the plane of displacement
 and velocity and shrinks the other. The mean logarithms are the exponents lambda_1 >= lambda_2; their sum is
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 import numpy as np
 
 from printhammer.chaos.exponents.zero_one import FEWEST, ZeroOne, zero_one
-from printhammer.chaos.strobe.points import strobe_of, transient_of
+from printhammer.chaos.strobe.points import strobe_of
 from printhammer.chaos.strobe.train import States, Train
 from printhammer.chaos.strobe.verdict import SIGNIFICANT, verdict
 from printhammer.derivatives.states import standard_error, strobe_exponent
@@ -260,7 +260,7 @@ def lyapunov(
     InputError
         An argument is not what is described above, or the hammer has no waveform or no rest state.
     """
-    counts = read_count(firings, "firings"), transient_of(transient)
+    counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     train = Train.of(Regime.of(hammer, **firing).at_firings, sum(counts) + 1, state)
     return exponents_of_train(train, counts, tolerance)
 

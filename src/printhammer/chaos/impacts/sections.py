@@ -1,4 +1,4 @@
-"""Impact maps: the state at each touch of the backstop or of the pack.
+"""Impact maps: Poincaré sections at the touches of the backstop or of the pack.
 
 At a touch the displacement is that of the surface. What decides all that follows is the velocity and the time
 since the last firing; from touch to touch these two are an iterated map, as the strobe is from firing to
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Final, Literal, SupportsIndex, Unpack, get_arg
 
 import numpy as np
 
-from printhammer.chaos.strobe.points import transient_of
 from printhammer.chaos.strobe.train import Train
 from printhammer.drive.input import MOST_PULSES, read_count
 from printhammer.errors import InputError
@@ -20,7 +19,7 @@ from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.regime import Regime, regimes_of
 from printhammer.run.start import initial_state
 from printhammer.run.touches import touches_of
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -199,21 +198,14 @@ def sections(
     check_tolerance(tolerance)
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
     trains = [Train.of(regime, counts[1] + counts[2]) for regime in regimes]
-    found: dict[int, Section] = {}
-
-    def work(begin: int, end: int) -> None:
-        for i in range(begin, end):
-            found[i] = _section(trains[i], surface, counts, tolerance)
-
-    in_threads([work], [len(trains)], thread_count(threads), progress)
-    return [found[i] for i in range(len(trains))]
+    return mapped(lambda train: _section(train, surface, counts, tolerance), trains, threads, progress)
 
 
 def _counts(
     touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
 ) -> tuple[int, int, int]:
     """Return the numbers of touches, of firings left out, and of firings after which to give up."""
-    wanted, skipped = read_count(touches, "touches"), transient_of(transient)
+    wanted, skipped = read_count(touches, "touches"), read_count(transient, "transient", least=0)
     room = MOST_PULSES - skipped - 1
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
     if not 1 <= limit <= room:

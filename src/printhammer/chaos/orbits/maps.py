@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.chaos.orbits.newton import CLOSED, Images
-from printhammer.chaos.strobe.map import IN_PACK, WITH_MEMORY, image_of, usable
+from printhammer.chaos.strobe.map import IN_PACK, WITH_MEMORY, Image, image_of, usable
 from printhammer.errors import InputError
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.start import initial_state
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -49,16 +49,14 @@ class ExactMaps:
 
     def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
         """Return the images of states, each after its own number of firings."""
+
+        def image(i: int) -> Image:
+            return image_of(self.regime, states[i], int(firings[i]), self.tolerance, contacts=False)
+
         found = Images.empty(len(states))
-
-        def work(begin: int, end: int) -> None:
-            for i in range(begin, end):
-                image = image_of(self.regime, states[i], int(firings[i]), self.tolerance, contacts=False)
-                found.states[i], found.jacobians[i] = image.state, image.jacobian
-                found.smooth[i] = image.smooth
-                found.reasons[i] = CLOSED if image.ok else image.status
-
-        in_threads([work], [len(states)], self.threads)
+        for i, one in enumerate(mapped(image, range(len(states)), self.threads)):
+            found.states[i], found.jacobians[i], found.smooth[i] = one.state, one.jacobian, one.smooth
+            found.reasons[i] = CLOSED if one.ok else one.status
         return found
 
 

@@ -12,14 +12,14 @@ from printhammer.chaos.orbits.guesses import PHASES, close_returns, first_state,
 from printhammer.chaos.orbits.maps import ExactMaps, FastMaps
 from printhammer.chaos.orbits.newton import Closing, close_orbits
 from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, no_orbit, orbit_of, orbits_table
-from printhammer.chaos.strobe.map import MAP_TOLERANCE
+from printhammer.chaos.strobe.map import MAP_TOLERANCE, read_state
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, part, scalar
 from printhammer.results.stacking import stacked
 from printhammer.run.problem import TOLERANCE, check_tolerance
 from printhammer.run.regime import Regime
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -217,11 +217,7 @@ def orbit(
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     check_tolerance(tolerance)
-    found = np.asarray(state, dtype=np.float64)
-    if found.shape != (2,) or not np.isfinite(found).all():
-        raise InputError(
-            f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
-        )
+    found = read_state(state)
     if count > MOST_FIRINGS:
         raise InputError(f"firings = {count}, expected at most {MOST_FIRINGS}")
     scales = regime.window.half_widths
@@ -349,22 +345,14 @@ class _Search:
 
     def _described(self, closed: Sequence[tuple[Regime, Closing]]) -> list[Orbit]:
         """Return all about the orbits, without those that were found at another section too."""
-        every: dict[int, Orbit] = {}
-
-        def work(begin: int, end: int) -> None:
-            for i in range(begin, end):
-                regime, closing = closed[i]
-                every[i] = orbit_of(regime, closing, self.tolerance)
-
-        in_threads([work], [len(closed)], self.threads)
         found: list[Orbit] = []
-        for i in range(len(closed)):
-            if not every[i].ok:
-                self.failures[every[i].status] += 1
-            elif any(self._same(every[i], other) for other in found):
+        for one in mapped(lambda pair: orbit_of(*pair, self.tolerance), closed, self.threads):
+            if not one.ok:
+                self.failures[one.status] += 1
+            elif any(self._same(one, other) for other in found):
                 self.repeats += 1
             else:
-                found.append(every[i])
+                found.append(one)
         return sorted(found, key=lambda orbit: (orbit.firings, KINDS.index(orbit.kind), *orbit.x, *orbit.v))
 
     def _same(self, one: Orbit, other: Orbit) -> bool:

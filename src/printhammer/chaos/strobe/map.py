@@ -1,4 +1,8 @@
-"""The strobe map: from the state at one section to that some firings later, with its derivative.
+"""The stroboscopic map: from the state at one section to that some firings later, with its derivative.
+
+It is the Poincaré map of a section at a fixed phase of the drive. Its derivative over a period of an orbit is
+the monodromy matrix, whose eigenvalues are the Floquet multipliers; where a motion touches a surface, the
+tangent flow passes it by the saltation matrix (docs/tangent.md).
 
 A section lies at a fixed phase of the period. There the state is displacement and velocity, unless the
 armature is just then in the pack on its way out: then what the pack remembers belongs to it too, and the
@@ -22,7 +26,7 @@ from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import Problem, check_tolerance
 from printhammer.run.regime import Regime
 from printhammer.run.start import initial_state
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -135,12 +139,23 @@ def strobe_map(
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     check_tolerance(tolerance)
+    return image_of(regime, read_state(state), count, tolerance, contacts=contacts)
+
+
+def read_state(state: npt.ArrayLike) -> FloatArray:
+    """Read displacement, m, and velocity, m/s.
+
+    Raises
+    ------
+    InputError
+        It is not two finite numbers.
+    """
     found = np.asarray(state, dtype=np.float64)
     if found.shape != (2,) or not np.isfinite(found).all():
         raise InputError(
             f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
         )
-    return image_of(regime, found, count, tolerance, contacts=contacts)
+    return found
 
 
 def strobe_maps(
@@ -183,14 +198,12 @@ def strobe_maps(
     if len(many) != len(rows):
         raise InputError(f"regimes: {len(many)} are given, expected 1 or {len(rows)}")
     many = [Regime.of(regime, phase=phase) for regime in many]
-    found: dict[int, Image] = {}
-
-    def work(begin: int, end: int) -> None:
-        for i in range(begin, end):
-            found[i] = image_of(many[i], rows[i], count, tolerance, contacts=contacts)
-
-    in_threads([work], [len(rows)], thread_count(threads), progress)
-    return [found[i] for i in range(len(rows))]
+    return mapped(
+        lambda i: image_of(many[i], rows[i], count, tolerance, contacts=contacts),
+        range(len(rows)),
+        threads,
+        progress,
+    )
 
 
 def strobe_slope(

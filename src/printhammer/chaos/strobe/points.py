@@ -1,20 +1,19 @@
 """Strobe: the state of the armature once a period, as the Poincaré plots of Fig. 11 show it.
 
-A train of firings is an iterated map in the plane of displacement and velocity: from the state at one firing
-to that at the next. Where a firing falls inside a pack contact, the state also has the branch of the pack's
-law and its memory, the latest local maximum.
+A train of firings is an iterated map, the stroboscopic map, in the plane of displacement and velocity: from
+the state at one firing to that at the next. Where a firing falls inside a pack contact, the state also has
+the branch of the pack's law and its memory, the latest local maximum.
 """
 
 from __future__ import annotations
 
-import operator
 from typing import TYPE_CHECKING, Any, SupportsIndex, Unpack
 
 import numpy as np
 
 from printhammer.chaos.strobe.train import Train, run_trains
 from printhammer.chaos.strobe.verdict import FIRST, LAST
-from printhammer.drive.input import MOST_PULSES, read_count
+from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
@@ -200,7 +199,7 @@ def strobes(
     InputError
         As for `strobe`, or numbers of hammers, periods and states that do not fit together.
     """
-    count, skipped = read_count(points, "points"), transient_of(transient)
+    count, skipped = read_count(points, "points"), read_count(transient, "transient", least=0)
     if not 1 <= firings[0] < firings[1]:
         raise InputError(f"firings = {firings!r}, expected the first and the last firing to judge, ascending")
     fired = max(count + skipped, firings[1] if verdict else 1)
@@ -262,22 +261,3 @@ def strobe_of(
         tolerance=tolerance,
         verdict=judged,
     )
-
-
-def transient_of(transient: SupportsIndex) -> int:
-    """Read a number of firings to leave out.
-
-    Raises
-    ------
-    InputError
-        It is none.
-    """
-    try:
-        count = -1 if isinstance(transient, bool) else operator.index(transient)
-    except TypeError:
-        count = -1
-    if not 0 <= count <= MOST_PULSES:
-        raise InputError(
-            f"transient = {transient!r}, expected a whole number of firings from 0 to {MOST_PULSES}"
-        )
-    return count

@@ -24,7 +24,7 @@ from printhammer.chaos.strobe.train import Train, exponents_of, run_trains
 from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, period_of, verdict
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -125,17 +125,15 @@ def _settled(
         period = period_of(row)
         done = period is not None and found.status == "ok" and row[period - 1] <= CLOSER * AGREEMENT
         closer.append(period if done else None)
-    stable: dict[int, bool] = {}
     candidates = [(i, period) for i, period in enumerate(closer) if period is not None]
-
-    def work(begin: int, end: int) -> None:
-        for i, period in candidates[begin:end]:
-            stable[i] = largest_multiplier(trains[i], states[i], period, tolerance) <= LARGEST_MULTIPLIER
-
-    in_threads([work], [len(candidates)], thread_count(threads))
+    largest = mapped(
+        lambda found: largest_multiplier(trains[found[0]], states[found[0]], found[1], tolerance),
+        candidates,
+        threads,
+    )
+    stable = {i for (i, _), size in zip(candidates, largest, strict=True) if size <= LARGEST_MULTIPLIER}
     return [
-        verdict(distances[i], firings, tolerance, None) if stable.get(i, False) else None
-        for i in range(len(trains))
+        verdict(distances[i], firings, tolerance, None) if i in stable else None for i in range(len(trains))
     ]
 
 

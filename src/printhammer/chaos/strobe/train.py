@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from printhammer.chaos.strobe.verdict import period_of, repeats, verdict
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.window import window_of
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,14 +91,21 @@ class States:
         """Return how far the states are from repeating, see `printhammer.chaos.strobe.verdict.repeats`."""
         width, speed = window_of(train.hammer, train.drive).half_widths
         front = math.inf if train.hammer.front is None else train.hammer.front
-        branch = np.where(self.x > front, self.branch, 0)
-        for held, part_of in HELD_BRANCHES.items():
-            branch[branch == held] = part_of
         return repeats(
             np.column_stack([self.x, self.v, self.memory]),
-            branch,
+            pack_branches(self.x, self.branch, front),
             np.array([width, speed, width]),
         )
+
+
+def pack_branches(
+    x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray
+) -> npt.NDArray[np.int64]:
+    """Return the branches of the pack on which states lie, 0 outside of it."""
+    found = np.where(x > front, branch, 0).astype(np.int64)
+    for held, part_of in HELD_BRANCHES.items():
+        found[found == held] = part_of
+    return found
 
 
 def run_trains(
@@ -204,20 +211,17 @@ def exponents_of(
     """Return the largest exponents of trains, from the first to the last of some firings, on all cores."""
     from printhammer.derivatives.states import strobe_exponent
 
-    found: dict[int, Exponent] = {}
-
-    def work(begin: int, end: int) -> None:
-        for i in range(begin, end):
-            train = trains[i]
-            found[i] = strobe_exponent(
-                train.hammer,
-                train.drive,
-                train.period,
-                first=firings[0],
-                last=firings[1],
-                state=train.state,
-                tolerance=tolerance,
-            )
-
-    in_threads([work], [len(trains)], thread_count(threads), progress)
-    return [found[i] for i in range(len(trains))]
+    return mapped(
+        lambda train: strobe_exponent(
+            train.hammer,
+            train.drive,
+            train.period,
+            first=firings[0],
+            last=firings[1],
+            state=train.state,
+            tolerance=tolerance,
+        ),
+        trains,
+        threads,
+        progress,
+    )
