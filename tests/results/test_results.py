@@ -35,7 +35,7 @@ from printhammer.support.arrays import FloatArray
 
 _FIGURES = Path(printhammer.__file__).parent / "figures"
 
-WITHOUT_PICTURE = {"DotTable", "EnsembleResult", "Measurement", "Strobes"}
+WITHOUT_PICTURE = {"DotTable", "EnsembleResult", "Measurement", "Spread", "Strobes"}
 
 
 @pytest.fixture(scope="module")

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray
 
+CONFIDENCE: Final = 0.95
+"""Probability with which an interval is meant to contain the constant."""
+
 LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
 """Laws whose constants are fitted, by role."""
 
@@ -30,9 +33,6 @@ _REPLACED: Final = {
     ),
     "backstop.damping": ("restitution", "restitution_speed"),
 }
-
-CONFIDENCE: Final = 0.95
-"""Probability with which an interval is meant to contain the constant."""
 
 
 @dataclass(frozen=True)
@@ -222,12 +222,48 @@ class Fit(Result):
 
     @property
     def for_file(self) -> dict[str, dict[str, str | float]]:
-        """The constants that a hammer file has, as tables that `Hammer.replace` takes."""
-        return constants_for_file(self)
+        """The constants that a hammer file has, as tables for `Hammer.replace`, with status and source."""
+        return {
+            key: {
+                "value": constant.value,
+                "unit": constant.unit,
+                "status": "derived",
+                "source": self._source(constant),
+            }
+            for key, constant in self.constants.items()
+            if constant.in_file
+        }
+
+    def _source(self, constant: FittedConstant) -> str:
+        """Return the source of a constant, such as "fitted to magnet.csv, standard error 0.02 N"."""
+        how = constant.how or f"fitted to {' and '.join(self.source)}"
+        error = constant.standard_error
+        return f"{how}, standard error {error:.2g} {constant.unit}" if error else how
 
     def fragment(self) -> str:
-        """Return the constants as TOML text for a hammer file."""
-        return fragment(self)
+        """Return the constants as TOML text for a hammer file, with comments on what they hold for."""
+        from printhammer.hammer.edit import changed_text
+
+        files = f", fitted to {' and '.join(self.source)}" if self.source else ""
+        remarks = [f"Constants of a hammer file{files}"]
+        remarks += [f"taken as known: {name} = {value}" for name, value in self.given.items()]
+        remarks += self.indistinct
+        if self.rejected:
+            remarks.append(f"the data reject the law: {self.rejected}")
+        found = self.for_file
+        sections = {key.rpartition(".")[0]: None for key in found}
+        laws = [(f"{section}.law", LAWS[section]) for section in sections if section in LAWS]
+        comments = "".join(f"# {' '.join(remark.split())}\n" for remark in remarks)
+        # Tables come last, or the constants at the top would become theirs.
+        return changed_text(comments, sorted([*laws, *found.items()], key=lambda edit: "." in edit[0]))
+
+    def covariance_table(self) -> str:
+        """Return the covariance as CSV: a row and a column for each constant, SI, units in comments."""
+        lines = [f"# unit of {key}: {self.constants[key].unit}" for key in self.keys]
+        lines.append(",".join(["constant", *self.keys]))
+        for key, row in zip(self.keys, self.covariance, strict=True):
+            lines.append(",".join([key, *(repr(float(entry)) for entry in row)]))
+        return "\n".join(lines) + "\n"
 
     def into(self, hammer: Hammer) -> Hammer:
         """Return a hammer with the constants replaced by those found.
@@ -237,12 +273,57 @@ class Fit(Result):
         InputError
             The hammer has another law for the part, or takes as different what the fit took as known.
         """
-        return into(self, hammer)
+        found = self.for_file
+        sections = {key.rpartition(".")[0] for key in found} & set(LAWS)
+        for section in sorted(sections):
+            part = hammer.parts.get(section)
+            if part is None or part.law != LAWS[section]:
+                law = "is missing" if part is None else f"has the law {part.law!r}"
+                raise InputError(f"{hammer.path}: the {section} {law}, expected the law {LAWS[section]!r}")
+        for key, text in self.given.items():
+            _agrees(hammer, key, text)
+        gone = [f"{key.rpartition('.')[0]}.{name}" for key in found for name in _REPLACED.get(key, ())]
+        taken = {key: None for key in gone if key in hammer.constants}
+        return hammer.replace({**taken, **found})
 
     @property
     def report(self) -> list[str]:
         """What there is to say, line by line."""
-        return report(self)
+        lines = []
+        for constant in self.constants.values():
+            low, high = constant.interval
+            lines.append(
+                f"{constant.key} = {constant.value:.6g} {constant.unit}, standard error"
+                f" {constant.standard_error:.2g}, 95 % interval {low:.6g} to {high:.6g}"
+            )
+        used = int((~self.outliers).sum())
+        if used:
+            lines.append(
+                f"{used} data, {self.degrees_of_freedom:g} degrees of freedom, residual scale"
+                f" {self.residual_scale:.3g} {self.axes[1][1]}, condition number {self.condition_number:.3g}"
+            )
+        if self.outliers.any():
+            lines.append(self.outlier_lines())
+        if math.isfinite(self.p_value):
+            lines.append(f"test of the law: p = {self.p_value:.3g}")
+        if self.rejected:
+            lines.append(f"the data reject the law: {self.rejected}")
+        return [*lines, *self.indistinct, *self.remarks]
+
+    def outlier_lines(self, most: int = 20) -> str:
+        """Say which rows were left out; of several files, also to which series each belongs."""
+        rows = [int(row) for row in np.flatnonzero(self.outliers)]
+        told = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
+        if not len(self.lines):
+            return told
+        listed = [str(self.lines[row]) for row in rows[:most]]
+        if len(self.source) > 1:
+            listed = [
+                f"{line} ({self.series_names[self.series[row]]})"
+                for line, row in zip(listed, rows, strict=False)
+            ]
+        more = ", …" if len(rows) > most else ""
+        return f"{told}: line{'s' if len(rows) > 1 else ''} {', '.join(listed)}{more}"
 
 
 def student(degrees_of_freedom: float) -> float:
@@ -250,116 +331,6 @@ def student(degrees_of_freedom: float) -> float:
     from scipy.stats import t
 
     return float(t.ppf(0.5 + 0.5 * CONFIDENCE, degrees_of_freedom))
-
-
-def constants_for_file(fit: Fit) -> dict[str, dict[str, str | float]]:
-    """Return the constants that a hammer file has, each as a table of the file, with status and source."""
-    return {
-        key: {
-            "value": constant.value,
-            "unit": constant.unit,
-            "status": "derived",
-            "source": source(fit, constant),
-        }
-        for key, constant in fit.constants.items()
-        if constant.in_file
-    }
-
-
-def source(fit: Fit, constant: FittedConstant) -> str:
-    """Return the source of a constant, such as "fitted to magnet.csv, standard error 0.02 N"."""
-    files = " and ".join(fit.source)
-    how = constant.how or f"fitted to {files}"
-    error = constant.standard_error
-    return f"{how}, standard error {error:.2g} {constant.unit}" if error else how
-
-
-def fragment(fit: Fit) -> str:
-    """Return the constants as TOML text for a hammer file, with comments on what they hold for."""
-    from printhammer.hammer.edit import changed_text
-
-    files = f", fitted to {' and '.join(fit.source)}" if fit.source else ""
-    remarks = [f"Constants of a hammer file{files}"]
-    remarks += [f"taken as known: {name} = {value}" for name, value in fit.given.items()]
-    remarks += fit.indistinct
-    if fit.rejected:
-        remarks.append(f"the data reject the law: {fit.rejected}")
-    found = constants_for_file(fit)
-    sections = {key.rpartition(".")[0]: None for key in found}
-    laws = [(f"{section}.law", LAWS[section]) for section in sections if section in LAWS]
-    comments = "".join(f"# {' '.join(remark.split())}\n" for remark in remarks)
-    # Tables come last, or the constants at the top would become theirs.
-    return changed_text(comments, sorted([*laws, *found.items()], key=lambda edit: "." in edit[0]))
-
-
-def covariance_table(fit: Fit) -> str:
-    """Return the covariance as CSV: a row and a column for each constant, SI, units in comments."""
-    lines = [f"# unit of {key}: {fit.constants[key].unit}" for key in fit.keys]
-    lines.append(",".join(["constant", *fit.keys]))
-    for key, row in zip(fit.keys, fit.covariance, strict=True):
-        lines.append(",".join([key, *(repr(float(entry)) for entry in row)]))
-    return "\n".join(lines) + "\n"
-
-
-def into(fit: Fit, hammer: Hammer) -> Hammer:
-    """Return a hammer with the constants of a fit.
-
-    Raises
-    ------
-    InputError
-        The hammer has another law for the part, or takes as different what the fit took as known.
-    """
-    found = constants_for_file(fit)
-    sections = {key.rpartition(".")[0] for key in found} & set(LAWS)
-    for section in sorted(sections):
-        part = hammer.parts.get(section)
-        if part is None or part.law != LAWS[section]:
-            law = "is missing" if part is None else f"has the law {part.law!r}"
-            raise InputError(f"{hammer.path}: the {section} {law}, expected the law {LAWS[section]!r}")
-    for key, text in fit.given.items():
-        _agrees(hammer, key, text)
-    gone = [f"{key.rpartition('.')[0]}.{name}" for key in found for name in _REPLACED.get(key, ())]
-    taken = {key: None for key in gone if key in hammer.constants}
-    return hammer.replace({**taken, **found})
-
-
-def report(fit: Fit) -> list[str]:
-    """Return what there is to say of a fit, line by line."""
-    lines = []
-    for constant in fit.constants.values():
-        low, high = constant.interval
-        lines.append(
-            f"{constant.key} = {constant.value:.6g} {constant.unit}, standard error"
-            f" {constant.standard_error:.2g}, 95 % interval {low:.6g} to {high:.6g}"
-        )
-    used = int((~fit.outliers).sum())
-    if used:
-        lines.append(
-            f"{used} data, {fit.degrees_of_freedom:g} degrees of freedom, residual scale"
-            f" {fit.residual_scale:.3g} {fit.axes[1][1]}, condition number {fit.condition_number:.3g}"
-        )
-    if fit.outliers.any():
-        lines.append(outliers(fit))
-    if math.isfinite(fit.p_value):
-        lines.append(f"test of the law: p = {fit.p_value:.3g}")
-    if fit.rejected:
-        lines.append(f"the data reject the law: {fit.rejected}")
-    return [*lines, *fit.indistinct, *fit.remarks]
-
-
-def outliers(fit: Fit, most: int = 20) -> str:
-    """Say which rows were left out; of several files, also to which series each belongs."""
-    rows = [int(row) for row in np.flatnonzero(fit.outliers)]
-    told = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
-    if not len(fit.lines):
-        return told
-    listed = [str(fit.lines[row]) for row in rows[:most]]
-    if len(fit.source) > 1:
-        listed = [
-            f"{line} ({fit.series_names[fit.series[row]]})" for line, row in zip(listed, rows, strict=False)
-        ]
-    more = ", …" if len(rows) > most else ""
-    return f"{told}: line{'s' if len(rows) > 1 else ''} {', '.join(listed)}{more}"
 
 
 def _agrees(hammer: Hammer, key: str, text: str) -> None:

@@ -48,7 +48,7 @@ def _filled_up(arrays: list[Any], dims: int) -> Any:
         return np.zeros((0,) * (dims + 1))
     shape = [max(array.shape[axis] for array in arrays) for axis in range(dims)]
     dtype = np.result_type(*arrays)
-    nothing: Any = {"U": "", "i": -1}.get(dtype.kind, np.nan)
+    nothing: Any = {"U": "", "i": -1, "b": False}.get(dtype.kind, np.nan)
     table: Any = np.full((len(arrays), *shape), nothing, dtype=dtype)
     for k, array in enumerate(arrays):
         table[(k, *(slice(length) for length in array.shape))] = array

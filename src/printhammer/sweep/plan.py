@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from printhammer.sweep.outputs import Output
     from printhammer.sweep.spec import Spec
 
-
 MEMBER: Final = "member"
 
 _MOST_MEMBERS: Final = 1_000_000_000

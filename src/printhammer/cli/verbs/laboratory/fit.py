@@ -225,7 +225,6 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
     """Fit, and return what is shown and written."""
     from printhammer.cli.verbs.laboratory.fit_report import described
     from printhammer.hammer.hammer import load
-    from printhammer.identify.result import covariance_table
 
     for path in job.wanted["into"]:
         if hammer is None:
@@ -236,7 +235,7 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
     files = {
         "plot": Content(plot=partial(_drawn, fit)),
         "out": Content.text(fit.fragment),
-        "covariance": Content.text(partial(covariance_table, fit)),
+        "covariance": Content.text(fit.covariance_table),
     }
     if job.wanted["into"] and known is not None:
         files["into"] = Content(fit.into(known).save)

@@ -28,15 +28,13 @@ _COLUMNS: Final[tuple[Column[FittedConstant], ...]] = (
 
 def described(fit: Fit) -> list[RenderableType]:
     """Return what a fit tells."""
-    from printhammer.identify.result import outliers
-
     files = f"  [dim]{escape(' and '.join(fit.source))}[/dim]" if fit.source else ""
     scale = f"residual scale {fit.residual_scale:.3g} {fit.axes[1][1]}"
     several = len(fit.keys) > 1
     verdict = "[bold yellow]rejected[/bold yellow]" if fit.rejected else "[green]not rejected[/green]"
     rows: list[tuple[str, str | None]] = [
         ("data", f"{int((~fit.outliers).sum())} used, {scale}" if len(fit.data) else None),
-        ("robust", escape(outliers(fit)) if fit.outliers.any() else None),
+        ("robust", escape(fit.outlier_lines()) if fit.outliers.any() else None),
         ("correlation", escape(_largest_correlation(fit)) if several else None),
         ("condition", f"{fit.condition_number:.3g}" if several else None),
         ("law", f"{verdict}, p = {fit.p_value:.2g}" if math.isfinite(fit.p_value) else None),
