@@ -110,7 +110,7 @@ def test_a_chart(cli: Callable, tmp_path: Path) -> None:
         (("--from", "1 ms", "--to", "2 ms", "--regimes", "--parameter", "period"), "--parameter"),
         (("--from", "800 Hz", "--to", "700 Hz", "--rate", "750 Hz"), "ascending"),
         (("--from", "700 Hz", "--to", "800 Hz", "--rate", "2 kHz"), "within the bounds"),
-        (("--from", "1", "--to", "2", "--rate", "1 kHz", "--parameter", "nothing"), "nothing is not known"),
+        (("--from", "1", "--to", "2", "--rate", "1 kHz", "--parameter", "nothing"), "'nothing' is not known"),
         ((*SLOW, "--state", "1 um"), "--state"),
         ((*SLOW, "--state", "1 um, 1 um"), "--state"),
         ((*SLOW, "--doublings", "-1"), "doublings"),

@@ -1,5 +1,6 @@
 import json
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import pandas as pd
@@ -8,7 +9,6 @@ import xarray as xr
 from tests.hammers import CRUDE
 
 import printhammer as ph
-from printhammer.cli.verbs.printing.quality_report import damping
 from printhammer.printing.rates.materials import Material
 
 GRID = ("--first", "400 Hz", "--last", "1.2 kHz", "--step", "400 Hz")
@@ -43,7 +43,7 @@ def test_the_safe_rate(cli: Callable, tmp_path: Path) -> None:
     found = ph.safe_rate(ph.load(CRUDE), first=400.0, last=1200.0, step=400.0)
     assert found.failure is not None
     assert found.failure.text[:30] in done.out
-    assert json.loads(out.read_text())["columns"]["rate"] == found.rates.tolist()
+    assert json.loads(out.read_text())["columns"]["rate"]["values"] == found.rates.tolist()
     assert b"<svg" in (tmp_path / "rates.svg").read_bytes()
 
 
@@ -83,7 +83,7 @@ def test_the_damping_study(cli: Callable, tmp_path: Path, monkeypatch: pytest.Mo
         Material("hard", "five times", {"backstop.damping": 5.0 * ph.load(CRUDE).backstop.l}),
         Material("hard", "no material", {"backstop.damping": -1.0}),
     ]
-    monkeypatch.setattr(damping, "materials", lambda *_: few)
+    monkeypatch.setattr(import_module("printhammer.printing.rates.damping"), "materials", lambda *_: few)
     out = tmp_path / "study.png"
     done = cli("quality", CRUDE, "--damping", "--current", "1.5 A", *GRID, "--out", out)
     assert done.status == 0
