@@ -54,7 +54,7 @@ format: $(INSTALLED) ## sort the imports and lay out the code
 paper: $(INSTALLED) ## every figure and claim of the paper, into build/paper
 	$(BIN)/printhammer paper --out build/paper
 
-docs: $(INSTALLED) ## the documentation, into build/docs
+docs: $(INSTALLED) ## the documentation, into build/docs; says which measured tables are stale
 	$(BIN)/sphinx-build -W --keep-going -b html docs build/docs
 
 bench: $(INSTALLED) ## the benchmark table (PEERS=folder of another environment's programs)

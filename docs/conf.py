@@ -22,6 +22,7 @@ extensions = [
     "docstrings",
     "key_tables",
     "mathml",
+    "measured_tables",
 ]
 exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py"]
 default_role = "code"

@@ -1,4 +1,4 @@
-"""Measure the figures of the page on numerics and print them as tables.
+"""Measure the figures of the page on numerics.
 
 Run it with ``.venv/bin/python docs/measure/accuracy.py``; it takes a minute or two.
 """
@@ -6,6 +6,7 @@ Run it with ``.venv/bin/python docs/measure/accuracy.py``; it takes a minute or 
 import math
 
 import numpy as np
+from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
 from printhammer.reference.integrator import horizon, reference
@@ -15,17 +16,7 @@ SINGLE = ph.PulseTrain(HAMMER.waveform)
 GRID = np.linspace(0.0, 4e-3, 4001)
 FINEST = 1e-14
 """Tolerance of the reference; its error is about 1e-13 of the stroke."""
-
-
-def heading(*cells: str) -> None:
-    """Print the first two lines of a table."""
-    print("\n| " + " | ".join(cells) + " |")
-    print("|" + "---|" * len(cells))
-
-
-def row(*cells: str) -> None:
-    """Print a line of a table."""
-    print("| " + " | ".join(cells) + " |")
+ROOMS = (*MOTION, "reference")
 
 
 def single_pulse() -> float:
@@ -34,18 +25,26 @@ def single_pulse() -> float:
     stroke = float(exact.x.max()) - HAMMER.position
     finer = reference(HAMMER, SINGLE, GRID[-1], tolerance=1e-13, times=GRID)
     print(f"\nReferences of 1e-13 and 1e-14: {np.abs(finer.x - exact.x).max() / stroke:.1e} of the stroke")
-    heading("tolerance", "steps", "error / stroke", "ledger residual / throughput")
+    rows: list[list[Cell]] = []
     for tolerance in (1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 2e-11, 1e-12, 1e-13):
         motion = ph.simulate(HAMMER, SINGLE, times=GRID, tolerance=tolerance)
         error = np.abs(motion.x - exact.x).max() / stroke
         residual = abs(motion.energy.residual) / motion.energy.throughput
-        row(f"{tolerance:.0e}", str(motion.steps), f"{error:.1e}", f"{residual:.1e}")
+        rows.append([tolerance, motion.steps, float(error), residual])
+    columns = [
+        Column(name="tolerance", format=".0e"),
+        Column(name="steps"),
+        Column(name="error / stroke", format=".1e"),
+        Column(name="ledger residual / throughput", format=".1e"),
+    ]
+    settings = {"duration": float(GRID[-1]), "points": GRID.size, "reference": FINEST}
+    write("accuracy-tolerance", columns, rows, settings, ROOMS)
     return stroke
 
 
 def trains(stroke: float) -> None:
     """Errors of trains up to their horizon."""
-    heading("drive", "horizon (ms)", "largest error / stroke before it")
+    rows: list[list[Cell]] = []
     drives = {
         "two pulses, 700 µs": ph.PulseTrain(HAMMER.waveform, at=[0.0, 700e-6]),
         "three pulses, 1.2 kHz": ph.PulseTrain(HAMMER.waveform, rate=1200.0, pulses=3),
@@ -60,7 +59,13 @@ def trains(stroke: float) -> None:
         motion = ph.simulate(HAMMER, drive, duration=end, times=grid)
         before = grid < until
         error = np.abs(motion.x - exact.x)[before].max() / stroke
-        row(name, f"{1e3 * until:.2f}" + (" (end)" if until == end else ""), f"{error:.1e}")
+        rows.append([name, f"none in {1e3 * end:.3g}" if until == end else 1e3 * until, float(error)])
+    columns = [
+        Column(name="drive"),
+        Column(name="horizon", unit="ms", format=".2f"),
+        Column(name="largest error / stroke before it", format=".1e"),
+    ]
+    write("accuracy-horizon", columns, rows, {"points": 8001, "reference": 1e-13}, ROOMS)
 
 
 def pack_alone(tolerance: float) -> float:
@@ -85,35 +90,43 @@ def backstop_alone(tolerance: float) -> float:
 
 def oracles() -> None:
     """Errors against closed forms, at the default and at a tight tolerance."""
-    heading("closed form", "error at 2e-11", "error at 1e-12")
-    for name, measure in (("pack alone", pack_alone), ("backstop alone", backstop_alone)):
-        row(name, f"{measure(2e-11):.1e}", f"{measure(1e-12):.1e}")
+    rows: list[list[Cell]] = [
+        [name, measure(2e-11), measure(1e-12)]
+        for name, measure in (("pack alone", pack_alone), ("backstop alone", backstop_alone))
+    ]
+    errors = [Column(name=f"error at {tolerance}", format=".1e") for tolerance in ("2e-11", "1e-12")]
+    write("accuracy-closed-forms", [Column(name="closed form"), *errors], rows, {}, MOTION, hammers=())
 
 
 def schemes(stroke: float) -> None:
     """Order of the schemes of 1983 in smooth motion, and their errors on a cycle with contacts."""
-    flight = {"state": (80e-6, 1.6), "duration": 80e-6, "times": [80e-6]}
+    flight = {"state": (80e-6, 1.2), "duration": 80e-6, "times": [80e-6]}
     never = ph.PulseTrain(HAMMER.waveform, at=[1.0])
     landing = ph.simulate(HAMMER, never, tolerance=1e-14, **flight)
     assert not landing.contacts
     exact = ph.simulate(HAMMER, SINGLE, times=GRID, tolerance=1e-13).x
-    heading(
-        "factor on all steps", "trapezoidal rule, flight", "Runge-Kutta, flight",
-        "trapezoidal rule, single pulse", "Runge-Kutta, single pulse",
-    )  # fmt: skip
+    rows: list[list[Cell]] = []
     for scale in (4.0, 2.0, 1.0, 0.5, 0.25, 0.125):
-        cells = []
+        cells: list[Cell] = [scale]
         for scheme in ("trapezoid", "runge-kutta-4"):
             motion = ph.simulate(HAMMER, never, scheme=scheme, step_scale=scale, **flight)
-            cells.append(f"{abs(motion.x[0] - landing.x[0]) / stroke:.1e}")
+            cells.append(float(abs(motion.x[0] - landing.x[0]) / stroke))
         for scheme in ("trapezoid", "runge-kutta-4"):
             motion = ph.simulate(HAMMER, SINGLE, times=GRID, scheme=scheme, step_scale=scale)
-            cells.append(f"{np.abs(motion.x - exact).max() / stroke:.1e}" if motion.ok else motion.status)
-        row(f"{scale:g}", *cells)
+            cells.append(float(np.abs(motion.x - exact).max() / stroke) if motion.ok else motion.status)
+        rows.append(cells)
+    columns = [
+        Column(name=f"{scheme}, {motion}", format=".1e")
+        for motion in ("flight", "single pulse")
+        for scheme in ("trapezoidal rule", "Runge-Kutta")
+    ]
+    factor = Column(name="factor on all steps", format="g")
+    settings = {"flight": 80e-6, "duration": float(GRID[-1]), "points": GRID.size}
+    write("accuracy-1983", [factor, *columns], rows, settings, MOTION)
 
 
 def main() -> None:
-    """Print all tables."""
+    """Measure all tables."""
     stroke = single_pulse()
     trains(stroke)
     oracles()

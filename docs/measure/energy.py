@@ -1,8 +1,10 @@
-"""Measure what bursts of least work cost, and print the tables of the page on them.
+"""Measure what bursts of least work cost.
 
 Run it with ``.venv/bin/python docs/measure/energy.py``; it takes some minutes. Eight dots at 1 kHz, rest to
 rest, the settle-out included, for the shipped hammer and five of its family; then the rates, for two of them.
 """
+
+from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
 from printhammer.control.least_work.burst import NoBurstError
@@ -12,6 +14,9 @@ FAMILY = ("02", "06", "10", "14", "18")
 FORCES = (0.9, 1.1, 1.2)
 RATES = (1000.0, 1250.0, 1500.0)
 DOTS = 8
+ROOMS = (*MOTION, "control/least_work", "control/widths", "printing/dots")
+SINGLE, POSITIVE, LEAST = 2, 4, 5
+"""Places in what a burst costs: of a single pulse, positive work, and the least that any current needs."""
 
 
 def hammers() -> list[ph.Hammer]:
@@ -20,49 +25,60 @@ def hammers() -> list[ph.Hammer]:
     return [ph.load("hendriks-1983"), *chosen]
 
 
-def heading(*cells: str) -> None:
-    """Print the first two lines of a table."""
-    print("\n| " + " | ".join(cells) + " |")
-    print("|" + "---|" * len(cells))
+def short(hammer: ph.Hammer) -> str:
+    """Return the name of a hammer as pages write it."""
+    return hammer.name.replace("hendriks-1983-family", "family")
 
 
-def row(hammer: ph.Hammer, force: float, rate: float, first: str) -> None:
-    """Print a line of a table: a burst."""
-    cells = [hammer.name, first]
+def burst(hammer: ph.Hammer, force: float, rate: float) -> list[Cell]:
+    """Return what a burst costs."""
+    cells: list[Cell] = []
     try:
         found = ph.least_work(hammer, rate, dots=DOTS, force=force)
     except NoBurstError:
-        cells += ["none found", *["–"] * 6]
+        cells += ["none found", *[None] * 7]
     else:
         ledger, absorbed = found.ledger, found.ledger.pack_loss
         cells += [
             f"{found.adequate} of {found.count}",
-            f"{found.drive.peak:.2f}",
-            f"{found.single_ratio:.2f}",
-            f"{found.net_ratio:.4f}",
-            f"{found.positive_ratio:.3f}",
-            f"{found.bound_ratio:.3f}",
-            f"{ledger.backstop_loss / absorbed:.4f}",
-            f"{ledger.residual / ledger.throughput:.0e}",
+            float(found.drive.peak),
+            float(found.single_ratio),
+            float(found.net_ratio),
+            float(found.positive_ratio),
+            float(found.bound_ratio),
+            float(ledger.backstop_loss / absorbed),
+            float(ledger.residual / ledger.throughput),
         ]
-    print("| " + " | ".join(cells) + " |", flush=True)
+    print(hammer.name, f"{force:g}, {rate:g} Hz:", *cells, flush=True)
+    return cells
 
 
 def main() -> None:
-    """Print the tables."""
-    common = (
-        "adequate dots", "peak (A)", "W, single pulse", "W", "W+", "least W+", "backstop",
-        "residual / throughput",
-    )  # fmt: skip
-    heading("hammer", "force", *common)
+    """Measure the tables: by force at the first rate, and by rate at the first force."""
+    chosen = hammers()
+    rows: list[list[Cell]] = []
+    for hammer in chosen:
+        bursts = [burst(hammer, force, RATES[0]) for force in FORCES]
+        single = next((cells[SINGLE] for cells in bursts if cells[SINGLE] is not None), None)
+        costs = [cells[place] for cells in bursts for place in (POSITIVE, LEAST)]
+        rows.append([short(hammer), single, *costs])
+    columns = [Column(name="hammer"), Column(name="W, single pulse", format=".2f")]
     for force in FORCES:
-        for hammer in hammers():
-            row(hammer, force, 1000.0, f"{force:g}")
-    heading("hammer", "rate (Hz)", *common)
-    shipped, *_, last = hammers()
-    for hammer in (shipped, last):
-        for rate in RATES[1:]:
-            row(hammer, FORCES[0], rate, f"{rate:g}")
+        columns += [Column(name=f"{what}, force {force}", format=".3f") for what in ("W+", "least")]
+    settings = {"dots": DOTS, "rate": RATES[0], "forces": FORCES}
+    names = tuple(hammer.name for hammer in chosen)
+    write("energy", columns, rows, settings, ROOMS, names)
+    pair = (chosen[0], chosen[-1])
+    rows = [
+        [short(hammer), rate, *(cells[place] for place in (POSITIVE, LEAST))]
+        for hammer in pair
+        for rate in RATES
+        for cells in [burst(hammer, FORCES[0], rate)]
+    ]
+    columns = [Column(name="hammer"), Column(name="rate", unit="Hz", format="g")]
+    columns += [Column(name=what, format=".3f") for what in ("W+", "least")]
+    settings = {"dots": DOTS, "rates": RATES, "force": FORCES[0]}
+    write("energy-rates", columns, rows, settings, ROOMS, (names[0], names[-1]))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ displacement up to its horizon, in units of the stroke: states in double precisi
 from __future__ import annotations
 
 import numpy as np
+from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
 from printhammer.reference.integrator import horizon, reference
@@ -18,7 +19,7 @@ GRID = np.linspace(0.0, 17e-3, 512)
 
 
 def main() -> None:
-    """Measure and print the table."""
+    """Measure the table."""
     hammer = ph.load("hendriks-1983")
     drives = [
         ph.PulseTrain(hammer.waveform, rate=rate, pulses=PULSES) for rate in np.linspace(500.0, 2000.0, 40)
@@ -36,18 +37,25 @@ def main() -> None:
         inside = inside[inside <= until]
         times.append(inside)
         exact.append(reference(hammer, drive, float(inside[-1]), tolerance=1e-14, times=inside).x)
-    print("| tolerance | states, median | states, 95 % | picture, median | picture, 95 % |")
-    print("|---|---|---|---|---|")
+    rows: list[list[Cell]] = []
     for tolerance in (1e-6, DISPLAY_TOLERANCE, 1e-7, 1e-8, 1e-9, 2e-10, TOLERANCE):
         found = ph.Ensemble(hammer, drives, ends, tolerance=tolerance).run(strobes=times, times=GRID)
-        columns = []
+        cells: list[Cell] = [tolerance]
         for values in (found.strobes.x, found.x):
             errors = [
                 np.abs(row[: len(truth)] - truth).max() / stroke
                 for row, truth in zip(values, exact, strict=True)
             ]
-            columns += [np.median(errors), np.percentile(errors, 95.0)]
-        print(f"| {tolerance:.0e} | " + " | ".join(f"{value:.1e}" for value in columns) + " |")
+            cells += [float(np.median(errors)), float(np.percentile(errors, 95.0))]
+        rows.append(cells)
+    columns = [Column(name="tolerance", format=".0e")]
+    columns += [
+        Column(name=f"{kind}, {share}", format=".1e")
+        for kind in ("states", "picture")
+        for share in ("median", "95 %")
+    ]
+    settings = {"members": len(drives), "pulses": PULSES, "times": GRID.size}
+    write("ensembles", columns, rows, settings, (*MOTION, "reference"))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
-"""Measure how fast hammers print with feedback, as they should be and not quite so, and print tables.
+"""Measure how fast hammers print with feedback, as they should be and not quite so.
 
-Run it with ``.venv/bin/python docs/measure/feedback.py [--step HZ] [HAMMER ...]``; it takes hours a hammer.
+Run it with ``.venv/bin/python docs/measure/feedback.py [--step HZ] [HAMMER ...]``; it takes hours a hammer. A
+hammer is a name, a file, or the number of one of the family, ``02``; ``six`` stands for those of the page.
 Safe rates are those of `printhammer.safe_rate`: all patterns of eight slots and the de Bruijn cycle. The grid
 of rates has the step asked for, from 500 Hz on, and from the last rate that passes 5 Hz to the next.
 
@@ -8,11 +9,18 @@ With ``--grid FIRST`` it looks at every rate of the grid of 5 Hz from there up t
 the hammer as it should be, and goes on after one that fails; some six seconds a rate.
 With ``--shares X [X ...]`` it counts how many of the 128 patterns that begin with a dot are within limits, at
 rates in parts of the open loop's safe rate, for all hammers that differ; some seconds a number.
+With ``--all`` it tells what prints at the rate asked for, and on hammers that differ at 1.5 times the open
+loop.
+With ``--edge SECONDS ...`` it counts those patterns for other drivers, the hammer as it should be.
+
+The last four write the tables of the page.
 """
 
 import argparse
+import math
 
 import numpy as np
+from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
 from printhammer.control.feedback.comparison import FeedbackStrategy
@@ -25,6 +33,7 @@ from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.page.page import Page
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import from_rest, safe_rate
+from printhammer.reconstruction.family.family import family_hammers
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 FIRST, FINE = 500.0, 5.0
@@ -40,7 +49,25 @@ CASES = [
 SEEDS = range(1, 6)
 ASKED = 2.2
 """How many times faster than the open loop feedback is asked to be."""
+SIX = ("hendriks-1983", "02", "06", "10", "14", "18")
+ROOMS = (*MOTION, "control/feedback", "printing")
+OFF = {
+    "current −3 or +3 %": [Perturbation(current=share) for share in (-0.03, 0.03)],
+    "travel −10 or +10 µm": [Perturbation(travel=way) for way in (-10e-6, 10e-6)],
+    "current and travel both off, all four corners": [
+        Perturbation(current=share, travel=way) for share in (-0.03, 0.03) for way in (-10e-6, 10e-6)
+    ],
+}
+HARDER = 1.5
+"""How many times faster than the open loop hammers that differ are tried."""
 TEXT = "The quick brown fox\njumps over the lazy dog\n0123456789 !?"
+
+
+def load(name: str) -> ph.Hammer:
+    """Return a hammer by its name, its file, or its number in the family."""
+    if not name.isdigit():
+        return ph.load(name)
+    return next(hammer for hammer in family_hammers() if hammer.name.endswith(f"-{name}"))
 
 
 def fastest(hammer: ph.Hammer, strategy: Strategy, controller: Controller, step: float) -> tuple[float, str]:
@@ -53,41 +80,91 @@ def fastest(hammer: ph.Hammer, strategy: Strategy, controller: Controller, step:
     return fine.rate, "" if fine.failure is None else fine.failure.text
 
 
-def every_rate(hammer: ph.Hammer, controller: Controller, first: float, own: float) -> None:
-    """Print which rates fail on the fine grid, from a first one to that which is asked for."""
+def passes(hammer: ph.Hammer, strategy: Strategy, controller: Controller, rate: float) -> str:
+    """Return what fails at a rate; nothing where all patterns and the cycle are within limits."""
+    given = {"nominal": controller.single, "tolerance": DISPLAY_TOLERANCE}
+    found = safe_rate(hammer, strategy, first=rate, last=rate, step=FINE, **given)
+    return "" if found.failure is None else found.failure.text
+
+
+def rounded_up(rate: float) -> float:
+    """Return the next rate of the fine grid."""
+    return FINE * math.ceil(rate / FINE)
+
+
+def asked_for(hammer: ph.Hammer, controller: Controller, own: float) -> list[Cell]:
+    """Return what feedback prints at the rate that is asked for, and on hammers that differ."""
+    strategy, rate = FeedbackStrategy(controller), rounded_up(ASKED * own)
+    cells: list[Cell] = [own, rate if not passes(hammer, strategy, controller, rate) else None]
+    cells.append(round(rate / own, 2))
+    for group in OFF.values():
+        driven = [perturbed(hammer, by) for by in group]
+        whole = not any(passes(other, strategy, controller, rounded_up(HARDER * own)) for other in driven)
+        cells.append("all" if whole else "not all")
+    runs = [
+        (hammer, ASKED * own),
+        *((perturbed(hammer, by), HARDER * own) for by in OFF["travel −10 or +10 µm"]),
+    ]
+    cases = [Case(driven, controller.single, rate) for driven, rate in runs]
+    seen = 0
+    for seed in SEEDS:
+        seen += sum(
+            number == 128 for number in within(cases, FeedbackStrategy(controller, PositionSensor(seed=seed)))
+        )
+    return [*cells, f"{seen} of {len(cases) * len(SEEDS)}"]
+
+
+def within(cases: list[Case], way: Strategy) -> list[int]:
+    """Return how many of the patterns that begin with a dot are within limits, for each case."""
+    found = attempt(cases, from_rest(every=False), way, limits=Limits(), tolerance=DISPLAY_TOLERANCE)
+    return [int(number) for number in found.judgement.passed.reshape(len(cases), -1).sum(axis=1)]
+
+
+def every_rate(hammer: ph.Hammer, controller: Controller, first: float, own: float) -> list[Cell]:
+    """Return how many rates fail on the fine grid, from a first one to that which is asked for."""
     strategy = FeedbackStrategy(controller)
     rates = np.arange(first, ASKED * own + FINE, FINE)
     failed = []
     for number, rate in enumerate(rates.tolist(), 1):
-        found = safe_rate(
-            hammer,
-            strategy,
-            first=rate,
-            last=rate,
-            step=FINE,
-            nominal=controller.single,
-            tolerance=DISPLAY_TOLERANCE,
-        )
-        if found.failure is not None:
+        why = passes(hammer, strategy, controller, rate)
+        if why:
             failed.append(rate)
-            print(found.failure.text, flush=True)
+            print(why, flush=True)
         if number % 20 == 0 or number == rates.size:
             print(f"{number} of {rates.size} rates, to {rate:g} Hz: {len(failed)} fail", flush=True)
+    return [hammer.name, first, float(rates[-1]), int(rates.size), len(failed)]
 
 
-def counts(hammer: ph.Hammer, controller: Controller, own: float, shares: list[float]) -> None:
-    """Print how many patterns are within limits on hammers that differ, open loop and with feedback."""
-    patterns = from_rest(every=False)
+def counts(hammer: ph.Hammer, controller: Controller, own: float, shares: list[float]) -> list[Cell]:
+    """Return how many patterns are within limits with feedback on hammers that differ; print the open loop.
+
+    Of each hammer the number at the first share, and the fewest at any.
+    """
+    seen: list[Cell] = []
     print("| | " + " | ".join(f"{share:g} x, open loop | feedback" for share in shares) + " |")
     print("|---" * (2 * len(shares) + 1) + "|")
     for by in CASES:
         cases = [Case(perturbed(hammer, by), controller.single, share * own) for share in shares]
-        ways = [
-            attempt(cases, patterns, way, limits=Limits(), tolerance=DISPLAY_TOLERANCE)
-            for way in (open_loop, FeedbackStrategy(controller))
-        ]
-        found = np.stack([way.judgement.passed.reshape(len(cases), -1).sum(axis=1) for way in ways], axis=1)
-        print(f"| {by.name} | " + " | ".join(map(str, found.ravel().tolist())) + " |", flush=True)
+        found = [within(cases, way) for way in (open_loop, FeedbackStrategy(controller))]
+        print(
+            f"| {by.name} | " + " | ".join(str(n) for pair in zip(*found, strict=True) for n in pair) + " |"
+        )
+        seen.append(f"{found[1][0]}, {min(found[1])}")
+    return seen
+
+
+def drivers(hammer: ph.Hammer, own: float, edges: list[float], shares: list[float]) -> list[list[Cell]]:
+    """Return the fewest patterns within limits with drivers of other time constants, and at which rate."""
+    rows: list[list[Cell]] = []
+    for edge in edges:
+        controller = Controller(hammer, driver_of(hammer, edge=edge))
+        cases = [Case(hammer, controller.single, share * own) for share in shares]
+        found = within(cases, FeedbackStrategy(controller))
+        rows.append(
+            [1e6 * edge, sum(number == 128 for number in found), min(found), shares[int(np.argmin(found))]]
+        )
+        print(*rows[-1], flush=True)
+    return rows
 
 
 def page_row(page: Page) -> str:
@@ -99,18 +176,56 @@ def page_row(page: Page) -> str:
     return f"{counts} | {dark:.3f} | {np.std(place):.1f}, worst {np.abs(place).max():.1f}"
 
 
-def measure(name: str, given: argparse.Namespace) -> None:
-    """Print what is asked for of one hammer."""
-    hammer = ph.load(name)
+def measure(hammer: ph.Hammer, given: argparse.Namespace) -> dict[str, list]:
+    """Return what is asked for of one hammer, by table."""
     own = safe_rate(hammer).rate
     controller = Controller(hammer, driver_of(hammer))
     print(f"\n{hammer.name}: open loop {own:.0f} Hz\n", flush=True)
+    seen = {}
+    if given.all:
+        seen["feedback-rates"] = asked_for(hammer, controller, own)
     if given.grid is not None:
-        every_rate(hammer, controller, given.grid, own)
-    if given.shares:
-        counts(hammer, controller, own, given.shares)
-    if given.grid is None and not given.shares:
+        seen["feedback-grid"] = every_rate(hammer, controller, given.grid, own)
+    if given.edge:
+        seen["feedback-driver"] = drivers(hammer, own, given.edge, given.shares)
+    elif given.shares:
+        seen["feedback-shares"] = counts(hammer, controller, own, given.shares)
+    if not seen:
         compare(hammer, controller, own, given.step)
+    return seen
+
+
+def save(found: list[dict[str, list]], hammers: list[ph.Hammer], given: argparse.Namespace) -> None:
+    """Write the tables that were asked for."""
+    names = tuple(hammer.name for hammer in hammers)
+    heads = [
+        Column(name=name.rpartition("-")[2] if "family" in name else name, format=".4g") for name in names
+    ]
+    if given.all:
+        first = ["open loop, safe rate, Hz", "feedback prints all at, Hz", "that is, in open-loop safe rates"]
+        off = [f"{name}, at {HARDER:g} times the open loop" for name in OFF]
+        labels = [*first, *off, "other seeds of the noise: runs that print all"]
+        rows = list(map(list, zip(labels, *(seen["feedback-rates"] for seen in found), strict=True)))
+        settings = {"asked": ASKED, "harder": HARDER, "seeds": list(SEEDS)}
+        write("feedback-rates", [Column(name=""), *heads], rows, settings, ROOMS, names)
+    if given.grid is not None:
+        columns = [Column(name="hammer")]
+        columns += [Column(name=name, unit="Hz", format="g") for name in ("from", "to")]
+        columns += [Column(name=name) for name in ("rates", "not all within limits")]
+        rows = [seen["feedback-grid"] for seen in found]
+        write("feedback-grid", columns, rows, {"first": given.grid, "step": FINE}, ROOMS, names)
+    if given.edge:
+        columns = [
+            Column(name="time constant", unit="µs", format="g"),
+            Column(name="rates at which all are within"),
+        ]
+        columns += [Column(name="fewest of 128"), Column(name="at, in open-loop safe rates", format="g")]
+        rows = [row for seen in found for row in seen["feedback-driver"]]
+        write("feedback-driver", columns, rows, {"shares": given.shares}, ROOMS, names)
+    elif given.shares:
+        labels = [by.name for by in CASES]
+        rows = list(map(list, zip(labels, *(seen["feedback-shares"] for seen in found), strict=True)))
+        write("feedback-shares", [Column(name=""), *heads], rows, {"shares": given.shares}, ROOMS, names)
 
 
 def compare(hammer: ph.Hammer, controller: Controller, own: float, step: float) -> None:
@@ -132,15 +247,19 @@ def compare(hammer: ph.Hammer, controller: Controller, own: float, step: float) 
 
 
 def main() -> None:
-    """Read the arguments and print the tables."""
+    """Read the arguments, measure, write the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("hammers", nargs="*", default=["hendriks-1983"])
     parser.add_argument("--step", type=float, default=50.0)
     parser.add_argument("--grid", type=float, metavar="FIRST")
     parser.add_argument("--shares", type=float, nargs="+", default=[])
+    parser.add_argument("--all", action="store_true")
+    parser.add_argument("--edge", type=float, nargs="+", default=[])
     given = parser.parse_args()
-    for name in given.hammers:
-        measure(name, given)
+    if given.edge and not given.shares:
+        parser.error("--edge needs --shares")
+    hammers = [load(name) for asked in given.hammers for name in (SIX if asked == "six" else (asked,))]
+    save([measure(hammer, given) for hammer in hammers], hammers, given)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Measure how long a page of 60 characters takes, simulated and drawn, and print it as a table.
+"""Measure how long a page of 60 characters takes, simulated and drawn,.
 
 Run it with ``.venv/bin/python docs/measure/page.py``; it takes a few seconds. Imports and compilation are not
 counted. Medians of several pages, wall-clock time and processor time of all threads.
@@ -8,6 +8,8 @@ import io
 import statistics
 import time
 from collections.abc import Callable
+
+from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
 from printhammer.printing.page.page import Page
@@ -41,17 +43,21 @@ def drawn(page: Page) -> None:
 
 
 def main() -> None:
-    """Print the table."""
+    """Measure the table."""
     page = ph.print_page(HAMMER, TEXT, RATE)
     print(f"{len(TEXT)} characters, {page.line.size} dots, {page.status.size} runs\n")
-    print("| | wall-clock time, s | processor time, s |\n|---|---|---|")
+    rows: list[list[Cell]] = []
     for name, call in (
         ("simulated", lambda: ph.print_page(HAMMER, TEXT, RATE)),
         ("drawn, PNG of 200 dots per inch", lambda: drawn(page)),
         ("both", whole),
     ):
         wall, busy = timed(call)
-        print(f"| {name} | {wall:.2f} | {busy:.2f} |")
+        rows.append([name, wall, busy])
+    columns = [Column(name=f"{kind} time", unit="s", format=".2f") for kind in ("wall-clock", "processor")]
+    settings = {"text": TEXT, "rate": RATE, "repeats": REPEATS, "dots": int(page.line.size)}
+    rooms = (*MOTION, "printing/page", "printing/dots")
+    write("page-time", [Column(name=""), *columns], rows, settings, rooms)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
 from printhammer.identify.bench.recovery import Recovery, recover
@@ -44,10 +45,9 @@ def prints(hammer: ph.Hammer) -> bool:
     return motion.dots[0].struck and any(touch.surface == "backstop" for touch in motion.contacts[1:])
 
 
-def table(found: list[Recovery]) -> None:
-    """Print one line for each constant: in a fit of its own, and in the end, from all measurements."""
-    print("| constant | from | intervals that hold | standard error | mean error in standard errors |")
-    print("|---|---|---|---|---|")
+def table(found: list[Recovery]) -> list[list[Cell]]:
+    """Return a row for each constant: in a fit of its own, and in the end, from all measurements."""
+    rows: list[list[Cell]] = []
     for kind in found[0].fits:
         for key, constant in found[0].fits[kind].constants.items():
             if not constant.in_file:
@@ -58,11 +58,12 @@ def table(found: list[Recovery]) -> None:
             error = np.median([one.standard_error / true for one, true in known])
             bias = np.mean([(one.value - true) / one.standard_error for one, true in known])
             where = "all" if kind == "motion" else kind
-            print(f"| `{key}` | {where} | {held} of {len(known)} | {100.0 * error:.2g} % | {bias:+.2f} |")
+            rows.append([f"`{key}`", where, f"{held} of {len(known)}", 100.0 * float(error), float(bias)])
+    return rows
 
 
 def main() -> None:
-    """Print the table."""
+    """Measure the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--labs", type=int, default=100)
     parser.add_argument("--random", action="store_true")
@@ -73,7 +74,15 @@ def main() -> None:
             found.append(recover(hammer, seed))
         except ph.InputError as error:
             failed.append(f"laboratory {seed}: {error}")
-    table(found)
+    columns = [
+        Column(name="constant"),
+        Column(name="from"),
+        Column(name="intervals that hold"),
+        Column(name="standard error", unit="%", format=".2g"),
+        Column(name="mean error in standard errors", format="+.2f"),
+    ]
+    settings = {"laboratories": options.labs, "random": options.random}
+    write("recovery", columns, table(found), settings, (*MOTION, "identify"))
     print("\n".join(["", f"{len(failed)} of {options.labs} laboratories without a result", *failed]))
 
 

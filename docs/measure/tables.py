@@ -1,7 +1,7 @@
 """Measure how fast hammers print with a compensation table: safe rates beside open loop, also perturbed.
 
 Run it with ``.venv/bin/python docs/measure/tables.py``. For the shipped hammer and five of its family it
-tunes a table over all rates and prints a line, with ``--perturbed`` one for each hammer that differs. It
+tunes a table over all rates and makes a row, with ``--perturbed`` one for each hammer that differs. It
 takes some ten minutes on two cores, ``--perturbed`` some five more for each hammer.
 
 ``--history N`` and ``--robust`` are as for ``printhammer tune``. ``--hammer`` takes a name or a file instead
@@ -12,6 +12,9 @@ import argparse
 import time
 from collections.abc import Iterator
 from pathlib import Path
+
+import numpy as np
+from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
@@ -29,6 +32,13 @@ TOLERANCE = 5e-7
 
 BETWEEN = 2.5
 """Shift of a grid of rates that lie between those of the table, Hz."""
+
+ROOMS = (*MOTION, "control/table", "control/widths", "printing/dots", "printing/rates")
+
+
+def finite(value: float) -> float | str:
+    """Return a number, or "none" for what is not one."""
+    return float(value) if np.isfinite(value) else "none"
 
 
 def hammers(names: list[str]) -> Iterator[ph.Hammer]:
@@ -67,13 +77,8 @@ def rates_of(hammer: ph.Hammer, table: CompensationTable, by: Perturbation) -> t
     )
 
 
-def line(*cells: object) -> None:
-    """Print a line of a table."""
-    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
-
-
 def main() -> None:
-    """Print the tables."""
+    """Measure the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hammer", action="append", default=[])
     parser.add_argument("--history", type=int, default=1)
@@ -81,15 +86,13 @@ def main() -> None:
     parser.add_argument("--perturbed", action="store_true")
     parser.add_argument("--keep", type=Path)
     asked = parser.parse_args()
-    line(
-        "hammer", "driven", "open loop, Hz", "table, Hz", "ratio", "between, Hz", "rates", "tuned, s", "then"
-    )
-    line(*["---"] * 9)
+    rows: list[list[Cell]] = []
+    used = []
     for hammer in hammers(asked.hammer):
         table, spent = tuned(hammer, asked.history, asked.robust, asked.keep)
         for by in PERTURBATIONS if asked.perturbed else PERTURBATIONS[:1]:
             plain, better = rates_of(hammer, table, by)
-            between = "–"
+            between = None
             if by == Perturbation():
                 # From the first rate on at which a dot does not follow on rest.
                 found = ph.safe_rate(
@@ -99,18 +102,35 @@ def main() -> None:
                     last=float(table.rates[-1]),
                     tolerance=TOLERANCE,
                 )
-                between = f"{found.rate:g}"
-            line(
+                between = finite(found.rate)
+            row: list[Cell] = [
                 hammer.name.removeprefix("hendriks-1983-"),
                 by.name,
-                f"{plain.rate:g}",
-                f"{better.rate:g}",
-                f"{better.rate / plain.rate:.2f}",
+                finite(plain.rate),
+                finite(better.rate),
+                finite(better.rate / plain.rate),
                 between,
-                table.rates.size,
-                f"{spent:.0f}",
+                int(table.rates.size),
+                spent,
                 better.failure.text if better.failure else "the table ends",
-            )
+            ]
+            print(*row, flush=True)
+            rows.append(row)
+        used.append(hammer.name)
+    columns = [
+        Column(name="hammer"),
+        Column(name="driven"),
+        Column(name="open loop", unit="Hz", format="g"),
+        Column(name="table", unit="Hz", format="g"),
+        Column(name="ratio", format=".2f"),
+        Column(name="between", unit="Hz", format="g"),
+        Column(name="rates"),
+        Column(name="processor time of tuning", unit="s", format=".0f"),
+        Column(name="what fails first with the table"),
+    ]
+    settings = {"history": asked.history, "robust": asked.robust, "hammers": used}
+    name = "tables-perturbed" if asked.perturbed else "tables"
+    write(name, columns, rows, settings, ROOMS, tuple(used))
 
 
 if __name__ == "__main__":

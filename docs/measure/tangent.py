@@ -1,4 +1,4 @@
-"""Measure the figures of the page on the tangent flow and print them as a table.
+"""Measure the figures of the page on the tangent flow.
 
 Run it with ``.venv/bin/python docs/measure/tangent.py``; it takes a few minutes. The differences of runs and
 the hammers are those of the tests.
@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from measured import MOTION, Cell, Column, write
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
@@ -36,20 +37,23 @@ def best(*what: object, **how: object) -> float:
     return found
 
 
-def row(name: str, errors: list[float]) -> None:
-    """Print a line of the table."""
-    print(f"| {name} | {max(errors):.1e} |", flush=True)
+def row(name: str, errors: list[float]) -> list[Cell]:
+    """Return a row of the table."""
+    print(name, f"{max(errors):.1e}", flush=True)
+    return [name, float(max(errors)), float(np.median(errors))]
 
 
-def shipped_hammer() -> None:
+def shipped_hammer() -> list[list[Cell]]:
     """A single pulse, trains, from contact to contact; and what the default tolerance does."""
+    rows = []
     hammer = shipped()
     single = ph.PulseTrain(hammer.waveform)
     ends = np.linspace(0.1e-3, 0.85e-3, 16)
-    row("single pulse, 16 ends", [best(hammer, single, 0.0, end) for end in ends])
+    rows.append(row("single pulse, 16 ends in all modes", [best(hammer, single, 0.0, end) for end in ends]))
     starts = [0.3e-3, 0.36e-3, 0.5e-3, 0.56e-3]
     pairs = [(start, end) for start in starts for end in ends if end > start + 10e-6]
-    row("from contact to contact", [best(hammer, single, *pair) for pair in pairs])
+    between = [best(hammer, single, *pair) for pair in pairs]
+    rows.append(row("from inside one contact to inside another", between))
     errors, changes = [], []
     for period in np.linspace(0.8e-3, 1.35e-3, 12):
         train = ph.PulseTrain(hammer.waveform, period=period, pulses=3)
@@ -59,11 +63,12 @@ def shipped_hammer() -> None:
         scales = Problem(hammer, train, exact.state_at_start[:2], 0.0, SHARP).scales
         change = scaled(usual.matrix - exact.matrix, scales)
         changes.append(float(np.linalg.norm(change) / np.linalg.norm(scaled(exact.matrix, scales))))
-    row("trains of three pulses, 12 rates", errors)
-    print(f"\nDefault tolerance against 1e-13, trains: {max(changes):.1e}\n")
+    rows.append(row("trains of three pulses, 12 rates", errors))
+    rows.append(row("these trains, at the default tolerance", changes))
+    return rows
 
 
-def other_hammers() -> None:
+def other_hammers() -> list[list[Cell]]:
     """Parts, drives, and hammers drawn about the shipped one."""
     errors: dict[bool, list[float]] = {False: [], True: []}
     for magnet, spring, pack, backstop, name, start, end in CASES:
@@ -71,20 +76,21 @@ def other_hammers() -> None:
             hammer = hammer_of(magnet, spring, pack, backstop, Path(folder))
             drive = drive_of(magnet, name)
             errors[magnet == "table"].append(best(hammer, drive, start, end, MOVING, levels=4))
-    row(f"other parts and drives, {len(errors[False])} hammers", errors[False])
-    row(f"with a force table, {len(errors[True])} hammers", errors[True])
+    rows = [
+        row(f"other parts and drives, {len(errors[False])} hammers", errors[False]),
+        row(f"the same with a force table, {len(errors[True])} hammers", errors[True]),
+    ]
     draw, found = Draw(np.random.default_rng(4), spread=0.1), []
     while len(found) < 200:
         hammer = draw()
         drive = ph.PulseTrain(hammer.waveform, period=draw.rng.uniform(0.8e-3, 1.6e-3), pulses=3)
         end = before_slow_touches(hammer, drive, draw.rng.uniform(0.5e-3, 2.5e-3))
         found.append(best(hammer, drive, 0.0, end))
-    row(f"random hammers, {len(found)}, trains of three pulses", found)
-    print(f"\nMedian of the random hammers: {np.median(found):.1e}")
+    return [*rows, row(f"{len(found)} random hammers, trains of three pulses", found)]
 
 
-def cost() -> None:
-    """Time of exponents over time of the runs alone."""
+def cost() -> list[Cell]:
+    """Time of exponents over time of the runs alone, a row of a table."""
     hammer = shipped()
     ratios = []
     for _ in range(5):
@@ -94,11 +100,13 @@ def cost() -> None:
         drive = ph.PulseTrain(hammer.waveform, period=1.05e-3, pulses=1000)
         Problem(hammer, drive, (rest_state(hammer), 0.0), 0.0, TOLERANCE).run(float(drive.times[-1]))
         ratios.append((middle - begin) / (time.process_time() - middle) - 1.0)
-    print(f"\nSecond pass over run, 1000 firings: {np.median(ratios[1:]):.1f}")
+    return ["shipped hammer, 1000 firings", float(np.median(ratios[1:]))]
 
 
 if __name__ == "__main__":
-    print("| | largest difference |\n|---|---|")
-    shipped_hammer()
-    other_hammers()
-    cost()
+    rows = [*shipped_hammer(), *other_hammers()]
+    columns = [Column(name=f"{which} difference", format=".1e") for which in ("largest", "median")]
+    rooms = (*MOTION, "derivatives")
+    write("tangent", [Column(name="what"), *columns], rows, {"spacings": SIZES, "seed": 4}, rooms)
+    columns = [Column(name="train"), Column(name="time of the second pass / time of the run", format=".1f")]
+    write("tangent-cost", columns, [cost()], {"firings": 1000}, rooms)

@@ -1,8 +1,8 @@
 """Set three ways to drive a hammer side by side: open loop, a compensation table, feedback.
 
-Run it with ``.venv/bin/python docs/measure/ways.py [HAMMER] [--rate RATE] [--picture FILE]``. It prints how
-good a page of several lines is at each rate, and how far the second of two dots is off at all distances, and
-draws the first line of the page, printed in each way at the last rate. It takes a few minutes.
+Run it with ``.venv/bin/python docs/measure/ways.py [HAMMER] [--rate RATE] [--picture FILE]``. It measures
+how good a page of several lines is at each rate and how far the second of two dots is off at all distances,
+and draws the first line of the page, printed in each way at the last rate. It takes a few minutes.
 """
 
 import argparse
@@ -10,6 +10,7 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
 from printhammer.control.feedback.comparison import Feedback, FeedbackStrategy
@@ -20,6 +21,7 @@ from printhammer.printing.page.page import Page
 
 RATES = ("1 kHz", "1.3 kHz", "1.6 kHz")
 TEXT = "The quick brown fox\njumps over the lazy dog\n0123456789 !?"
+ROOMS = (*MOTION, "control/feedback", "control/table", "control/widths", "printing")
 LINE = "Bounce and chaos 1983"
 
 
@@ -29,29 +31,30 @@ def ways_at(hammer: ph.Hammer, rate: str, controller: Controller) -> list[Strate
     return [open_loop, table.strategy(hammer), FeedbackStrategy(controller)]
 
 
-def page_row(page: Page) -> str:
+def page_row(page: Page) -> list[Cell]:
     """Return how good a page is, a row of a table."""
     on = page.printed
     force, place = 100.0 * (page.force_ratio[on] - 1.0), 1e6 * page.placement_error[on]
-    return (
-        f"| {page.rate:.0f} | {page.strategy} | {page.line.size} | {int(page.lost.sum())} |"
-        f" {int(page.good.sum())} | {force.min():+.1f} to {force.max():+.1f} |"
-        f" {np.std(place):.1f}, worst {np.abs(place).max():.1f} |"
-    )
+    return [
+        float(page.rate),
+        str(page.strategy),
+        int(page.lost.sum()),
+        int(page.good.sum()),
+        f"{force.min():+.1f} to {force.max():+.1f}",
+        f"{np.std(place):.1f}, {np.abs(place).max():.1f}",
+    ]
 
 
-def pair_rows(found: Feedback) -> list[str]:
+def pair_rows(found: Feedback) -> list[list[Cell]]:
     """Return how far the second of two dots is off, a row for each way."""
-    rows = []
+    rows: list[list[Cell]] = []
     for number, name in enumerate(found.strategies):
         force, arrival = found.gap_force[number], found.gap_arrival[number]
         known = np.isfinite(force)
         good = (np.abs(force) <= found.limits.force) & (np.abs(arrival) <= found.limits.arrival)
         off, late = 100.0 * force[known], 1e6 * arrival[known]
-        rows.append(
-            f"| {name} | {good.sum()} of {good.size} | {off.min():+.1f} to {off.max():+.1f} |"
-            f" {late.min():+.0f} to {late.max():+.0f} |"
-        )
+        extremes = [f"{off.min():+.1f} to {off.max():+.1f}", f"{late.min():+.0f} to {late.max():+.0f}"]
+        rows.append([name, f"{good.sum()} of {good.size}", *extremes])
     return rows
 
 
@@ -73,7 +76,7 @@ def picture(pages: list[Page], path: Path) -> None:
 
 
 def main() -> None:
-    """Read the arguments, print the tables, draw the picture."""
+    """Read the arguments, measure the tables, draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("hammer", nargs="?", default="hendriks-1983")
     parser.add_argument("--rate", action="append", dest="rates")
@@ -81,12 +84,22 @@ def main() -> None:
     given = parser.parse_args()
     hammer = ph.load(given.hammer)
     controller = Controller(hammer, driver_of(hammer))
-    print("| rate, Hz | | dots | lost | within limits | force, % | placement, µm |")
-    print("|---|---|---|---|---|---|---|")
+    rows: list[list[Cell]] = []
     for rate in given.rates or RATES:
         ways = ways_at(hammer, rate, controller)
         for way in ways:
-            print(page_row(ph.print_page(hammer, TEXT, rate, strategy=way)), flush=True)
+            rows.append(page_row(ph.print_page(hammer, TEXT, rate, strategy=way)))
+            print(*rows[-1], flush=True)
+    columns = [
+        Column(name="rate", unit="Hz", format=".0f"),
+        Column(name="way"),
+        Column(name="lost"),
+        Column(name="within limits"),
+        Column(name="force", unit="%"),
+        Column(name="placement: spread, worst", unit="µm"),
+    ]
+    settings = {"rates": given.rates or RATES, "text": TEXT}
+    write("ways-pages", columns, rows, settings, ROOMS, (hammer.name,))
     if given.picture is not None:
         picture([ph.print_page(hammer, LINE, rate, strategy=way) for way in ways], given.picture)
     table = ph.tune(hammer, history=1)
@@ -96,9 +109,10 @@ def main() -> None:
         beside=[table.strategy(hammer)],
         gaps=np.arange(1.0 / table.rates[-1], 3e-3, 40e-6),
     )
-    print(f"\nTwo dots, {1e3 * found.gaps[0]:.2f} to {1e3 * found.gaps[-1]:.2f} ms from slot to slot\n")
-    print("| | within limits | force, % | arrival, µs |\n|---|---|---|---|")
-    print("\n".join(pair_rows(found)))
+    columns = [Column(name="way"), Column(name="within limits"), Column(name="force", unit="%")]
+    settings = {"gaps, ms": [round(1e3 * float(found.gaps[place]), 3) for place in (0, -1)]}
+    columns.append(Column(name="arrival", unit="µs"))
+    write("ways-pairs", columns, pair_rows(found), settings, ROOMS, (hammer.name,))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,207 @@
+"""Measured tables: written by the scripts beside this file, shown by the pages, and known to be stale.
+
+A table is a file ``docs/measured/NAME.json``. It holds, beside columns and rows, the command that made it,
+the fingerprints of its hammers and one of the code that the figures depend on. Where one of them is another
+today the table is stale; ``.venv/bin/python docs/measure/measured.py`` lists those, as ``make docs`` does.
+
+The fingerprint of code is that of the syntax trees of the rooms of ``src/printhammer`` that a script names.
+File names, order, docstrings, comments and imports do not count, so that code may move within these rooms.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import re
+import shlex
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+import printhammer as ph
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "docs" / "measured"
+SOURCES = ROOT / "src" / "printhammer"
+MOTION = ("drive", "hammer", "kernel", "parts", "run", "support/roots")
+"""Rooms that every motion depends on."""
+
+Cell = bool | int | float | str | None
+UNSEEN = (ast.Import, ast.ImportFrom)
+
+
+class Column(BaseModel):
+    """A column: its name in the page, its unit, and how its numbers are written, in Python's notation."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    unit: str = ""
+    format: str = ""
+
+    @property
+    def head(self) -> str:
+        """Name and unit."""
+        return f"{self.name}, {self.unit}" if self.unit else self.name
+
+
+class Measured(BaseModel):
+    """A measured table; an empty fingerprint is one that was not recorded."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    format: Literal[1] = 1
+    command: str
+    hammers: dict[str, str]
+    rooms: list[str]
+    code: str
+    settings: dict[str, Any]
+    columns: list[Column]
+    rows: list[list[Cell]]
+
+    @property
+    def script(self) -> str:
+        """The script that makes it."""
+        return shlex.split(self.command)[0]
+
+    def stale(self) -> list[str]:
+        """Return what has changed since it was measured; nothing for a fresh table."""
+        if not self.code:
+            return ["its code was not recorded"]
+        changed = ["the code"] if self.code != code_fingerprint(self.rooms) else []
+        changed += [name for name, known in self.hammers.items() if known != hammer_fingerprint(name)]
+        return [f"{what} has changed" for what in changed]
+
+
+def write(
+    name: str,
+    columns: list[Column],
+    rows: list[list[Cell]],
+    settings: dict[str, Any],
+    rooms: tuple[str, ...],
+    hammers: tuple[str, ...] = ("hendriks-1983",),
+) -> None:
+    """Print a table and write it, unless there is one of other settings that was measured too."""
+    print(f"\n{markdown(columns, rows)}\n")
+    path = FOLDER / f"{name}.json"
+    settings = json.loads(json.dumps(settings))
+    if path.exists() and (kept := read(name)).code and kept.settings != settings:
+        print(f"{path.relative_to(ROOT)} is of other settings, {kept.settings}: kept")
+        return
+    script = Path(sys.argv[0]).resolve().relative_to(ROOT).as_posix()
+    table = Measured(
+        command=shlex.join([script, *sys.argv[1:]]),
+        hammers={hammer: hammer_fingerprint(hammer) for hammer in hammers},
+        rooms=sorted(rooms),
+        code=code_fingerprint(rooms),
+        settings=settings,
+        columns=columns,
+        rows=rows,
+    )
+    FOLDER.mkdir(exist_ok=True)
+    path.write_text(text_of(table), "utf-8")
+    print(f"{path.relative_to(ROOT)} written")
+
+
+def text_of(table: Measured) -> str:
+    """Return the text of a file, a row a line."""
+    data = table.model_dump()
+    parts = [f"  {json.dumps(key)}: {_value(key, value)}" for key, value in data.items()]
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def _value(key: str, value: Any) -> str:
+    if key not in ("columns", "rows"):
+        return json.dumps(value, ensure_ascii=False)
+    lines = [f"    {json.dumps(line, ensure_ascii=False, allow_nan=False)}" for line in value]
+    return "[\n" + ",\n".join(lines) + "\n  ]"
+
+
+def read(name: str) -> Measured:
+    """Read a table."""
+    return Measured.model_validate_json((FOLDER / f"{name}.json").read_text("utf-8"))
+
+
+def names() -> list[str]:
+    """Return the names of all tables."""
+    return sorted(path.stem for path in FOLDER.glob("*.json"))
+
+
+def markdown(columns: list[Column], rows: list[list[Cell]]) -> str:
+    """Return a table as a page shows it."""
+    lines = [[column.head for column in columns], ["---"] * len(columns)]
+    lines += [[shown(cell, column) for cell, column in zip(row, columns, strict=True)] for row in rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def shown(cell: Cell, column: Column) -> str:
+    """Return the text of a cell."""
+    if cell is None or isinstance(cell, str):
+        return cell or ""
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    return re.sub(r"e([+-])0*(?=\d)", lambda sign: "e" + sign[1].strip("+"), format(cell, column.format))
+
+
+@cache
+def hammer_fingerprint(name: str) -> str:
+    """Return the fingerprint that a shipped hammer, or one of the family, has today."""
+    from printhammer.reconstruction.family.family import family_hammers
+
+    if "-family-" in name:
+        return next((hammer.fingerprint for hammer in family_hammers() if hammer.name == name), "none")
+    return ph.load(name).fingerprint
+
+
+def code_fingerprint(rooms: tuple[str, ...] | list[str]) -> str:
+    """Return the fingerprint of the code of some rooms, folders or modules of the package."""
+    found = sorted(statement for room in rooms for statement in _statements(room))
+    return hashlib.sha256("\n".join(found).encode()).hexdigest()[:16]
+
+
+@cache
+def _statements(room: str) -> tuple[str, ...]:
+    path = SOURCES / room
+    files = sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
+    trees = [ast.parse(file.read_text("utf-8")) for file in files if file.exists()]
+    return tuple(text for tree in trees for node in tree.body if (text := _seen(node)))
+
+
+def _seen(node: Any) -> str:
+    """Return the text of a syntax tree, the same in all versions of Python; empty for what does not count."""
+    if isinstance(node, list):
+        return "[" + ",".join(filter(None, map(_seen, node))) + "]"
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    if isinstance(node, UNSEEN) or _is_text(node) or _is_for_types(node):
+        return ""
+    fields = ((name, value) for name, value in ast.iter_fields(node) if value not in (None, []))
+    kept = (f"{name}={_seen(value)}" for name, value in fields if name not in ("ctx", "kind", "type_comment"))
+    return f"{type(node).__name__}({','.join(kept)})"
+
+
+def _is_text(node: ast.AST) -> bool:
+    value = node.value if isinstance(node, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
+
+
+def _is_for_types(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+
+
+def report() -> list[str]:
+    """Return a line for each stale table."""
+    tables = {name: read(name) for name in names()}
+    return [
+        f"stale table {name}: {', '.join(why)}; .venv/bin/python {table.command}"
+        for name, table in tables.items()
+        if (why := table.stale())
+    ]
+
+
+if __name__ == "__main__":
+    print("\n".join(report()) or "no stale table")

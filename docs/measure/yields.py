@@ -1,0 +1,47 @@
+"""Measure which part of a production prints well, for spreads of its constants and at several rates.
+
+Run it with ``.venv/bin/python docs/measure/yields.py``; it takes some minutes.
+"""
+
+from measured import MOTION, Cell, Column, write
+
+import printhammer as ph
+from printhammer.reconstruction.family.family import family_hammers
+
+NUMBER = 256
+"""Hammers drawn for each number."""
+
+SPREADS = (("own", 0.01), ("own", 0.02), ("design", 0.01))
+"""By which single pulse dots are judged, and the spread of the constants."""
+
+RATES = {
+    "hendriks-1983": {400.0: (2,), 750.0: (0, 1), 800.0: (0, 1, 2)},
+    "hendriks-1983-family-06": {400.0: (2,), 900.0: (0, 1, 2), 925.0: (0, 1)},
+}
+"""Rates of each hammer, Hz, and the places in `SPREADS` that are measured there."""
+
+
+def main() -> None:
+    """Measure the table."""
+    known = {hammer.name: hammer for hammer in family_hammers()}
+    rows: list[list[Cell]] = []
+    for name, rates in RATES.items():
+        hammer = known[name] if name in known else ph.load(name)
+        own = float(ph.safe_rate(hammer).rate)
+        for rate, places in rates.items():
+            cells: list[Cell] = [None] * len(SPREADS)
+            for place in places:
+                judged, spread = SPREADS[place]
+                found = ph.tolerance_yield(hammer, rate, number=NUMBER, spreads=spread, judged_by=judged)
+                cells[place] = f"{100.0 * found.share:.1f} ± {100.0 * found.share_error:.1f} %"
+            rows.append([name.replace("hendriks-1983-family", "family"), own, rate, *cells])
+            print(*rows[-1], flush=True)
+    columns = [Column(name="hammer"), Column(name="its safe rate", unit="Hz", format="g")]
+    columns.append(Column(name="rate", unit="Hz", format="g"))
+    columns += [Column(name=name) for name in ("1 %", "2 %", "1 %, judged by the design")]
+    settings = {"number": NUMBER, "spreads": SPREADS}
+    write("yields", columns, rows, settings, (*MOTION, "printing/dots", "printing/rates"), tuple(RATES))
+
+
+if __name__ == "__main__":
+    main()
