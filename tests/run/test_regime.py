@@ -87,7 +87,7 @@ def test_an_endless_force(hammer: ph.Hammer) -> None:
     assert regime.with_("period", 0.01).drive == ph.SineForce(1.0, 100.0)
     assert regime.with_("drive.amplitude", 2.0).drive == ph.SineForce(2.0, 50.0)
     assert regime.with_("drive.phase", 0.5).value("drive.phase") == 0.5
-    with pytest.raises(ph.InputError, match=r"waveform\.amplitude is not known"):
+    with pytest.raises(ph.InputError, match=r"'waveform\.amplitude' is not known"):
         regime.with_("waveform.amplitude", 1.0)
 
 
@@ -136,7 +136,9 @@ def test_bad_input(hammer: ph.Hammer, options: dict, said: str) -> None:
 
 def test_more_bad_input(hammer: ph.Hammer) -> None:
     regime = Regime.of(hammer, period=1e-3)
-    with pytest.raises(ph.InputError, match=r"backstop\.dampingg is not known"):
+    with pytest.raises(
+        ph.InputError, match=r"'backstop\.dampingg' is not known, expected 'backstop\.damping'"
+    ):
         regime.with_("backstop.dampingg", 1.0)
     with pytest.raises(ph.InputError, match=r"mass"):
         regime.with_("mass", -1.0)

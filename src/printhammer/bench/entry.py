@@ -22,31 +22,21 @@ class Absent(Exception):
 
 @dataclass
 class Entry:
-    """One solver with one setting.
-
-    Attributes
-    ----------
-    name : str
-        Solver, method and tolerance.
-    positions : callable
-        Returns the displacement, m: of a single run at `printhammer.bench.problem.GRID`; of the members of
-        an ensemble that are compared at `printhammer.bench.problem.ENDS`. The first call may compile.
-    integrate : callable
-        Does what is timed, without output.
-    duration : float
-        Hammer-seconds of what is timed, over all members.
-    members : int
-        1 for a single run; the number of runs of an ensemble.
-    ours : bool
-        Whether it is this program.
-    """
+    """One solver with one setting."""
 
     name: str
+    """Solver, method and tolerance."""
     positions: Callable[[], FloatArray]
+    """Returns the displacement, m: of a single run at `printhammer.bench.problem.GRID`; of the members of an
+    ensemble that are compared at `printhammer.bench.problem.ENDS`. The first call may compile."""
     integrate: Callable[[], object]
+    """Does what is timed, without output."""
     duration: float
+    """Hammer-seconds of what is timed, over all members."""
     members: int = 1
+    """1 for a single run; the number of runs of an ensemble."""
     ours: bool = False
+    """Whether it is this program."""
 
 
 SingleMaker = Callable[["Task", bool], list[Entry]]

@@ -23,18 +23,12 @@ GRID: Final = np.linspace(0.0, FIRST, 3001)
 
 @dataclass(frozen=True)
 class Task:
-    """A hammer with the laws of the paper, fired at a constant rate, from rest.
-
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    period : float
-        Time between firings, s.
-    """
+    """A hammer with the laws of the paper, fired at a constant rate, from rest."""
 
     hammer: Hammer
+    """The hammer."""
     period: float = PERIOD
+    """Time between firings, s."""
 
     @cached_property
     def rest(self) -> float:

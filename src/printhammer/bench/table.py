@@ -27,39 +27,26 @@ _SLOW: Final = 1.0
 
 @dataclass(frozen=True)
 class Line:
-    """One solver of the table.
-
-    Attributes
-    ----------
-    solver : str
-        Solver, version, method, tolerance.
-    ours : bool
-        Whether it is this program.
-    members : int
-        1 for a single run.
-    error : float
-        Largest deviation from the reference over the first 3 ms, m; NaN where the solver did not get there.
-    speed : float
-        Hammer-seconds per second of processor time.
-    first : float
-        Time of the first call, s, in which things are compiled.
-    duration : float
-        Hammer-seconds of one call timed.
-    match : str
-        For a peer: the fastest of our lines of its kind that is at least as exact.
-    ratio : float
-        How many times faster that line is; NaN where there is none.
-    """
+    """One solver of the table."""
 
     solver: str
+    """Solver, version, method, tolerance."""
     ours: bool
+    """Whether it is this program."""
     members: int
+    """1 for a single run."""
     error: float
+    """Largest deviation from the reference over the first 3 ms, m; NaN where the solver did not get there."""
     speed: float
+    """Hammer-seconds per second of processor time."""
     first: float
+    """Time of the first call, s, in which things are compiled."""
     duration: float
+    """Hammer-seconds of one call timed."""
     match: str = ""
+    """For a peer: the fastest of our lines of its kind that is at least as exact."""
     ratio: float = math.nan
+    """How many times faster that line is; NaN where there is none."""
 
 
 def measure(

@@ -23,37 +23,25 @@ _PRINTED_DIGITS: Final = 1e-9
 
 @dataclass(frozen=True)
 class Claim:
-    """One checkable statement of the paper.
-
-    Attributes
-    ----------
-    name : str
-        Name.
-    kind : str
-        "stated", "typical" or "shape".
-    source : str
-        Where the paper says it.
-    says : str
-        What it says, in our words.
-    reading : str
-        What is measured, and what must be so.
-    note : str
-        What a reader must know beside; may be empty.
-    settings : mapping
-        Numbers that set up the experiment, SI.
-    band : mapping
-        What each measured value must be: a number or text, true or false; a list (least, largest) of two
-        numbers, or of texts; a table of `SIDES`.
-    """
+    """One checkable statement of the paper."""
 
     name: str
+    """Name."""
     kind: Kind
+    """"stated", "typical" or "shape"."""
     source: str
+    """Where the paper says it."""
     says: str
+    """What it says, in our words."""
     reading: str
+    """What is measured, and what must be so."""
     note: str
+    """What a reader must know beside; may be empty."""
     settings: Mapping[str, Any]
+    """Numbers that set up the experiment, SI."""
     band: Mapping[str, Any]
+    """What each measured value must be: a number or text, true or false; a list (least, largest) of two
+    numbers, or of texts; a table of `SIDES`."""
 
     def holds(self, value: Mapping[str, Any]) -> bool:
         """Whether every measured value is within its band."""

@@ -22,18 +22,12 @@ Verdict = Literal["holds", "fails", "not yet"]
 
 @dataclass(frozen=True)
 class Measured:
-    """What a claim's function measures.
-
-    Attributes
-    ----------
-    value : mapping
-        Measured values by name, SI, the unit at the end of the name; None where there is no such thing.
-    detail : str
-        One sentence about them.
-    """
+    """What a claim's function measures."""
 
     value: Mapping[str, Any]
+    """Measured values by name, SI, the unit at the end of the name; None where there is no such thing."""
     detail: str
+    """One sentence about them."""
 
 
 @dataclass(frozen=True)

@@ -92,18 +92,12 @@ class Option:
 
 @dataclass(frozen=True)
 class Files(Option):
-    """An option that names files to write; the runner checks them before any work, and writes them.
-
-    Attributes
-    ----------
-    endings : tuple of str
-        How names may end beside those of pictures; empty if the end does not matter.
-    pictures : bool
-        Whether names may be those of pictures.
-    """
+    """An option that names files to write; the runner checks them before any work, and writes them."""
 
     endings: tuple[str, ...] = ()
+    """How names may end beside those of pictures; empty if the end does not matter."""
     pictures: bool = True
+    """Whether names may be those of pictures."""
 
 
 def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:

@@ -39,18 +39,12 @@ PICTURES: Final = (".svg", ".png", ".pdf")
 
 @dataclass(frozen=True)
 class Content:
-    """What a file holds: a picture where its name ends as one's does, else what `save` writes.
-
-    Attributes
-    ----------
-    save : callable, optional
-        Writes any file that is no picture; None where the work itself has written it.
-    plot : callable, optional
-        Returns a matplotlib figure.
-    """
+    """What a file holds: a picture where its name ends as one's does, else what `save` writes."""
 
     save: Callable[[Path], Any] | None = None
+    """Writes any file that is no picture; None where the work itself has written it."""
     plot: Callable[[], Any] | None = None
+    """Returns a matplotlib figure."""
 
     @classmethod
     def text(cls, content: Callable[[], str]) -> Content:
@@ -79,30 +73,20 @@ class Content:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a verb has to say at its end.
-
-    Attributes
-    ----------
-    shown : sequence of renderable
-        What is still to be shown; text is markup.
-    note : str
-        Line below the name of the hammer.
-    files : mapping of str to Content
-        What the files of an option hold.
-    complaints : sequence of str
-        Why the exit status is 1.
-    failed : bool
-        Whether it is 1 without a complaint.
-    interrupted : bool
-        Whether Ctrl-C ended the work, of which this much was done.
-    """
+    """What a verb has to say at its end."""
 
     shown: Sequence[RenderableType] = ()
+    """What is still to be shown; text is markup."""
     note: str = ""
+    """Line below the name of the hammer."""
     files: Mapping[str, Content] = field(default_factory=dict)
+    """What the files of an option hold."""
     complaints: Sequence[str] = ()
+    """Why the exit status is 1."""
     failed: bool = False
+    """Whether it is 1 without a complaint."""
     interrupted: bool = False
+    """Whether Ctrl-C ended the work, of which this much was done."""
 
 
 class Job:
@@ -209,27 +193,18 @@ class Job:
 
 @dataclass(frozen=True)
 class Verb:
-    """A verb of the command line.
-
-    Attributes
-    ----------
-    name : str
-        What it is called, such as "strobe" or "fit magnet".
-    example : str
-        A command line that runs; it stands in the help.
-    call : callable
-        What typer calls, with texts; returns the exit status.
-    options : dict of str to Option
-        Options with their declarations, by the names of the parameters.
-    files : dict of str to Files
-        Options that name files to write.
-    """
+    """A verb of the command line."""
 
     name: str
+    """What it is called, such as "strobe" or "fit magnet"."""
     example: str
+    """A command line that runs; it stands in the help."""
     call: Callable[..., int]
+    """What typer calls, with texts; returns the exit status."""
     options: Mapping[str, Option]
+    """Options with their declarations, by the names of the parameters."""
     files: Mapping[str, Files]
+    """Options that name files to write."""
 
 
 def verb(

@@ -54,25 +54,17 @@ _NEAR: Final = 1e-6
 
 @dataclass(frozen=True)
 class Struck:
-    """One dot that was struck: its contacts, by their rows, and the instants at which to look.
-
-    Attributes
-    ----------
-    index : int
-        Number of the firing.
-    touch : int
-        Row of the contact with the pack.
-    back : int or None
-        Row of the first touch of the backstop after it.
-    t_peak, t_force : float
-        Times of the largest indentation and of the largest force, s.
-    """
+    """One dot that was struck: its contacts, by their rows, and the instants at which to look."""
 
     index: int
+    """Number of the firing."""
     touch: int
+    """Row of the contact with the pack."""
     back: int | None
+    """Row of the first touch of the backstop after it."""
     t_peak: float
     t_force: float
+    """Times of the largest indentation and of the largest force, s."""
 
 
 def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck]:
@@ -185,21 +177,15 @@ def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
 
 @dataclass(frozen=True)
 class Changes:
-    """Changes with ``value / scale`` of each constant.
-
-    Attributes
-    ----------
-    dots : array, shape (dots, quantities, n)
-        Of `DOT_QUANTITIES`; NaN where a dot is lost or a quantity is not known.
-    run : array, shape (4, n)
-        Of `RUN_QUANTITIES`.
-    smooth : bool
-        Whether the motion is differentiable throughout.
-    """
+    """Changes with ``value / scale`` of each constant."""
 
     dots: FloatArray
+    """Of `DOT_QUANTITIES`; NaN where a dot is lost or a quantity is not known. Shape (dots, quantities,
+    n)."""
     run: FloatArray
+    """Of `RUN_QUANTITIES`, shape (4, n)."""
     smooth: bool
+    """Whether the motion is differentiable throughout."""
 
 
 def changes_of(

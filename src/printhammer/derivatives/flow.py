@@ -41,34 +41,25 @@ _VALUE_SPACING: Final = 1e-3
 
 @dataclass(frozen=True)
 class Flow:
-    """Columns along a run, at times that are called marks.
-
-    Attributes
-    ----------
-    states : array, shape (m, 4)
-        Displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks.
-    changes : array, shape (m, 3 or 7, n)
-        Changes at the marks: displacement, m; velocity, m/s; latest local maximum, m; with constants also
-        work of coil and of a drive force, loss in pack and backstop, J, since the first mark.
-    growth : array, shape (m, n)
-        Logarithms of the growth of columns that were kept orthonormal, each since the mark before.
-    passed : array, shape (q, 2, 3 or 7, n)
-        The changes at chosen nodes of the record, before and after the switch there.
-    columns : array, shape (3 or 7, n)
-        The changes at the last mark.
-    smooth : bool
-        Whether the motion is differentiable from the first mark to the last.
-    status : int
-        Code of how the run ended.
-    """
+    """Columns along a run, at times that are called marks."""
 
     states: FloatArray
+    """Displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks. Shape (m, 4)."""
     changes: FloatArray
+    """Changes at the marks: displacement, m; velocity, m/s; latest local maximum, m; with constants also work
+    of coil and of a drive force, loss in pack and backstop, J, since the first mark. Shape (m, 3 or 7, n)."""
     growth: FloatArray
+    """Logarithms of the growth of columns that were kept orthonormal, each since the mark before. Shape (m,
+    n)."""
     passed: FloatArray
+    """The changes at chosen nodes of the record, before and after the switch there. Shape (q, 2, 3 or 7,
+    n)."""
     columns: FloatArray
+    """The changes at the last mark, shape (3 or 7, n)."""
     smooth: bool
+    """Whether the motion is differentiable from the first mark to the last."""
     status: int
+    """Code of how the run ended."""
 
     @property
     def status_name(self) -> str:

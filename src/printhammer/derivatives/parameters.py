@@ -46,37 +46,25 @@ _MOST_SINGLE: Final = 20
 
 @dataclass(frozen=True)
 class Parameter:
-    """A constant of a hammer under a drive, and the changes that it makes.
-
-    Attributes
-    ----------
-    name : str
-        Such as "pack.stiffness", "waveform.width", "period", "firing.1".
-    value : float
-        In SI.
-    scale : float
-        Unit in which it is changed, SI: its absolute value, or what is typical of its dimension for the
-        motion where that is zero.
-    unit : str
-        SI unit.
-    meaning : str
-        One phrase.
-    hammer : array, shape (h,)
-        Change of the packed constants with ``value / scale``.
-    firings : array, shape (f,)
-        Change of the firing times [s].
-    pieces : array, shape (m, 6)
-        Change of the tables of the waveforms, see `Drive.kernel_arrays`.
-    """
+    """A constant of a hammer under a drive, and the changes that it makes."""
 
     name: str
+    """Such as "pack.stiffness", "waveform.width", "period", "firing.1"."""
     value: float
+    """In SI."""
     scale: float
+    """Unit in which it is changed, SI: its absolute value, or what is typical of its dimension for the motion
+    where that is zero."""
     unit: str
+    """SI unit."""
     meaning: str
+    """One phrase."""
     hammer: FloatArray = field(repr=False)
+    """Change of the packed constants with ``value / scale``, shape (h,)."""
     firings: FloatArray = field(repr=False)
+    """Change of the firing times [s], shape (f,)."""
     pieces: FloatArray = field(repr=False)
+    """Change of the tables of the waveforms, see `Drive.kernel_arrays`. Shape (m, 6)."""
 
 
 def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:

@@ -65,34 +65,23 @@ class Equilibrium:
 
 @dataclass(frozen=True)
 class EquilibriumPicture:
-    """The statics of a hammer.
-
-    Attributes
-    ----------
-    rest : float or None
-        Rest state at zero current, m.
-    no_rest : str
-        Why there is none; empty where there is one.
-    equilibria : tuple of Equilibrium
-        At zero current, ascending.
-    release_current : float or None
-        Current at which the armature lifts off the backstop, A.
-    x, margin : arrays
-        Displacements from the backstop to the end of the stroke, m, and the holding margin there, N.
-    weakest : tuple (x, margin)
-        Where on that grid the armature is held least, m and N.
-    positive_intervals : tuple of (low, high)
-        Displacements, m, where the net force at zero current drives the armature toward the paper.
-    """
+    """The statics of a hammer."""
 
     rest: float | None
+    """Rest state at zero current, m."""
     no_rest: str
+    """Why there is none; empty where there is one."""
     equilibria: tuple[Equilibrium, ...]
+    """At zero current, ascending."""
     release_current: float | None
+    """Current at which the armature lifts off the backstop, A."""
     x: FloatArray
     margin: FloatArray
+    """Displacements from the backstop to the end of the stroke, m, and the holding margin there, N."""
     weakest: tuple[float, float]
+    """Where on that grid the armature is held least, m and N."""
     positive_intervals: tuple[tuple[float, float], ...]
+    """Displacements, m, where the net force at zero current drives the armature toward the paper."""
 
 
 def rest_state(hammer: HammerLike) -> float:

@@ -16,37 +16,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drawing:
-    """One figure of the paper, drawn.
-
-    Attributes
-    ----------
-    number : int
-        Number in the paper.
-    title, caption : str
-        What it is, and what it shows for this hammer.
-    says : str
-        What the paper says of it, in our words.
-    svg : bytes
-        The picture; empty where it could not be drawn.
-    pdf : Path or None
-        Its file as vectors, seen from the folder of the report.
-    reason : str
-        Why it could not be drawn; empty where it was.
-    claims : tuple of Result
-        Claims that cite the figure.
-    seconds : float
-        Time that it took.
-    """
+    """One figure of the paper, drawn."""
 
     number: int
+    """Number in the paper."""
     title: str
     caption: str
+    """What it is, and what it shows for this hammer."""
     says: str
+    """What the paper says of it, in our words."""
     svg: bytes
+    """The picture; empty where it could not be drawn."""
     pdf: Path | None
+    """Its file as vectors, seen from the folder of the report."""
     reason: str
+    """Why it could not be drawn; empty where it was."""
     claims: tuple[Result, ...]
+    """Claims that cite the figure."""
     seconds: float
+    """Time that it took."""
 
 
 @dataclass(frozen=True)

@@ -17,22 +17,15 @@ _LEAST: Final = {"above", "at_least"}
 
 @dataclass(frozen=True)
 class Miss:
-    """A measured value outside its band, as text.
-
-    Attributes
-    ----------
-    words : str
-        What was measured.
-    value, band : str
-        What it is, and what it must be.
-    distance : str
-        How far that is apart.
-    """
+    """A measured value outside its band, as text."""
 
     words: str
+    """What was measured."""
     value: str
     band: str
+    """What it is, and what it must be."""
     distance: str
+    """How far that is apart."""
 
 
 def misses(result: Result) -> list[Miss]:

@@ -67,24 +67,16 @@ class Variable:
 
 @dataclass(frozen=True)
 class Layout:
-    """What a store holds.
-
-    Attributes
-    ----------
-    chunks : tuple of int
-        Members of a block along each of their dimensions.
-    variables : tuple of Variable
-        Results and coordinates, `MARK` among the results.
-    attrs : mapping
-        Attributes of the group.
-    identity : mapping of str to str
-        What must be the same where a sweep goes on.
-    """
+    """What a store holds."""
 
     chunks: tuple[int, ...]
+    """Members of a block along each of their dimensions."""
     variables: tuple[Variable, ...]
+    """Results and coordinates, `MARK` among the results."""
     attrs: Mapping[str, Any]
+    """Attributes of the group."""
     identity: Mapping[str, str]
+    """What must be the same where a sweep goes on."""
 
 
 class Store:

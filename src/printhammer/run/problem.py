@@ -47,24 +47,16 @@ _MOST_FLIGHTS: Final = 1e6
 
 @dataclass(frozen=True)
 class Record:
-    """What the kernel recorded of one run; see `printhammer.kernel.single.record`.
-
-    Attributes
-    ----------
-    status : int
-        Code of the status.
-    nodes : array, shape (n, 5)
-        Time, displacement, velocity, mode and memory at the ends of all steps.
-    contacts : array, shape (m, 7)
-        Surface, time and velocity in and out, first node, whether open at the start.
-    steps : int
-        Number of steps.
-    """
+    """What the kernel recorded of one run; see `printhammer.kernel.single.record`."""
 
     status: int
+    """Code of the status."""
     nodes: FloatArray
+    """Time, displacement, velocity, mode and memory at the ends of all steps. Shape (n, 5)."""
     contacts: FloatArray
+    """Surface, time and velocity in and out, first node, whether open at the start. Shape (m, 7)."""
     steps: int
+    """Number of steps."""
 
     @property
     def status_name(self) -> str:
@@ -74,23 +66,16 @@ class Record:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Part of a record, up to a pause or the end; its arrays are overwritten by the next one.
-
-    Attributes
-    ----------
-    status : int
-        Code of the status, PAUSED but for the last.
-    nodes, contacts : array, shapes (n, 5) and (m, 7)
-        As in `Record`; the first node is the last one of the stretch before, a contact that is open at a
-        pause the first one of the stretch after it.
-    reached : float
-        Time that the run got to, s.
-    """
+    """Part of a record, up to a pause or the end; its arrays are overwritten by the next one."""
 
     status: int
+    """Code of the status, PAUSED but for the last."""
     nodes: FloatArray
     contacts: FloatArray
+    """As in `Record`; the first node is the last one of the stretch before, a contact that is open at a pause
+    the first one of the stretch after it."""
     reached: float
+    """Time that the run got to, s."""
 
 
 class _TooLong(Exception):

@@ -25,21 +25,15 @@ _SURFACE, _IN, _OUT, _INITIAL = 0, 1, 3, 6
 
 @dataclass(frozen=True)
 class Touches:
-    """Touches of one surface.
-
-    Attributes
-    ----------
-    rows : array, shape (n, 4)
-        Time, s, and velocity, m/s, at touch and at leaving; NaN for a contact that is open at the end.
-    status : str
-        How the run ended; "ok" also where it was ended because there were touches enough.
-    reached : float
-        Time that the run got to, s.
-    """
+    """Touches of one surface."""
 
     rows: FloatArray
+    """Time, s, and velocity, m/s, at touch and at leaving; NaN for a contact that is open at the end. Shape
+    (n, 4)."""
     status: str
+    """How the run ended; "ok" also where it was ended because there were touches enough."""
     reached: float
+    """Time that the run got to, s."""
 
 
 def touches_of(problem: Problem, surface: Surface, after: float, end: float, most: int) -> Touches:

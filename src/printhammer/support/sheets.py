@@ -21,21 +21,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sheet:
-    """Cells of a CSV table.
-
-    Attributes
-    ----------
-    where : str
-        Name of the file, for messages.
-    rows : list of (int, list of str)
-        Line of the file, counted from 1, and cells; the heading first.
-    comments : dict of str to str
-        Comments of the form ``# key: value``; of a key given twice, the last.
-    """
+    """Cells of a CSV table."""
 
     where: str
+    """Name of the file, for messages."""
     rows: list[tuple[int, list[str]]]
+    """Line of the file, counted from 1, and cells; the heading first."""
     comments: dict[str, str]
+    """Comments of the form ``# key: value``; of a key given twice, the last."""
 
 
 def read_sheet(path: Path, what: str, *, gaps: bool = False) -> Sheet:

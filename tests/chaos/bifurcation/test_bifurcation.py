@@ -152,8 +152,8 @@ def test_another_constant_can_be_the_parameter(hammer: "ph.Hammer") -> None:
     )
     alone = ph.bifurcation(hammer.replace("backstop.damping", 5e8), periods=[1.3e-3], refine=0, **SHORT)
     np.testing.assert_array_equal(found.x[0, 1], alone.x[0, 0])
-    assert found.regime.meaning_of("backstop.damping")[0] == "N s/m^2.5"
-    assert found.regime.meaning_of("waveform.amplitude")[0] == "A"
+    assert found.regime.quantity("backstop.damping").si == "N s/m^2.5"
+    assert found.regime.quantity("waveform.amplitude").si == "A"
 
 
 def test_exponents_tell_strange_from_undecided(hammer: "ph.Hammer") -> None:

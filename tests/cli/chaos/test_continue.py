@@ -1,5 +1,6 @@
 import json
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +42,7 @@ def test_ctrl_c_writes_the_branches_that_were_followed(
     def interrupted(*_arguments: object, **_options: object) -> None:
         raise InterruptedBranches(Branches((branch,)))
 
-    monkeypatch.setattr("printhammer.chaos.continuation_regimes.regimes", interrupted)
+    monkeypatch.setattr(import_module("printhammer.chaos.continuation.regimes"), "regimes", interrupted)
     out = tmp_path / "branches.csv"
     done = cli("continue", "--regimes", "--from", "330 Hz", "--to", "340 Hz", "--out", out)
     assert done.status == 130
@@ -49,7 +50,11 @@ def test_ctrl_c_writes_the_branches_that_were_followed(
 
 
 def test_nothing_found_is_status_1(cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("printhammer.chaos.continuation_regimes.regimes", lambda *_, **_options: Branches(()))
+    monkeypatch.setattr(
+        import_module("printhammer.chaos.continuation.regimes"),
+        "regimes",
+        lambda *_, **_options: Branches(()),
+    )
     out = tmp_path / "branches.csv"
     done = cli("continue", "--regimes", "--from", "330 Hz", "--to", "340 Hz", "--out", out)
     assert done.status == 1

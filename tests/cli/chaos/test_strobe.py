@@ -28,7 +28,7 @@ def test_points_and_verdict(cli: Callable, tmp_path: Path) -> None:
         np.testing.assert_array_equal(chart["x"], found.x)
     kept = json.loads(paths["json"].read_text("utf-8"))
     assert kept["verdict"] == "period-1"
-    assert kept["points"]["x [m]"] == found.x.tolist()
+    assert kept["columns"]["x"]["values"] == found.x.tolist()
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in paths["svg"].read_bytes()
 

@@ -39,44 +39,29 @@ _SHIFTED: Final = 0.5
 
 @dataclass
 class Strand:
-    """Successive trains, the state being carried from each to the next.
-
-    Attributes
-    ----------
-    rows : list of int
-        Their rows in the table of all trains, in the order in which the state is carried.
-    before : int or None
-        Number of the strand that ends where this one begins; None for the first one.
-    """
+    """Successive trains, the state being carried from each to the next."""
 
     rows: list[int]
+    """Their rows in the table of all trains, in the order in which the state is carried."""
     before: int | None = None
+    """Number of the strand that ends where this one begins; None for the first one."""
 
 
 @dataclass
 class Trains:
-    """All trains of a diagram: what is run, and what is found.
-
-    Attributes
-    ----------
-    regimes : list of Regime
-        One for each train.
-    columns : Columns
-        Their states.
-    cycles : int array
-        Their periods, 0 for none.
-    scales : array, shape (M, 3)
-        By which differences of displacement, velocity and memory are divided.
-    carried : int
-        Number of trains that were run again to close the joints.
-    """
+    """All trains of a diagram: what is run, and what is found."""
 
     regimes: list[Regime]
+    """One for each train."""
     columns: Columns
+    """Their states."""
     cycles: Any
+    """Their periods, 0 for none."""
     distances: Any
     scales: FloatArray
+    """By which differences of displacement, velocity and memory are divided. Shape (M, 3)."""
     carried: int = field(default=0)
+    """Number of trains that were run again to close the joints."""
 
 
 def strands_of(rows: Sequence[int], first: int) -> list[Strand]:

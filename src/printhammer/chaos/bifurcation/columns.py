@@ -52,29 +52,22 @@ _PACK_RELEASED: Final = MODE_NAMES.index("pack released")
 
 @dataclass(frozen=True)
 class Columns:
-    """States of many trains at successive sections.
-
-    Attributes
-    ----------
-    x, v : array, shape (M, P)
-        Displacement, m, and velocity, m/s; NaN where a run did not get.
-    branch : int8 array, shape (M, P)
-        Code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where a run did not get.
-    memory : array, shape (M, P)
-        Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0.
-    status : str array, shape (M,)
-        How the runs ended; `NOT_RUN` before.
-    last : array, shape (M, 4)
-        Displacement, velocity, branch of the pack or -1, and memory at the firing after all that are asked
-        for, where the next train can go on; `FROM_REST` where it cannot.
-    """
+    """States of many trains at successive sections."""
 
     x: FloatArray
     v: FloatArray
+    """Displacement, m, and velocity, m/s; NaN where a run did not get. Shape (M, P)."""
     branch: npt.NDArray[np.int8]
+    """Code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where a run did not get. Shape
+    (M, P)."""
     memory: FloatArray
+    """Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0. Shape (M,
+    P)."""
     status: npt.NDArray[np.str_]
+    """How the runs ended; `NOT_RUN` before. Shape (M,)."""
     last: FloatArray
+    """Displacement, velocity, branch of the pack or -1, and memory at the firing after all that are asked
+    for, where the next train can go on; `FROM_REST` where it cannot. Shape (M, 4)."""
 
     def __len__(self) -> int:
         """Return the number of trains."""

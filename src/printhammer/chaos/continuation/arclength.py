@@ -56,44 +56,29 @@ _SAME: Final = 1e-6
 
 @dataclass(frozen=True)
 class Stop:
-    """Where a curve ends, and why.
-
-    Attributes
-    ----------
-    reason : str
-        "bound"; "closed"; "no value": the map has none beyond; "lost": Newton's method does not converge
-        beyond; "length": the number of steps is used up; "not asked"; or what the caller's watch says.
-    parameter : float
-        Where.
-    state : array
-        Where.
-    sentence : str
-        The same in words.
-    node : Node or None
-        Where the caller's watch stops between two nodes: the last node of the curve.
-    """
+    """Where a curve ends, and why."""
 
     reason: str
+    """"bound"; "closed"; "no value": the map has none beyond; "lost": Newton's method does not converge
+    beyond; "length": the number of steps is used up; "not asked"; or what the caller's watch says."""
     parameter: float
+    """Where."""
     state: FloatArray
+    """Where."""
     sentence: str
+    """The same in words."""
     node: Node | None = field(default=None, repr=False)
+    """Where the caller's watch stops between two nodes: the last node of the curve."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve of fixed points.
-
-    Attributes
-    ----------
-    nodes : list of Node
-        In order along the curve; `arc` increases.
-    stops : tuple of Stop
-        What ended it before the first and after the last.
-    """
+    """A curve of fixed points."""
 
     nodes: list[Node]
+    """In order along the curve; `arc` increases."""
     stops: tuple[Stop, Stop]
+    """What ended it before the first and after the last."""
 
     @property
     def closed(self) -> bool:
@@ -103,23 +88,16 @@ class Curve:
 
 @dataclass(frozen=True)
 class Steps:
-    """How a curve is followed; lengths in scaled variables.
-
-    Attributes
-    ----------
-    first, smallest, largest : float
-        Lengths of the steps.
-    most : int
-        Number of steps in either direction.
-    precision : float
-        Scaled correction of Newton's method below which a point is on the curve.
-    """
+    """How a curve is followed; lengths in scaled variables."""
 
     first: float = 0.02
     smallest: float = 1e-7
     largest: float = 0.1
+    """Lengths of the steps."""
     most: int = 1000
+    """Number of steps in either direction."""
     precision: float = 1e-11
+    """Scaled correction of Newton's method below which a point is on the curve."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.smallest <= self.first <= self.largest < math.inf:

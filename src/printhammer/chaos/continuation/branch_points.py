@@ -63,30 +63,20 @@ _HALF_DOUBLES: Final = 0.5
 
 @dataclass(frozen=True)
 class BranchPoint:
-    """A point at which something happens to a curve of fixed points.
-
-    Attributes
-    ----------
-    kind : str
-        "fold", "period doubling", "Neimark-Sacker", "branching" or "change".
-    node : Node
-        The fixed point there.
-    after : int
-        Number of the node of the curve that it follows.
-    labels : tuple
-        Labels of the motion before and after it.
-    sharp : bool
-        False where it could not be located to the precision of the curve; it is then between two nodes.
-    sides : tuple of Node or None
-        Of a change: fixed points close before and behind it.
-    """
+    """A point at which something happens to a curve of fixed points."""
 
     kind: Kind
+    """"fold", "period doubling", "Neimark-Sacker", "branching" or "change"."""
     node: Node
+    """The fixed point there."""
     after: int
+    """Number of the node of the curve that it follows."""
     labels: tuple[Hashable, Hashable]
+    """Labels of the motion before and after it."""
     sharp: bool = True
+    """False where it could not be located to the precision of the curve; it is then between two nodes."""
     sides: tuple[Node, Node] | None = None
+    """Of a change: fixed points close before and behind it."""
 
     @property
     def parameter(self) -> float:

@@ -39,42 +39,28 @@ Surface = Literal["pack", "backstop"]
 
 @dataclass(frozen=True)
 class Touch:
-    """One contact of an orbit that begins within its period.
-
-    Attributes
-    ----------
-    surface : str
-        "pack" or "backstop".
-    t_in, t_out : float
-        Times of touch and leaving, s, since the firing before the section; leaving may be in the next period,
-        and is infinite for a contact without end.
-    v_in : float
-        Velocity at touch, m/s.
-    """
+    """One contact of an orbit that begins within its period."""
 
     surface: Surface
+    """"pack" or "backstop"."""
     t_in: float
     t_out: float
+    """Times of touch and leaving, s, since the firing before the section; leaving may be in the next period,
+    and is infinite for a contact without end."""
     v_in: float
+    """Velocity at touch, m/s."""
 
 
 @dataclass(frozen=True)
 class Passage:
-    """What happens on the way from a section to the last.
-
-    Attributes
-    ----------
-    touches : tuple of Touch
-        In order.
-    period : float
-        Time between firings, s.
-    firings : int
-        Number of firings on the way.
-    """
+    """What happens on the way from a section to the last."""
 
     touches: tuple[Touch, ...]
+    """In order."""
     period: float
+    """Time between firings, s."""
     firings: int
+    """Number of firings on the way."""
 
     def of(self, surface: Surface) -> list[Touch]:
         """Return the touches of one surface."""
@@ -106,24 +92,17 @@ class Passage:
 
 @dataclass(frozen=True)
 class Course:
-    """What a periodic orbit does in one period of it.
-
-    Attributes
-    ----------
-    states : array, shape (firings, 2)
-        Displacement, m, and velocity, m/s, at the sections.
-    peak_forces : array, shape (firings,)
-        Largest pack force of the contacts of each firing, N; NaN without one.
-    coil_work, drive_work, pack_loss, backstop_loss : float
-        Energies, J.
-    """
+    """What a periodic orbit does in one period of it."""
 
     states: FloatArray
+    """Displacement, m, and velocity, m/s, at the sections, shape (firings, 2)."""
     peak_forces: FloatArray
+    """Largest pack force of the contacts of each firing, N; NaN without one. Shape (firings,)."""
     coil_work: float
     drive_work: float
     pack_loss: float
     backstop_loss: float
+    """Energies, J."""
 
 
 class RegimeFamily:

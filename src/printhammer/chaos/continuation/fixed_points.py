@@ -29,31 +29,21 @@ _STAGNANT: Final = 1e3
 
 @dataclass(frozen=True)
 class MapValue:
-    """A map with a parameter, evaluated at one point.
-
-    Attributes
-    ----------
-    image : array, shape (n,)
-        G(u, p).
-    jacobian : array, shape (n, n)
-        dG/du.
-    slope : array, shape (n,)
-        dG/dp.
-    label : hashable
-        What kind of motion led there, such as its sequence of contacts; where it changes along a curve, that
-        is an event.
-    trouble : str
-        Why the map has no value there; empty where it has one.
-    extra : object
-        Whatever else the map wants to keep of this evaluation.
-    """
+    """A map with a parameter, evaluated at one point."""
 
     image: FloatArray
+    """G(u, p), shape (n,)."""
     jacobian: FloatArray
+    """dG/du, shape (n, n)."""
     slope: FloatArray
+    """dG/dp, shape (n,)."""
     label: Hashable = ()
+    """What kind of motion led there, such as its sequence of contacts; where it changes along a curve, that
+    is an event."""
     trouble: str = ""
+    """Why the map has no value there; empty where it has one."""
     extra: Any = field(default=None, repr=False)
+    """Whatever else the map wants to keep of this evaluation."""
 
     @classmethod
     def none(cls, count: int, trouble: str) -> MapValue:
@@ -68,30 +58,20 @@ MapFamily = Callable[["FloatArray", float], MapValue]
 
 @dataclass(frozen=True)
 class Node:
-    """A fixed point on a curve.
-
-    Attributes
-    ----------
-    state : array, shape (n,)
-        u.
-    parameter : float
-        p.
-    tangent : array, shape (n + 1,)
-        Direction of the curve in scaled variables, of length 1.
-    arc : float
-        Length of the curve from its start in scaled variables, negative before it.
-    value : MapValue
-        The map there.
-    residual : float
-        Largest scaled component of G(u, p) - u.
-    """
+    """A fixed point on a curve."""
 
     state: FloatArray
+    """u, shape (n,)."""
     parameter: float
+    """p."""
     tangent: FloatArray
+    """Direction of the curve in scaled variables, of length 1, shape (n + 1,)."""
     arc: float
+    """Length of the curve from its start in scaled variables, negative before it."""
     value: MapValue
+    """The map there."""
     residual: float
+    """Largest scaled component of G(u, p) - u."""
 
     @property
     def multipliers(self) -> npt.NDArray[np.complex128]:

@@ -47,34 +47,22 @@ _PLASTIC: Final = 1.324717957244746
 
 @dataclass(frozen=True)
 class Records:
-    """States of many motions at the sections, from one on.
-
-    Attributes
-    ----------
-    states : array, shape (M, n, 2)
-        Displacement, m, and velocity, m/s; NaN where a run did not get.
-    usable : bool array, shape (M, n)
-        Whether that is the whole state.
-    """
+    """States of many motions at the sections, from one on."""
 
     states: FloatArray
+    """Displacement, m, and velocity, m/s; NaN where a run did not get. Shape (M, n, 2)."""
     usable: npt.NDArray[np.bool_]
+    """Whether that is the whole state, shape (M, n)."""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """A stretch of a motion that nearly closes.
-
-    Attributes
-    ----------
-    states : array, shape (m, 2)
-        States at the starts of the segments.
-    firings : int array, shape (m,)
-        Number of firings in each.
-    """
+    """A stretch of a motion that nearly closes."""
 
     states: FloatArray
+    """States at the starts of the segments, shape (m, 2)."""
     firings: npt.NDArray[np.int64]
+    """Number of firings in each, shape (m,)."""
 
 
 def record(

@@ -59,30 +59,20 @@ class StrobeMaps(Protocol):
 
 @dataclass(frozen=True)
 class Closing:
-    """What Newton's method made of one guess.
-
-    Attributes
-    ----------
-    states : array, shape (m, 2)
-        States at the starts of the segments.
-    firings : int array, shape (m,)
-        Number of firings in each segment.
-    jacobians : array, shape (m, 2, 2)
-        Derivative of the end of each segment with respect to its start.
-    residual : float
-        Largest distance of an end from the start that follows, in half-widths of the window.
-    smooth : bool
-        Whether the orbit has a derivative.
-    reason : str
-        Why it does not close; empty where it does.
-    """
+    """What Newton's method made of one guess."""
 
     states: FloatArray
+    """States at the starts of the segments, shape (m, 2)."""
     firings: npt.NDArray[np.int64]
+    """Number of firings in each segment, shape (m,)."""
     jacobians: FloatArray
+    """Derivative of the end of each segment with respect to its start. Shape (m, 2, 2)."""
     residual: float
+    """Largest distance of an end from the start that follows, in half-widths of the window."""
     smooth: bool
+    """Whether the orbit has a derivative."""
     reason: str
+    """Why it does not close; empty where it does."""
 
     @property
     def closed(self) -> bool:

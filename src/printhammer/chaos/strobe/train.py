@@ -35,21 +35,14 @@ HELD_BRANCHES: Final = {
 
 @dataclass(frozen=True)
 class Train:
-    """A regime fired from a state on, with nothing fired before.
-
-    Attributes
-    ----------
-    regime : Regime
-        Hammer and periodic drive.
-    drive : Drive
-        So many pulses, or the endless force.
-    state : tuple of float or None
-        Displacement, m, and velocity, m/s, at time 0; None for the rest state.
-    """
+    """A regime fired from a state on, with nothing fired before."""
 
     regime: Regime
+    """Hammer and periodic drive."""
     drive: Drive
+    """So many pulses, or the endless force."""
     state: tuple[float, float] | None = None
+    """Displacement, m, and velocity, m/s, at time 0; None for the rest state."""
 
     @classmethod
     def of(cls, regime: Regime, firings: int, state: tuple[float, float] | None = None) -> Self:

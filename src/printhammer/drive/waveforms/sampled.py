@@ -90,7 +90,9 @@ class Sampled(Waveform):
         else:
             from scipy.interpolate import PchipInterpolator
 
-            cubics = np.asarray(PchipInterpolator(t, y).c)[::-1].T
+            # Slopes so small that their inverse overflows become zero, as they should.
+            with np.errstate(over="ignore"):
+                cubics = np.asarray(PchipInterpolator(t, y).c)[::-1].T
         starts = t[:-1].tolist()
         rows = [(start, POLYNOMIAL, *cubic) for start, cubic in zip(starts, cubics.tolist(), strict=True)]
         return table(rows, float(t[-1]))

@@ -44,37 +44,26 @@ _ZOOMS, _PER_ZOOM = 2, 4
 
 @dataclass(frozen=True)
 class BuzzTrain:
-    """One train that was tried.
-
-    Attributes
-    ----------
-    kind : str
-        "uniform": pulses one period apart; "delayed": each a constant delay after leaving the pack.
-    interval : float
-        That period or delay, s.
-    times : tuple of float
-        Firing times, s.
-    first, count : int
-        Number of the firing that made the first dot of the longest run that counts, and number of its dots,
-        which may be 0: one for each firing, each with a peak force within limits, no touch of the backstop
-        between the first and the last.
-    forces : tuple of float
-        Peak forces of the dots of the run, in units of that of a single pulse.
-    clear : bool
-        Whether there is no lost dot and no touch of the backstop from the first dot of the train, which
-        starts from rest, to the last of the run: not only the dots that count, the whole burst stays clear.
-    peak_current : float
-        Largest value of the drive, A (N under a drive that is a force).
-    """
+    """One train that was tried."""
 
     kind: Literal["uniform", "delayed"]
+    """"uniform": pulses one period apart; "delayed": each a constant delay after leaving the pack."""
     interval: float
+    """That period or delay, s."""
     times: tuple[float, ...]
+    """Firing times, s."""
     first: int
     count: int
+    """Number of the firing that made the first dot of the longest run that counts, and number of its dots,
+    which may be 0: one for each firing, each with a peak force within limits, no touch of the backstop
+    between the first and the last."""
     forces: tuple[float, ...]
+    """Peak forces of the dots of the run, in units of that of a single pulse."""
     clear: bool
+    """Whether there is no lost dot and no touch of the backstop from the first dot of the train, which starts
+    from rest, to the last of the run: not only the dots that count, the whole burst stays clear."""
     peak_current: float
+    """Largest value of the drive, A (N under a drive that is a force)."""
 
     @property
     def weakest(self) -> float:
@@ -84,27 +73,18 @@ class BuzzTrain:
 
 @dataclass(frozen=True)
 class BuzzSearch:
-    """Result of a search for buzz printing.
-
-    Attributes
-    ----------
-    train : BuzzTrain or None
-        The train found.
-    reason : str
-        Why there is none, in one sentence; empty if there is one.
-    best : BuzzTrain or None
-        The best attempt, which is `train` if there is one; None if no dot of any train counts.
-    reference_force : float
-        Peak force of the dot of a single pulse, N; 0 if it makes none.
-    tried : int
-        Number of trains tried.
-    """
+    """Result of a search for buzz printing."""
 
     train: BuzzTrain | None
+    """The train found."""
     reason: str
+    """Why there is none, in one sentence; empty if there is one."""
     best: BuzzTrain | None
+    """The best attempt, which is `train` if there is one; None if no dot of any train counts."""
     reference_force: float
+    """Peak force of the dot of a single pulse, N; 0 if it makes none."""
     tried: int
+    """Number of trains tried."""
 
 
 def find_buzz_train(

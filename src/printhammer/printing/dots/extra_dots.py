@@ -36,22 +36,15 @@ _AFTER: Final = 1e-9
 
 @dataclass(frozen=True)
 class ExtraDots:
-    """Extra contacts, E of them.
-
-    Attributes
-    ----------
-    member, firing : int array, shape (E,)
-        To which firing of which member they belong.
-    touch : array, shape (E,)
-        Time of touch, s.
-    peak_force : array, shape (E,)
-        Largest pack force, N.
-    """
+    """Extra contacts, E of them."""
 
     member: IntArray = field(repr=False)
     firing: IntArray = field(repr=False)
+    """To which firing of which member they belong, shape (E,)."""
     touch: FloatArray = field(repr=False)
+    """Time of touch, s, shape (E,)."""
     peak_force: FloatArray = field(repr=False)
+    """Largest pack force, N, shape (E,)."""
 
 
 def extra_dots(

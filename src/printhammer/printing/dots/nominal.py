@@ -24,18 +24,12 @@ WAIT: Final = 4e-3
 
 @dataclass(frozen=True)
 class SinglePulse:
-    """The dot of one pulse from rest, as far as dots are judged by it.
-
-    Attributes
-    ----------
-    force : float
-        Largest pack force, N.
-    flight_time : float
-        From firing to touch, s.
-    """
+    """The dot of one pulse from rest, as far as dots are judged by it."""
 
     force: float
+    """Largest pack force, N."""
     flight_time: float
+    """From firing to touch, s."""
 
 
 @dataclass(frozen=True)

@@ -39,39 +39,26 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True)
 class Trial:
-    """What became of all patterns in all cases: members by case first, then by pattern.
-
-    Attributes
-    ----------
-    cases : tuple of Case
-        Hammers and rates.
-    patterns : tuple of tuple of int
-        Numbers of the slots at which dots are wanted.
-    drives : tuple of Drive
-        What drove each member.
-    slots : int array, shape (members, firings)
-        Number of the slot of each firing; -1 where there is none.
-    due : array, shape (members, firings)
-        Time of that slot, s.
-    ends : array, shape (members,)
-        Ends of the runs, s.
-    dots : DotTable
-        What the firings did.
-    judgement : Judgement
-        How far off they are.
-    statuses : tuple of str
-        How the runs ended.
-    """
+    """What became of all patterns in all cases: members by case first, then by pattern."""
 
     cases: tuple[Case, ...]
+    """Hammers and rates."""
     patterns: tuple[tuple[int, ...], ...]
+    """Numbers of the slots at which dots are wanted."""
     drives: tuple[Drive, ...]
+    """What drove each member."""
     slots: npt.NDArray[np.int64]
+    """Number of the slot of each firing; -1 where there is none. Shape (members, firings)."""
     due: FloatArray
+    """Time of that slot, s, shape (members, firings)."""
     ends: FloatArray
+    """Ends of the runs, s, shape (members,)."""
     dots: DotTable
+    """What the firings did."""
     judgement: Judgement
+    """How far off they are."""
     statuses: tuple[str, ...]
+    """How the runs ended."""
 
     @property
     def passed(self) -> npt.NDArray[np.bool_]:

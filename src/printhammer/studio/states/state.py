@@ -34,49 +34,33 @@ class ProtocolError(Exception):
 
 @dataclass(frozen=True)
 class State:
-    """What the user has set; all numbers SI.
-
-    Attributes
-    ----------
-    hammer : str
-        Name of a hammer that the studio offers; not looked at where `text` is given.
-    text : str
-        Text of a hammer file that was dropped, or empty.
-    constants : tuple of (str, float)
-        Constants that are changed, by dotted key, sorted.
-    waveform : tuple of (str, value), or None
-        The pulse that is fired, ``shape`` and its constants; None for the hammer's own.
-    rate : float
-        Firing rate, Hz.
-    pulses : int
-        Number of firings.
-    pattern : str
-        Instead of all pulses: which of the slots are fired, such as "1101".
-    overlap : str
-        "add" or "replace".
-    low, high : float
-        Rates of the map, Hz.
-    line : str
-        Text that is printed.
-    views : tuple of str
-        Views that are shown, see `VIEWS`.
-    shelf : Shelf
-        Where hammers are looked up by name; no part of what the page sends.
-    """
+    """What the user has set; all numbers SI."""
 
     hammer: str
+    """Name of a hammer that the studio offers; not looked at where `text` is given."""
     text: str
+    """Text of a hammer file that was dropped, or empty."""
     constants: tuple[tuple[str, float], ...]
+    """Constants that are changed, by dotted key, sorted."""
     waveform: tuple[tuple[str, Any], ...] | None
+    """The pulse that is fired, ``shape`` and its constants; None for the hammer's own."""
     rate: float
+    """Firing rate, Hz."""
     pulses: int
+    """Number of firings."""
     pattern: str
+    """Instead of all pulses: which of the slots are fired, such as "1101"."""
     overlap: Overlap
+    """"add" or "replace"."""
     low: float
     high: float
+    """Rates of the map, Hz."""
     line: str
+    """Text that is printed."""
     views: tuple[str, ...]
+    """Views that are shown, see `VIEWS`."""
     shelf: Shelf = field(default_factory=Shelf, compare=False, repr=False)
+    """Where hammers are looked up by name; no part of what the page sends."""
 
     @cached_property
     def base(self) -> Hammer:

@@ -80,7 +80,8 @@ def continue_(
 
     Ctrl-C keeps the branches that were followed by then. Ends with status 1 where there is none.
     """
-    from printhammer.chaos.continuation import regimes as of_regimes
+    from printhammer.chaos.continuation.regimes import InterruptedBranches
+    from printhammer.chaos.continuation.regimes import regimes as all_regimes
     from printhammer.chaos.continuation.stability_chart import stability_chart
 
     bounds = _both(lowest, highest, "--from", "--to", parameter)
@@ -95,13 +96,13 @@ def continue_(
     try:
         if regimes:
             with job.counting("regimes", remaining=False) as tell:
-                result = of_regimes.regimes(
+                result = all_regimes(
                     hammer, bounds, longest=longest, seeds=seeds, doublings=doublings, progress=tell, **passed
                 )
         else:
             start = {"period": period, "rate": rate, "firings": firings, "state": state, "phase": phase}
             result = _followed(job, hammer, parameter, bounds, doublings, **start, **passed)
-    except of_regimes.InterruptedBranches as interrupt:
+    except InterruptedBranches as interrupt:
         interrupted, result = True, interrupt.branches
     job.show(*described(result))
     if second is not None and ends is not None and not interrupted:

@@ -1,8 +1,9 @@
-"""The verb `bench`: this machine's figures, beside those of the solvers that are installed on it."""
+"""The verb `bench`: this machine's figures, beside those of other solvers where a folder of them is named."""
 
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
@@ -27,13 +28,16 @@ def bench(
     job: Job,
     quick: bool = opt.switch("Short runs, one round: to see that everything works."),
     threads: int | None = opt.whole("Largest number of threads of ensembles (2)."),
+    peers: str | None = opt.text("FOLDER", "Other solvers, such as benchmarks/peers."),
 ) -> Answer:
-    """Measure speed and error against other solvers, one run at a time and in ensembles."""
+    """Measure speed and error against a slow reference and other solvers, single runs and ensembles."""
     from printhammer import bench as benchmark
+    from printhammer.bench.entry import load_peers
 
+    others = None if peers is None else load_peers(Path(peers))
     announce_compiling()
     with job.telling() as say:
-        report = benchmark.run(quick=quick, threads=threads, say=say)
+        report = benchmark.run(quick=quick, threads=threads, peers=others, say=say)
     return Answer(
         described(report),
         files={"json": Content.text(report.to_json), "markdown": Content.text(report.to_markdown)},
