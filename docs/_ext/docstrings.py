@@ -1,11 +1,14 @@
-"""What the numpydoc reader of Sphinx makes of three kinds of docstrings here, put right."""
+"""What Sphinx and its numpydoc reader make of four kinds of docstrings here, put right."""
 
 from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING, Any
 
+from sphinx.addnodes import pending_xref
+
 if TYPE_CHECKING:
+    from docutils import nodes
     from sphinx.application import Sphinx
 
 # Napoleon runs at 500, the default.
@@ -29,8 +32,17 @@ def restore(_app: Sphinx, _what: str, name: str, _object: Any, _options: Any, li
     lines[:] = [NAMES.sub(lambda found: found[0].replace(", ", ","), line) for line in lines]
 
 
+def unlink(_app: Sphinx, doctree: nodes.document) -> None:
+    """Make the dimensions of "array, shape (rate, time)" words again, not links to what has such a name."""
+    for link in list(doctree.findall(pending_xref)):
+        dimension = link.get("reftype") == "class" and link["reftarget"].islower()
+        if dimension and "shape (" in link.parent.astext():
+            link.replace_self(link.children)
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Connect to autodoc."""
     app.connect("autodoc-process-docstring", keep, priority=BEFORE)
     app.connect("autodoc-process-docstring", restore, priority=AFTER)
+    app.connect("doctree-read", unlink)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
