@@ -150,6 +150,9 @@ def test_words_and_places_do_not_change_the_fingerprint_of_code(package: Path) -
         law='"""A law."""\nimport math\nA = 2\n\ndef f(x):\n    """Return."""\n    return A * x**0.5\n'
     )
     assert one == digest(law="A = 2  # why\ndef f(x): return A*x**.5\n")
+    raised = "def f(x):\n    raise ValueError({})\n"
+    assert digest(error=raised.format("'a'")) == digest(error=raised.format("f'{x} is wrong'"))
+    (package / "error.py").unlink()
     assert one == digest(law="A = 2\n", other="from room.law import A\n\ndef f(x):\n    return A * x**0.5\n")
     measured._statements.cache_clear()
 

@@ -5,7 +5,8 @@ the fingerprints of its hammers and one of the code that the figures depend on. 
 today the table is stale; ``.venv/bin/python docs/measure/measured.py`` lists those, as ``make docs`` does.
 
 The fingerprint of code is that of the syntax trees of the rooms of ``src/printhammer`` that a script names.
-File names, order, docstrings, comments and imports do not count, so that code may move within these rooms.
+File names, order, docstrings, comments, imports and the words of errors do not count, so that code may move
+within these rooms.
 """
 
 from __future__ import annotations
@@ -179,6 +180,8 @@ def _seen(node: Any) -> str:
         return repr(node)
     if isinstance(node, UNSEEN) or _is_text(node) or _is_for_types(node):
         return ""
+    if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+        return f"Raise({_seen(node.exc.func)})"
     fields = ((name, value) for name, value in ast.iter_fields(node) if value not in (None, []))
     kept = (f"{name}={_seen(value)}" for name, value in fields if name not in ("ctx", "kind", "type_comment"))
     return f"{type(node).__name__}({','.join(kept)})"
