@@ -230,3 +230,12 @@ def test_a_page_chooses_columns_and_formats() -> None:
     assert measured.shown(rows[0][1], columns[1]) == "1.200e-10"
     with pytest.raises(ValueError, match="no column place, expected some of error; ok"):
         chosen(table(), "place", "")
+
+
+def test_a_page_says_where_a_table_comes_from() -> None:
+    origin = module("measured_tables", DOCS / "_ext").origin
+    made = table(code="0123456789abcdef")
+    hammer = made.hammers["hendriks-1983"][:8]
+    assert origin(made) == f"Measured with `docs/measure/accuracy.py`: hendriks-1983 {hammer}, code 01234567."
+    assert "2 hammers, code 01234567" in origin(table(code="0123456789abcdef", hammers={"a": "1", "b": "2"}))
+    assert "was not recorded" in origin(table(code=""))

@@ -68,10 +68,12 @@ def chosen(
 
 def origin(table: measured.Measured) -> str:
     """Return the line below a table."""
+    if not table.code:
+        return f"`{table.command}` measures this; the code of these figures was not recorded."
     marks = {**table.hammers, "code": table.code}
     if len(table.hammers) > 1:
         marks = {f"{len(table.hammers)} hammers, code": table.code}
-    told = ", ".join(f"{name} {mark[:8] or 'not recorded'}" for name, mark in marks.items())
+    told = ", ".join(f"{name} {mark[:8]}" for name, mark in marks.items())
     return f"Measured with `{table.command}`: {told}."
 
 
