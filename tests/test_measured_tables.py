@@ -3,6 +3,7 @@
 import ast
 import importlib
 import re
+import runpy
 import sys
 from pathlib import Path
 from typing import Any
@@ -128,6 +129,13 @@ def test_a_script_names_the_rooms_that_it_uses(script: Path) -> None:
     used = imported(script) - {"reconstruction/family/family"}
     assert script.name == "measured.py" or rooms
     assert all(any(path.startswith(room) for room in rooms) for path in used)
+
+
+@pytest.mark.parametrize("script", sorted(MEASURE.glob("*.py")), ids=lambda path: path.stem)
+def test_what_a_script_imports_is_there(script: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(MEASURE))
+    monkeypatch.syspath_prepend(str(ROOT))
+    assert runpy.run_path(str(script), run_name=f"docs.measure.{script.stem}")
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from measured import MOTION, Cell, Column, write
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from tests.hammers import Draw, interpreted, shipped
+from tests.hammers import Draw, crude, interpreted
 from tests.tangents import SHARP, before_slow_touches, deviation, scaled
 from tests.truth.test_tangent_finite_differences import CASES, MOVING, drive_of, hammer_of
 
@@ -43,10 +43,10 @@ def row(name: str, errors: list[float]) -> list[Cell]:
     return [name, float(max(errors)), float(np.median(errors))]
 
 
-def shipped_hammer() -> list[list[Cell]]:
+def crude_hammer() -> list[list[Cell]]:
     """A single pulse, trains, from contact to contact; and what the default tolerance does."""
     rows = []
-    hammer = shipped()
+    hammer = crude()
     single = ph.PulseTrain(hammer.waveform)
     ends = np.linspace(0.1e-3, 0.85e-3, 16)
     rows.append(row("single pulse, 16 ends in all modes", [best(hammer, single, 0.0, end) for end in ends]))
@@ -69,7 +69,7 @@ def shipped_hammer() -> list[list[Cell]]:
 
 
 def other_hammers() -> list[list[Cell]]:
-    """Parts, drives, and hammers drawn about the shipped one."""
+    """Parts, drives, and hammers drawn about the crude one."""
     errors: dict[bool, list[float]] = {False: [], True: []}
     for magnet, spring, pack, backstop, name, start, end in CASES:
         with tempfile.TemporaryDirectory() as folder, interpreted():
@@ -91,7 +91,7 @@ def other_hammers() -> list[list[Cell]]:
 
 def cost() -> list[Cell]:
     """Time of exponents over time of the runs alone, a row of a table."""
-    hammer = shipped()
+    hammer = ph.load("hendriks-1983")
     ratios = []
     for _ in range(5):
         begin = time.process_time()
@@ -104,9 +104,10 @@ def cost() -> list[Cell]:
 
 
 if __name__ == "__main__":
-    rows = [*shipped_hammer(), *other_hammers()]
+    rows = [*crude_hammer(), *other_hammers()]
     columns = [Column(name=f"{which} difference", format=".1e") for which in ("largest", "median")]
     rooms = (*MOTION, "derivatives")
-    write("tangent", [Column(name="what"), *columns], rows, {"spacings": SIZES, "seed": 4}, rooms)
+    settings = {"hammer": crude().fingerprint, "spacings": SIZES, "seed": 4}
+    write("tangent", [Column(name="what"), *columns], rows, settings, rooms, hammers=())
     columns = [Column(name="train"), Column(name="time of the second pass / time of the run", format=".1f")]
     write("tangent-cost", columns, [cost()], {"firings": 1000}, rooms)
