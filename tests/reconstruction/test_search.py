@@ -39,7 +39,7 @@ def bowl(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Something cheap to minimise in place of hammers; the list tells how many points were computed."""
     computed: list[int] = []
 
-    def scored(points: list[Any], aim: str, _pool: Any) -> list[dict[str, Any]]:
+    def scored(points: list[Any], aim: str, _pool: Any, _shape: str) -> list[dict[str, Any]]:
         computed.append(len(points))
         return [
             {

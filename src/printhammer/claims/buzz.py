@@ -8,7 +8,13 @@ from printhammer.claims.context import TAIL, Context
 from printhammer.claims.definition import claims
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
-from printhammer.printing.dots.buzz import BuzzSearch, BuzzTrain, delayed_train, find_buzz_train, longest_run
+from printhammer.printing.dots.buzz import (
+    BuzzSearch,
+    BuzzTrain,
+    delayed_train,
+    find_buzz_train,
+    longest_run,
+)
 from printhammer.printing.dots.settling import touches
 
 if TYPE_CHECKING:
@@ -44,11 +50,14 @@ def buzz_printing(context: Context, claim: Claim) -> Measured:
         return Measured(nothing, f"No train does: {found.reason}.")
     motion = context.run(PulseTrain(context.waveform, at=train.times), train.times[-1] + TAIL)
     dots = motion.dots[train.first : train.first + train.count]
+    returns = [contact.t_in for contact in touches(motion)]
     struck = [dot.fired_at + dot.flight_time for dot in dots if dot.flight_time is not None]
     forces = [dot.peak_force / context.print_force for dot in dots if dot.peak_force is not None]
     value: dict[str, Any] = {
         "dots": len(struck),
-        "backstop_touches_between": sum(struck[0] <= c.t_in <= struck[-1] for c in touches(motion)),
+        "backstop_touches_before": sum(t < struck[0] for t in returns),
+        "backstop_touches_between": sum(struck[0] <= t <= struck[-1] for t in returns),
+        "backstop_touches_after": train.touches[2],
         "least_force_over_single": min(forces),
         "largest_force_over_single": max(forces),
         "first_dot": train.first + 1,
@@ -62,7 +71,7 @@ def buzz_printing(context: Context, claim: Claim) -> Measured:
     return Measured(
         value,
         f"{_described(train)}: {len(struck)} dots of {min(forces):.2f} to {max(forces):.2f} of the single"
-        " force.",
+        f" force. {train.touches_text}.",
     )
 
 
@@ -101,4 +110,4 @@ def _count(context: Context, hammer: Hammer, train: BuzzTrain, interval: float) 
     if not force:
         return 0
     motion = context.attempt(PulseTrain(context.waveform, at=times), times[-1] + TAIL, hammer=hammer)
-    return len(longest_run(motion, force, _wanted()[1])[1])
+    return len(longest_run(motion, force, _wanted()[1]).forces)

@@ -74,9 +74,9 @@ def test_a_touch_of_the_backstop_ends_a_run(hammer: "ph.Hammer") -> None:
     # At 500 Hz every dot is a single one, at its full force, with a settle-out before the next.
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, rate=500.0, pulses=3), points=2)
     force = single_force(hammer)
-    assert longest_run(motion, force)[1] == ()
-    first, forces, clear = longest_run(motion, force, (0.9, 1.1))
-    assert (first, len(forces), clear) == (0, 1, True)
+    assert longest_run(motion, force).forces == ()
+    run = longest_run(motion, force, (0.9, 1.1))
+    assert (run.first, len(run.forces), run.clear) == (0, 1, True)
 
 
 def test_without_a_dot_of_a_single_pulse_there_is_a_reason(hammer: "ph.Hammer") -> None:

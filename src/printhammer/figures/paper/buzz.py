@@ -45,8 +45,8 @@ def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | 
     motion = fired(hammer, train.times if train is not None else (0.0,), duration)
     until = motion.end if duration is not None else shown_until(motion)
     remarks = [] if found.train is not None else [f"No buzz printing: {found.reason}."]
-    if train is not None and found.train is not None and not train.clear:
-        remarks.append("The armature touches the backstop, or loses a dot, before the dots that count.")
+    if train is not None and train.count:
+        remarks.append(f"{train.touches_text}.")
     heading = _heading(train) if train is not None else "a single pulse"
     figure = timeline([motion], until, heading=heading, show_firings=True, remarks=remarks)
     if train is not None:

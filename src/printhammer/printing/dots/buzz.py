@@ -5,13 +5,15 @@ can be issued that are synchronized with the return of the armature from the pap
 beforehand for a hammer; `find_buzz_train` looks for one, with the hammer's own waveform, in two families:
 even trains, and trains in which each pulse follows the leaving of the pack by a constant delay. The latter
 watch the armature, and can hold a motion that no even train holds, being unstable under a constant period.
+Such a train starts from rest; where its first excursions are too strong for a steady buzz, it may touch the
+backstop once before the dots that count, and settles into the buzz afterwards.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
@@ -19,13 +21,16 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.settling import touches
+from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    import numpy.typing as npt
+
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.contacts import Contact
+    from printhammer.run.ensemble import DotTable
     from printhammer.run.motion import Motion
 
 MAX_CURRENT: Final = 2.0
@@ -38,7 +43,16 @@ FEWEST: Final = 6
 """Number of dots without a touch of the backstop that makes buzz printing."""
 
 _PULSES: Final = 9
-_PERIODS, _DELAYS = 96, 32
+_PERIODS: Final = 96
+_DELAY_STEP: Final = 2e-6
+"""Step of the delays tried, s."""
+
+_DELAYS: Final = 400
+"""Most delays tried at that step; a slower hammer is tried at as many, farther apart."""
+
+PATIENCE: Final = 3.0
+"""How long a dot is waited for after its firing, in times of the single pulse from firing to leaving."""
+
 _ZOOMS, _PER_ZOOM = 2, 4
 
 
@@ -62,6 +76,9 @@ class BuzzTrain:
     clear: bool
     """Whether there is no lost dot and no touch of the backstop from the first dot of the train, which starts
     from rest, to the last of the run: not only the dots that count, the whole burst stays clear."""
+    touches: tuple[int, int, int]
+    """Touches of the backstop before the first dot of the run, between its first and its last, and from there
+    to the end of the run of the train, which is still long enough for a dot after the last firing."""
     peak_current: float
     """Largest value of the drive, A (N under a drive that is a force)."""
 
@@ -69,6 +86,15 @@ class BuzzTrain:
     def weakest(self) -> float:
         """Smallest of the relative peak forces of the run; 0 if it is empty."""
         return min(self.forces, default=0.0)
+
+    @property
+    def touches_text(self) -> str:
+        """The touches of the backstop in words."""
+        before, between, after = self.touches
+        return (
+            f"Touches of the backstop: {before} before the first dot that counts, {between} between it and"
+            f" the last, {after} after"
+        )
 
 
 @dataclass(frozen=True)
@@ -99,9 +125,10 @@ def find_buzz_train(
 
     Even trains come first, since they need no sensor: periods from half the flight time of a single pulse up
     to its return to the backstop, ever more finely around the best. If none does and stays clear from its
-    first dot on, delays from the leaving of the pack up to that return, each train built pulse by pulse. Of
-    several, a train that stays clear is preferred, then one with more dots, then the one whose weakest dot is
-    strongest. Same hammer, same result.
+    first dot on, delays from the leaving of the pack up to that return, every 2 us, each train built pulse by
+    pulse. A dot may come late: it is waited for three times as long as a single pulse takes from firing to
+    leaving the pack. Of several, a train that stays clear is preferred, then one with more dots, then the one
+    whose weakest dot is strongest. Same hammer, same result.
 
     Parameters
     ----------
@@ -129,25 +156,25 @@ def find_buzz_train(
     return _Search(hammer, pulses, fewest, forces, max_current).result()
 
 
-def longest_run(
-    motion: Motion, reference_force: float, forces: tuple[float, float] = FORCES
-) -> tuple[int, tuple[float, ...], bool]:
-    """Judge a train: the longest run of dots whose peak forces count, in units of a reference, N.
+@dataclass(frozen=True)
+class Run:
+    """The longest run of dots of a motion that count; its fields are those of `BuzzTrain`."""
 
-    Returns
-    -------
-    first : int
-        Number of the firing of its first dot; 0 if it is empty.
-    forces : tuple of float
-        Relative peak forces of its dots, one for each firing.
-    clear : bool
-        As for `BuzzTrain`.
+    first: int
+    forces: tuple[float, ...]
+    clear: bool
+    touches: tuple[int, int, int]
+
+
+def longest_run(motion: Motion, reference_force: float, forces: tuple[float, float] = FORCES) -> Run:
+    """Return the longest run of dots whose peak forces count, in units of a reference, N.
+
+    Of several of the same length, the first; without a dot that counts all touches come before it.
     """
-    returns = [c.t_in for c in touches(motion)]
-    best: tuple[int, tuple[float, ...], bool] = (0, (), False)
+    returns = [contact.t_in for contact in touches(motion)]
+    best: list[tuple[int, float, float]] = []
     run: list[tuple[int, float, float]] = []
-    opening = math.inf
-    clear = True
+    opening, clear, stays_clear = math.inf, True, False
     for dot in motion.dots:
         # A contact still open at the end of the run has not shown its peak force.
         if dot.flight_time is None or dot.peak_force is None or dot.contact_time is None:
@@ -162,19 +189,19 @@ def longest_run(
         if run and any(run[-1][1] < t <= touch for t in returns):
             run = []
         run.append((dot.index, touch, force))
-        if len(run) > len(best[1]):
-            best = (run[0][0], tuple(force for _index, _touch, force in run), clear)
-    return best
+        if len(run) > len(best):
+            best, stays_clear = list(run), clear
+    begin, end = (best[0][1], best[-1][1]) if best else (math.inf, math.inf)
+    before, until = (sum(t <= moment for t in returns) for moment in (begin, end))
+    return Run(
+        best[0][0] if best else 0,
+        tuple(force for _index, _touch, force in best),
+        stays_clear,
+        (before, until - before, len(returns) - until),
+    )
 
 
-def delayed_train(
-    hammer: Hammer,
-    delay: float,
-    pulses: int = _PULSES,
-    *,
-    patience: float | None = None,
-    until_touch: bool = False,
-) -> tuple[float, ...]:
+def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[float, ...]:
     """Return firing times, s, of which each but the first follows the leaving of the pack by a delay.
 
     Parameters
@@ -185,26 +212,70 @@ def delayed_train(
         From the leaving of the pack contact that a firing made to the next firing, s.
     pulses : int, optional
         Number of firings; there are fewer where a firing makes no dot, so that no leaving follows it.
-    patience : float, optional
-        How long after a firing its dot is waited for, s; by default as long as `printhammer.simulate` runs.
-    until_touch : bool, optional
-        Fire no more once the armature has touched the backstop before a dot.
 
     Raises
     ------
     InputError
-        The hammer has no waveform or no rest state.
+        The hammer has no waveform, no rest state, or its single pulse makes no dot.
     """
-    times = [0.0]
-    while len(times) < pulses:
-        motion = _run(hammer, times, patience)
-        contact = _dot_contact(motion, len(times) - 1)
-        if contact is None or contact.t_out is None or contact.t_out + delay <= times[-1]:
+    leaving = _leaving(_run(hammer, [0.0], None))
+    return (0.0,) if leaving is None else delayed_trains([hammer], [delay], [PATIENCE * leaving], pulses)[0]
+
+
+def delayed_trains(
+    hammers: Sequence[Hammer],
+    delays: Sequence[float],
+    patience: Sequence[float],
+    pulses: int,
+    *,
+    states: Sequence[tuple[float, float]] | None = None,
+    hopeless: Callable[[DotTable, list[int]], npt.NDArray[np.bool_]] | None = None,
+    **options: Any,
+) -> list[tuple[float, ...]]:
+    """Return the trains of many hammers and delays, built side by side; see `delayed_train`.
+
+    Parameters
+    ----------
+    hammers : sequence of Hammer
+        Hammer of each train.
+    delays : sequence of float
+        Delay of each, s.
+    patience : sequence of float
+        How long after a firing the leaving of its dot is waited for, s.
+    pulses : int
+        Number of firings of a train that is not broken off.
+    states : sequence of tuple, optional
+        Displacement, m, and velocity, m/s, from which each starts; by default at rest.
+    hopeless : callable, optional
+        From the dots of trains that still grow, and their numbers, to which of them are broken off.
+    **options
+        `tolerance` of the runs and `threads`, as for `printhammer.Ensemble`.
+    """
+    threads = options.pop("threads", None)
+    trains = [[0.0] for _ in delays]
+    growing = list(range(len(delays)))
+    waveforms = {id(hammer): pulse_of(hammer) for hammer in hammers}
+    for number in range(pulses - 1):
+        if not growing:
             break
-        if until_touch and any(c.t_in < contact.t_in for c in touches(motion)):
-            break
-        times.append(contact.t_out + delay)
-    return tuple(times)
+        ensemble = Ensemble(
+            [hammers[i] for i in growing],
+            [PulseTrain(waveforms[id(hammers[i])], at=trains[i]) for i in growing],
+            [trains[i][-1] + patience[i] for i in growing],
+            states=None if states is None else [states[i] for i in growing],
+            **options,
+        )
+        dots = ensemble.run(dots=True, threads=threads).dots
+        assert dots is not None
+        leavings = (dots.fired_at + dots.flight_time + dots.contact_time)[:, number]
+        firings = leavings + np.array([delays[i] for i in growing])
+        grows = firings > np.array([trains[i][-1] for i in growing])
+        if hopeless is not None:
+            grows &= ~hopeless(dots, growing)
+        for i, firing in zip(np.array(growing)[grows], firings[grows].tolist(), strict=True):
+            trains[i].append(firing)
+        growing = [i for i, goes_on in zip(growing, grows, strict=True) if goes_on]
+    return [tuple(times) for times in trains]
 
 
 def _run(hammer: Hammer, times: Sequence[float], patience: float | None) -> Motion:
@@ -213,9 +284,12 @@ def _run(hammer: Hammer, times: Sequence[float], patience: float | None) -> Moti
     return simulate(hammer, drive, duration=duration, points=2)
 
 
-def _dot_contact(motion: Motion, firing: int) -> Contact | None:
-    made = (c for c in motion.contacts if c.surface == "pack" and not c.initial and not c.extra)
-    return next((c for c in made if c.firing == firing), None)
+def _leaving(motion: Motion) -> float | None:
+    """Return when the dot of the first firing of a motion ends, s; None if there is none."""
+    dot = motion.dots[0]
+    if dot.flight_time is None or dot.contact_time is None or not dot.peak_force:
+        return None
+    return dot.fired_at + dot.flight_time + dot.contact_time
 
 
 class _Search:
@@ -234,27 +308,27 @@ class _Search:
         self.tried = 0
         self.best: BuzzTrain | None = None
         single = _run(hammer, [0.0], None)
-        contact = _dot_contact(single, 0)
-        returned = (c.t_in for c in touches(single))
+        leaving = _leaving(single)
         self.reference = 0.0
-        if contact is not None and contact.t_out is not None and contact.peak_force:
-            self.reference = contact.peak_force
-            self.flight, self.leaving = contact.t_in, contact.t_out
-            self.back = next((t for t in returned if t > self.leaving), 2.0 * self.leaving)
-            self.patience = 1.5 * self.leaving
+        if leaving is not None:
+            dot = single.dots[0]
+            assert dot.peak_force is not None
+            assert dot.flight_time is not None
+            self.reference, self.flight, self.leaving = dot.peak_force, dot.flight_time, leaving
+            returned = (contact.t_in for contact in touches(single))
+            self.back = next((t for t in returned if t > leaving), 2.0 * leaving)
+            self.patience = PATIENCE * leaving
 
     def result(self) -> BuzzSearch:
         if not self.reference:
             return BuzzSearch(None, "a single pulse makes no dot", None, 0.0, 0)
         # Sooner than half a flight time after the last firing, the armature has hardly answered it.
-        self._scan(np.linspace(0.5 * self.flight, self.back, _PERIODS, endpoint=False), self._even, 3)
-        if not (self._enough() and self.best is not None and self.best.clear):
-            self._scan(np.linspace(0.0, self.back - self.leaving, _DELAYS, endpoint=False), self._delayed, 1)
-        if self._enough():
+        self._scan(np.linspace(0.5 * self.flight, self.back, _PERIODS, endpoint=False), self._even)
+        if not self._done:
+            way = self.back - self.leaving
+            self._scan(np.arange(0.0, way, max(_DELAY_STEP, way / _DELAYS)), self._delayed)
+        if self.best is not None and self.best.count >= self.fewest:
             return BuzzSearch(self.best, "", self.best, self.reference, self.tried)
-        if self.best is not None and len(self.best.times) < self.pulses and self.best.kind == "uniform":
-            period = self.best.interval
-            self.best = self._judged("uniform", period, [k * period for k in range(self.pulses)]) or self.best
         count = self.best.count if self.best is not None else 0
         reason = (
             f"of {self.tried} trains tried, even or fired a constant delay after each leaving of the pack,"
@@ -264,56 +338,56 @@ class _Search:
         )
         return BuzzSearch(None, reason, self.best, self.reference, self.tried)
 
-    def _enough(self) -> bool:
-        return self.best is not None and self.best.count >= self.fewest
+    @property
+    def _done(self) -> bool:
+        """Whether no better train is to be looked for."""
+        return self.best is not None and self.best.clear and self.best.count >= self.fewest
 
-    def _scan(self, grid: np.ndarray, trial: Callable[[float], BuzzTrain | None], branches: int) -> None:
-        """Try a grid and, unless that is enough already, finer ones around the best places."""
-        found = {float(value): trial(float(value)) for value in grid}
-        step = float(grid[1] - grid[0])
+    def _scan(self, grid: np.ndarray, trial: Callable[[Sequence[float]], list[BuzzTrain]]) -> None:
+        """Try a grid and, unless a train is good enough already, finer ones around the three best places."""
+        trains = {train.interval: train for train in trial(grid.tolist())}
+        step, known = float(grid[1] - grid[0]), set(grid.tolist())
         for _ in range(_ZOOMS):
-            if self._enough() and self.best is not None and self.best.clear:
+            if self._done:
                 return
-            ranked = sorted(
-                (train for train in found.values() if train is not None),
-                key=self._merit,
-                reverse=True,
-            )
             step /= _PER_ZOOM
-            for train in ranked[:branches]:
-                for k in range(1 - _PER_ZOOM, _PER_ZOOM):
-                    value = train.interval + k * step
-                    if float(grid[0]) <= value <= float(grid[-1]) and value not in found:
-                        found[value] = trial(value)
+            ranked = sorted(trains.values(), key=self._merit, reverse=True)
+            steps = [k * step for k in range(1 - _PER_ZOOM, _PER_ZOOM)]
+            near = [train.interval + change for train in ranked[:3] for change in steps]
+            new = [value for value in near if grid[0] <= value <= grid[-1] and value not in known]
+            known.update(new)
+            trains |= {train.interval: train for train in trial(list(dict.fromkeys(new)))}
 
-    def _even(self, period: float) -> BuzzTrain | None:
-        """Try an even train; a short one first, since most fail early."""
-        short = min(4, self.pulses)
-        train = self._judged("uniform", period, [k * period for k in range(short)])
-        if train is None or train.count < 2 or short == self.pulses:
-            return train
-        return self._judged("uniform", period, [k * period for k in range(self.pulses)])
+    def _even(self, periods: Sequence[float]) -> list[BuzzTrain]:
+        trains = [tuple(k * period for k in range(self.pulses)) for period in periods]
+        return self._judged("uniform", periods, trains)
 
-    def _delayed(self, delay: float) -> BuzzTrain | None:
-        times = delayed_train(self.hammer, delay, self.pulses, patience=self.patience, until_touch=True)
-        return self._judged("delayed", delay, times)
+    def _delayed(self, delays: Sequence[float]) -> list[BuzzTrain]:
+        count = len(delays)
+        trains = delayed_trains([self.hammer] * count, delays, [self.patience] * count, self.pulses)
+        return self._judged("delayed", delays, trains)
 
     def _judged(
-        self, kind: Literal["uniform", "delayed"], interval: float, times: Sequence[float]
-    ) -> BuzzTrain | None:
-        """Try a train; None if no dot counts or the current is too large."""
-        self.tried += 1
-        motion = _run(self.hammer, times, self.patience)
-        first, forces, clear = longest_run(motion, self.reference, self.forces)
-        if not forces:
-            return None
-        peak = motion.drive.peak
-        if peak > self.limit:
-            return None
-        train = BuzzTrain(kind, interval, tuple(times), first, len(forces), forces, clear, peak)
-        if self.best is None or self._merit(train) > self._merit(self.best):
-            self.best = train
-        return train
+        self,
+        kind: Literal["uniform", "delayed"],
+        intervals: Sequence[float],
+        trains: Sequence[tuple[float, ...]],
+    ) -> list[BuzzTrain]:
+        """Try trains; those in which a dot counts and the current is not too large are returned."""
+        self.tried += len(trains)
+        judged = []
+        for interval, times in zip(intervals, trains, strict=True):
+            motion = _run(self.hammer, times, self.patience)
+            run = longest_run(motion, self.reference, self.forces)
+            if run.forces and (peak := motion.drive.peak) <= self.limit:
+                count = len(run.forces)
+                judged.append(
+                    BuzzTrain(
+                        kind, interval, times, run.first, count, run.forces, run.clear, run.touches, peak
+                    )
+                )
+        self.best = max(judged + ([self.best] if self.best else []), key=self._merit, default=None)
+        return judged
 
     def _merit(self, train: BuzzTrain) -> tuple[bool, bool, int, float]:
         """Return what makes one train better than another."""

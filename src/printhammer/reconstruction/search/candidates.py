@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.reconstruction.search.space import Shape
     from printhammer.support.arrays import FloatArray
 
 TOLERANCE: Final = 2e-10
@@ -69,7 +70,7 @@ class Candidate:
         return self.rest, 0.0
 
 
-def candidates(points: Sequence[FloatArray]) -> list[Candidate | None]:
+def candidates(points: Sequence[FloatArray], shape: Shape = "rectangle") -> list[Candidate | None]:
     """Make hammers of points; None where the armature has no rest, does not print, or not with that stroke.
 
     The forces are scaled to the mass by the variables, so that the stroke is a matter of the stiffness of the
@@ -79,24 +80,28 @@ def candidates(points: Sequence[FloatArray]) -> list[Candidate | None]:
     ----------
     points : sequence of arrays
         Shares of the ranges of the variables.
+    shape : str, optional
+        Of the current of a firing, one of `SHAPES`.
     """
     found: list[Candidate | None] = [None] * len(points)
     values = [values_at(point) for point in points]
     rests: dict[int, float] = {}
     for i, value in enumerate(values):
         try:
-            rests[i] = rest_state(hammer_of(constants_at(value, _MASS, 1.0)))
+            rests[i] = rest_state(hammer_of(constants_at(value, _MASS, 1.0, shape)))
         except InputError:
             continue
-    stiffness = _stiffnesses(values, rests)
+    stiffness = _stiffnesses(values, rests, shape)
     for i, own in stiffness.items():
         scale = printing_stiffness() / own
-        constants = constants_at(values[i], _MASS * scale, own * scale)
+        constants = constants_at(values[i], _MASS * scale, own * scale, shape)
         found[i] = Candidate(np.asarray(points[i]), constants, hammer_of(constants), rests[i])
     return found
 
 
-def _stiffnesses(values: Sequence[dict[str, float]], rests: dict[int, float]) -> dict[int, float]:
+def _stiffnesses(
+    values: Sequence[dict[str, float]], rests: dict[int, float], shape: Shape
+) -> dict[int, float]:
     """Return the stiffnesses of the pack at which hammers of a fixed mass have the printed stroke."""
     wanted = math.log(geometry()["top"] - geometry()["xp"])
     guess = dict.fromkeys(rests, math.log(_STIFFNESS))
@@ -107,7 +112,7 @@ def _stiffnesses(values: Sequence[dict[str, float]], rests: dict[int, float]) ->
         open_ = list(guess)
         if not open_:
             break
-        hammers = [hammer_of(constants_at(values[i], _MASS, math.exp(guess[i]))) for i in open_]
+        hammers = [hammer_of(constants_at(values[i], _MASS, math.exp(guess[i]), shape)) for i in open_]
         drives = [PulseTrain(hammer.waveform) for hammer in hammers if hammer.waveform is not None]
         dots = (
             Ensemble(hammers, drives, SINGLE, states=[(rests[i], 0.0) for i in open_], tolerance=TOLERANCE)

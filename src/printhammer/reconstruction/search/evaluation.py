@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from functools import cache
+from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
+from printhammer.reconstruction.search.buzz_losses import buzz
 from printhammer.reconstruction.search.candidates import candidates
 from printhammer.reconstruction.search.losses import Score, hung, pairs, single_pulse, statics
 from printhammer.reconstruction.search.panel_losses import panels
@@ -16,10 +18,14 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from printhammer.reconstruction.search.candidates import Candidate
+    from printhammer.reconstruction.search.space import Shape
     from printhammer.support.arrays import FloatArray
 
-Aim = Literal["stated", "all"]
-"""Which claims lead a search: those of kind "stated" alone, or those of kind "shape" too."""
+Aim = Literal["stated", "all", "panels", "buzz"]
+"""Which claims lead a search: those of kind "stated" alone; those of kind "shape" too; with these, a panel of
+Fig. 11 as much as a claim; or with these, buzz printing before all."""
+
+AIMS: Final[tuple[Aim, ...]] = get_args(Aim)
 
 STATED: Final = {
     "return_from_everywhere": 4.0,
@@ -39,30 +45,40 @@ SHAPE: Final = {
     "hang_up_at_high_rate": 0.5,
     "weak_prints_when_hung_up": 1.0,
 }
-WEIGHTS: Final[dict[str, dict[str, float]]] = {"stated": STATED, "all": {**STATED, **SHAPE}}
+_FIRMER: Final = {name: 1.5 * weight for name, weight in SHAPE.items()}
+WEIGHTS: Final[dict[str, dict[str, float]]] = {
+    "stated": STATED,
+    "all": {**STATED, **SHAPE},
+    "panels": {**STATED, **_FIRMER, "poincare": 9.0},
+    "buzz": {**STATED, **_FIRMER, "poincare": 6.0, "buzz_printing": 8.0},
+}
 """Weights of the losses: first come the stated claims outside Fig. 11, which are conditions of all else; a
-claim of kind "shape" counts for as much as three panels of Fig. 11."""
+claim of kind "shape" counts for as much as three panels of Fig. 11, or two where the panels lead. Buzz
+printing counts for the two claims that are about it."""
 
 PIECE: Final = 64
 """Points that one process looks at together."""
 
 _WORST_SINGLE: Final = 1.6
 _WORST_PAIRS: Final = 3.0
+_WORST_BUZZ: Final = 4.0
 
 
 @cache
 def losses_digest() -> str:
     """Return a digest of the sources that decide on the losses, so that logs of different ones do not mix."""
     digest = hashlib.sha256()
-    for name in ("space", "candidates", "losses", "panel_losses", "evaluation"):
+    for name in ("space", "candidates", "losses", "buzz_losses", "panel_losses", "evaluation"):
         digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
     return digest.hexdigest()[:16]
 
 
-def evaluate(points: Sequence[FloatArray], aim: Aim) -> list[tuple[Candidate | None, Score]]:
+def evaluate(
+    points: Sequence[FloatArray], aim: Aim, shape: Shape = "rectangle"
+) -> list[tuple[Candidate | None, Score]]:
     """Score points, shares of the ranges of the variables, by the claims of an aim in this thread."""
     weights = WEIGHTS[aim]
-    found = candidates(points)
+    found = candidates(points, shape)
     scores = [Score() for _ in points]
     chosen = [i for i, candidate in enumerate(found) if candidate is not None]
 
@@ -93,16 +109,19 @@ def evaluate(points: Sequence[FloatArray], aim: Aim) -> list[tuple[Candidate | N
     )
     look(pairs)
     chosen = keep(_WORST_PAIRS, ["two_pulses_660us", "two_pulses_700us", "second_dot_lost"])
+    if "buzz_printing" in weights:
+        look(buzz)
+        chosen = keep(_WORST_BUZZ, ["buzz_printing"])
     look(panels)
-    if aim == "all":
+    if aim != "stated":
         look(hung)
     return list(zip(found, scores, strict=True))
 
 
-def rows(points: Sequence[FloatArray], aim: Aim) -> list[dict[str, Any]]:
+def rows(points: Sequence[FloatArray], aim: Aim, shape: Shape = "rectangle") -> list[dict[str, Any]]:
     """Score points, each as a row of the log."""
     found = []
-    for point, (candidate, score) in zip(points, evaluate(points, aim), strict=True):
+    for point, (candidate, score) in zip(points, evaluate(points, aim, shape), strict=True):
         found.append(
             {
                 "point": [float(share) for share in point],
@@ -115,11 +134,10 @@ def rows(points: Sequence[FloatArray], aim: Aim) -> list[dict[str, Any]]:
     return found
 
 
-def scored(points: Sequence[FloatArray], aim: Aim, pool: Executor | None) -> list[dict[str, Any]]:
+def scored(
+    points: Sequence[FloatArray], aim: Aim, pool: Executor | None, shape: Shape = "rectangle"
+) -> list[dict[str, Any]]:
     """Score points, each as a row of the log, in the order given, whatever the number of processes."""
     pieces = [points[start : start + PIECE] for start in range(0, len(points), PIECE)]
-    if pool is None:
-        done = [rows(piece, aim) for piece in pieces]
-    else:
-        done = list(pool.map(rows, pieces, [aim] * len(pieces)))
-    return [row for piece in done for row in piece]
+    pieced = map if pool is None else pool.map
+    return [row for piece in pieced(rows, pieces, repeat(aim), repeat(shape)) for row in piece]

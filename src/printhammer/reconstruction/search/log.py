@@ -9,6 +9,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.reconstruction.lines import append, read_object, read_text
+from printhammer.reconstruction.search.evaluation import AIMS
 from printhammer.support.constants import shown
 
 if TYPE_CHECKING:
@@ -42,8 +43,8 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     if not rows:
         raise InputError(f"{path}: expected the log of a search, and there is nothing")
     aim, seed = rows[0]["aim"], rows[0]["seed"]
-    if aim not in ("stated", "all"):
-        raise InputError(f"{path}, line 1: aim = {shown(aim)}, expected stated or all")
+    if aim not in AIMS:
+        raise InputError(f"{path}, line 1: aim = {shown(aim)}, expected one of {', '.join(AIMS)}")
     if isinstance(seed, bool) or not isinstance(seed, int):
         raise InputError(f"{path}, line 1: seed = {shown(seed)}, expected a whole number")
     return rows[0], rows[1:]

@@ -135,7 +135,9 @@ def single_pulse(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
         for row, score in enumerate(own):
             _settling(result.x[row], score)
             score.losses["single_pulse_stroke"] = float(result.dots.extra_contacts[row, 0] != 0)
-            score.measured["flight_time"] = float(result.dots.flight_time[row, 0])
+            flight, contact = (float(t[row, 0]) for t in (result.dots.flight_time, result.dots.contact_time))
+            score.measured["flight_time"] = flight
+            score.measured["leaving"] = None if math.isnan(contact) else flight + contact
             score.measured["force"] = float(result.dots.peak_force[row, 0])
 
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.reconstruction.search.evaluation import WEIGHTS, losses_digest, scored
+from printhammer.hammer.hammer import load
+from printhammer.reconstruction.search.evaluation import AIMS, WEIGHTS, losses_digest, scored
 from printhammer.reconstruction.search.explorer import Explorer
 from printhammer.reconstruction.search.log import Log, read_search
-from printhammer.reconstruction.search.space import VARIABLES
+from printhammer.reconstruction.search.space import SHAPES, VARIABLES, point_of, values_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from printhammer.reconstruction.search.evaluation import Aim
+    from printhammer.reconstruction.search.space import Shape
     from printhammer.support.arrays import FloatArray
 
 FORMAT: Final = 1
@@ -56,19 +58,22 @@ class Plan:
     """What decides on a search."""
 
     aim: Aim
-    """Which claims lead: "stated" or "all"."""
+    """Which claims lead, one of `AIMS`."""
     seed: int
     """Of everything random."""
     sample: int = SAMPLE
     """Points of the wide sample."""
     starts: tuple[tuple[float, ...], ...] = ()
     """Further points from which islands may begin, such as the best of another search."""
+    shape: Shape = "rectangle"
+    """Waveform of the hammers."""
 
     def heading(self) -> dict[str, Any]:
         """Return the first line of the log."""
         return {
             "format": FORMAT,
             "aim": self.aim,
+            "shape": self.shape,
             "seed": self.seed,
             "sample": self.sample,
             "starts": [list(point) for point in self.starts],
@@ -98,6 +103,24 @@ def starts_of(path: Path, aim: Aim, count: int = STARTS) -> tuple[tuple[float, .
     return tuple(tuple(row["point"]) for row in shortlist(rows, count, _APART))
 
 
+def known_starts(aim: Aim) -> tuple[tuple[float, ...], ...]:
+    """Return the points of the shipped hammer and of its family.
+
+    Raises
+    ------
+    InputError
+        A search on the stated claims would be led by others through them.
+    """
+    from printhammer.reconstruction.results import shipped_results
+
+    if aim == "stated":
+        raise InputError("aim = 'stated', expected no start at hammers that other claims have led to")
+    family = shipped_results().family
+    shipped = {key: constant.si for key, constant in load("hendriks-1983").constants.items()}
+    constants = [shipped, *(member.constants for member in (family.hammers if family else ()))]
+    return tuple(tuple(np.clip(point_of(values_of(each)), 0.0, 1.0).tolist()) for each in constants)
+
+
 def search(
     plan: Plan,
     path: Path,
@@ -122,7 +145,7 @@ def search(
     def batch(points: list[FloatArray]) -> list[dict[str, Any]]:
         nonlocal place, best
         there = log.known(place, points)
-        fresh = scored(points[len(there) :], plan.aim, pool) if len(there) < len(points) else []
+        fresh = scored(points[len(there) :], plan.aim, pool, plan.shape) if len(there) < len(points) else []
         log.append(fresh)
         found = [*there, *fresh]
         place += len(found)
@@ -133,7 +156,7 @@ def search(
             tell(place, best["total"], best)
         return found
 
-    rng = np.random.default_rng([plan.seed, len(plan.aim)])
+    rng = np.random.default_rng([plan.seed, AIMS.index(plan.aim), SHAPES.index(plan.shape)])
     start: list[dict[str, Any]] = []
     points = [*(np.array(point) for point in plan.starts), *_wide(plan, rng)]
     for first in range(0, len(points), _TOGETHER):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
@@ -34,6 +34,16 @@ BEYOND: Final = 1.05
 
 LOADING_EXPONENT: Final = 2.7
 """Exponent of the loading branch of the pack, equation (5)."""
+
+Shape = Literal["rectangle", "trapezoid", "half-sine"]
+SHAPES: Final[tuple[Shape, ...]] = get_args(Shape)
+"""Waveforms among which hammers are sought."""
+
+_FALL: Final = 3.0
+"""Duration of the fall of a trapezoid over the time constant that stands for it in the search."""
+
+_HALF_SINE: Final = 1.5
+"""Duration of a half sine over the width that stands for it in the search."""
 
 _SOURCE: Final = "found by search for the behaviour that the paper tells"
 
@@ -114,10 +124,49 @@ def _reached(width: float, rise: float) -> float:
     return -math.expm1(-width / rise)
 
 
-def constants_at(values: Mapping[str, float], mass: float, stiffness: float) -> dict[str, float]:
+def _variable(name: str) -> Variable:
+    return next(variable for variable in VARIABLES if variable.name == name)
+
+
+def _waveform(values: Mapping[str, float], current: float, shape: Shape) -> dict[str, float]:
+    """Return the constants of a waveform whose largest current is given, A.
+
+    Of a trapezoid the width is the time from the firing to the end of its top, of which the straight rise
+    takes the share that the variable `rise` has of its range; its fall takes three times `decay`. Of a half
+    sine only the width counts, two thirds of its duration.
+    """
+    width = values["width"]
+    if shape == "half-sine":
+        return {"waveform.amplitude": current, "waveform.width": _HALF_SINE * width}
+    if shape == "trapezoid":
+        rise = width * min(max(_variable("rise").share(values["rise"]), 0.01), 0.99)
+        return {
+            "waveform.amplitude": current,
+            "waveform.rise": rise,
+            "waveform.width": width - rise,
+            "waveform.fall": _FALL * values["decay"],
+        }
+    return {
+        "waveform.amplitude": current / _reached(width, values["rise"]),
+        "waveform.width": width,
+        "waveform.rise": values["rise"],
+        "waveform.decay": values["decay"],
+    }
+
+
+def shape_of(constants: Mapping[str, float]) -> Shape:
+    """Return the shape of the waveform that constants of a hammer file describe; the rectangle if none."""
+    if "waveform.fall" in constants:
+        return "trapezoid"
+    return "half-sine" if "waveform.width" in constants and "waveform.decay" not in constants else "rectangle"
+
+
+def constants_at(
+    values: Mapping[str, float], mass: float, stiffness: float, shape: Shape = "rectangle"
+) -> dict[str, float]:
     """Return the constants of a hammer file, SI, for values of the variables and any scale of mass.
 
-    The mass of the armature is in kg, the stiffness of the pack in N.
+    The mass of the armature is in kg, the stiffness of the pack in N; `shape` is that of the current.
     """
     b = geometry()["b"]
     current = max(CURRENT, values["release"] * BEYOND * largest_current())
@@ -135,11 +184,24 @@ def constants_at(values: Mapping[str, float], mass: float, stiffness: float) -> 
         "pack.stiffness": stiffness,
         "backstop.stiffness": stiff,
         "backstop.damping": values["damping"] * stiff,
-        "waveform.amplitude": current / _reached(values["width"], values["rise"]),
-        "waveform.width": values["width"],
-        "waveform.rise": values["rise"],
-        "waveform.decay": values["decay"],
+        **_waveform(values, current, shape),
     }
+
+
+def _pulse_values(constants: Mapping[str, float]) -> tuple[float, float, float, float]:
+    """Return width, rise and decay as the search has them, s, and the largest current of the pulse, A."""
+    amplitude, width = constants["waveform.amplitude"], constants["waveform.width"]
+    shape = shape_of(constants)
+    if shape == "rectangle":
+        rise, decay = constants["waveform.rise"], constants["waveform.decay"]
+        return width, rise, decay, amplitude * _reached(width, rise)
+    if shape == "half-sine":
+        # What does not count for it lies in the middle of its range.
+        rise, decay = (float(_variable(name).value(np.asarray(0.5))) for name in ("rise", "decay"))
+        return width / _HALF_SINE, rise, decay, amplitude
+    whole = width + constants["waveform.rise"]
+    share = np.asarray(constants["waveform.rise"] / whole)
+    return whole, float(_variable("rise").value(share)), constants["waveform.fall"] / _FALL, amplitude
 
 
 def values_of(constants: Mapping[str, float]) -> dict[str, float]:
@@ -148,17 +210,16 @@ def values_of(constants: Mapping[str, float]) -> dict[str, float]:
     field = constants["magnet.Am"] ** 2
     magnet_force = field / math.sqrt(b) - constants["magnet.F0"]
     net = magnet_force - constants["spring.Bs"]
-    reached = _reached(constants["waveform.width"], constants["waveform.rise"])
-    current = constants["waveform.amplitude"] * reached
+    width, rise, decay, current = _pulse_values(constants)
     return {
         "pull": magnet_force / constants["mass"],
         "bias": constants["magnet.F0"] * math.sqrt(b) / field,
         "margin": net / magnet_force,
         "reach": constants["spring.As"],
         "release": constants["magnet.Bm"] * current / constants["magnet.Am"],
-        "width": constants["waveform.width"],
-        "rise": constants["waveform.rise"],
-        "decay": constants["waveform.decay"],
+        "width": width,
+        "rise": rise,
+        "decay": decay,
         "depth": (net / constants["backstop.stiffness"]) ** (2.0 / 3.0),
         "damping": constants["backstop.damping"] / constants["backstop.stiffness"],
     }
@@ -179,17 +240,23 @@ def printing_stiffness() -> float:
     return float(PRINT_FORCE / indentation**LOADING_EXPONENT)
 
 
+_UNITS: Final = {
+    "rectangle": {"amplitude": "A", "width": "s", "rise": "s", "decay": "s"},
+    "trapezoid": {"amplitude": "A", "rise": "s", "width": "s", "fall": "s"},
+    "half-sine": {"amplitude": "A", "width": "s"},
+}
+
+
 @cache
-def template() -> Hammer:
+def template(shape: Shape = "rectangle") -> Hammer:
     """Return a hammer with the geometry of the paper, its other constants to be replaced."""
-    base = load("hendriks-1983")
-    units = {"amplitude": "A", "width": "s", "rise": "s", "decay": "s"}
-    wave: dict[str, Any] = {"shape": "rectangle"}
-    for name, unit in units.items():
+    wave: dict[str, Any] = {"shape": shape}
+    for name, unit in _UNITS[shape].items():
         wave[name] = {"value": 1.0, "unit": unit, "status": "reconstructed", "source": _SOURCE}
-    return base.replace({"waveform": wave})
+    return load("hendriks-1983").replace({"waveform": wave})
 
 
 def hammer_of(constants: Mapping[str, float], **names: Any) -> Hammer:
     """Return the hammer with the constants found, SI, and the geometry of the paper."""
-    return template().replace({**constants, **names}, status="reconstructed", source=_SOURCE)
+    kind = template(shape_of(constants))
+    return kind.replace({**constants, **names}, status="reconstructed", source=_SOURCE)

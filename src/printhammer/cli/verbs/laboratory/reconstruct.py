@@ -6,7 +6,7 @@ import json
 import math
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
@@ -38,10 +38,21 @@ def _json(table: dict[str, Any]) -> str:
 )
 def search(
     job: Job,
-    aim: str = opt.choice("stated|all", "Claims that lead: stated ones alone, or shapes too.", default="all"),
+    aim: str = opt.choice(
+        "stated|all|panels|buzz",
+        "Claims that lead: stated ones alone; shapes too; these, panels of Fig. 11 or buzz printing first.",
+        default="all",
+    ),
+    waveform: str = opt.choice(
+        "rectangle|trapezoid|half-sine", "Shape of the current of a firing.", default="rectangle"
+    ),
     seed: int = _SEED,
-    start_from: Path | None = opt.folder(
-        "Another search, from whose best candidates to begin too.", metavar="LOG", flag="--from"
+    sample: int = opt.bounded(1, "Points of the wide sample that comes first.", default=16384),
+    start_from: str = opt.text(
+        "LOG",
+        "Another search, or the word family, from whose best hammers to begin too.",
+        default="",
+        flag="--from",
     ),
     minutes: float = opt.bounded(0, "How long to search; 0: until interrupted.", default=60.0),
     workers: int = _WORKERS,
@@ -50,13 +61,17 @@ def search(
     from time import monotonic
 
     from printhammer.cli.verbs.laboratory.workers import worker_pool
-    from printhammer.reconstruction.search.evaluation import WEIGHTS
-    from printhammer.reconstruction.search.search import Plan, starts_of
+    from printhammer.reconstruction.search.evaluation import AIMS, WEIGHTS
+    from printhammer.reconstruction.search.search import Plan, known_starts, starts_of
     from printhammer.reconstruction.search.search import search as candidates
+    from printhammer.reconstruction.search.space import SHAPES
 
     (log,) = job.outputs
-    leading: Literal["stated", "all"] = "stated" if aim == "stated" else "all"
-    plan = Plan(leading, seed, starts=() if start_from is None else starts_of(start_from, leading))
+    leading, shape = AIMS[AIMS.index(aim)], SHAPES[SHAPES.index(waveform)]
+    starts: tuple[tuple[float, ...], ...] = ()
+    if start_from:
+        starts = known_starts(leading) if start_from == "family" else starts_of(Path(start_from), leading)
+    plan = Plan(leading, seed, sample, starts, shape)
     announce_compiling()
     start = monotonic()
     count: int = 0
