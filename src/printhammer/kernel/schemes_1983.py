@@ -8,6 +8,9 @@ As a program of the time would, both evaluate the force as printed, step functio
 point a step gets to: no switch is located, no step ends at a pulse edge. The local maximum inside the pack is
 taken from the ends of steps. Hence a contact costs accuracy, of either scheme, and the order of the method
 shows in smooth motion only. The schemes are here to be compared with, not to be relied on.
+
+The paper says "typical step sizes" and not when the short step begins and ends. `READINGS` are three ways to
+read that; the first is the one of the claims.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +30,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Scheme = Literal["trapezoid", "runge-kutta-4"]
+Reading = Literal["look-ahead", "inside", "grid"]
+READINGS: Final[tuple[Reading, ...]] = get_args(Reading)
+"""When the short step is taken. "look-ahead": where x < b, or where the next free step would end there.
+"inside": only where x < b, so that the first step into the backstop is a long one. "grid": a free step that
+begins or would end there is made of ten short ones, so that free steps always begin on a grid of 10 us."""
 
 FREE_STEP = 10e-6
 """Step off the backstop, s."""
@@ -56,7 +64,9 @@ _STATUS = ("ok", "newton failed", "diverged")
 
 @dataclass(frozen=True)
 class SchemeRun:
-    """Ends of the steps, ``t`` (s), ``x`` (m), ``v`` (m/s), and ``status``.
+    """Ends of the steps, or moments asked for: ``t`` (s), ``x`` (m), ``v`` (m/s), ``memory`` and ``status``.
+
+    The memory is the latest local maximum, m, where the armature leaves the pack, and 0 elsewhere.
 
     The status is "ok", "newton failed" (no solution of an implicit step found) or "diverged" (the motion is
     no longer finite, has left the range of a law, or is further out than `integrate` was told).
@@ -65,6 +75,7 @@ class SchemeRun:
     t: Array
     x: Array
     v: Array
+    memory: Array
     status: str
 
 
@@ -80,6 +91,8 @@ def integrate(
     t_end: float,
     scheme: Scheme = "trapezoid",
     scale: float = 1.0,
+    reading: Reading = "look-ahead",
+    moments: Array | None = None,
     rigid: bool = False,
     reload_along_unloading: bool = False,
     far: float = 1.0,
@@ -108,6 +121,11 @@ def integrate(
         The trapezoidal rule is solved by Newton's method with a derivative by differences.
     scale : float
         Factor of all steps of the schedule.
+    reading : str
+        One of `READINGS`.
+    moments : array, optional
+        Ascending times, s, at which alone the state is kept; the cubic through both ends of a step stands
+        for the motion between them.
     rigid : bool
         The backstop is rigid: a step that ends beyond it ends on it, with the rebound speed.
     reload_along_unloading : bool
@@ -123,32 +141,37 @@ def integrate(
     Raises
     ------
     ValueError
-        Unknown scheme, or a scale or duration that is not positive.
+        Unknown scheme or reading, or a scale or duration that is not positive.
     """
     if scheme not in ("trapezoid", "runge-kutta-4"):
         raise ValueError(f"scheme {scheme!r}, expected 'trapezoid' or 'runge-kutta-4'")
+    if reading not in READINGS:
+        raise ValueError(f"reading {reading!r}, expected one of {', '.join(READINGS)}")
     if not (scale > 0.0 and t_end > 0.0 and math.isfinite(scale) and math.isfinite(t_end)):
         raise ValueError(f"scale {scale} and duration {t_end} s are expected to be positive")
     program = _program(tuple(laws[name] for name in LAW_NAMES))
     firings, begins, segments, replace, is_force = drive
     contact = CONTACT_STEP * scale
-    n = math.ceil(t_end / contact) + 8
-    t, x, v = np.empty(n), np.empty(n), np.empty(n)
-    x[0], v[0] = state
+    wanted = np.zeros(0) if moments is None else np.array(moments, dtype=np.float64)
+    rows = np.empty((math.ceil(t_end / contact) + 8 if moments is None else wanted.size, 4))
     steps = np.array([FREE_STEP * scale, contact, LATE_STEP * scale])
     packed = tuple(
         np.ascontiguousarray(constants[role], dtype=np.float64)
         for role in ("magnet", "spring", "pack", "backstop")
     )
     options = (bool(replace), bool(is_force), scheme == "trapezoid", rigid, reload_along_unloading)
-    places = np.array([mass, front, position, t_end, far])
+    places = np.array([mass, front, position, t_end, far, *state])
     table = (
         np.array(firings, dtype=np.float64),
         np.array(begins, dtype=np.int64),
         np.array(segments, dtype=np.float64),
+        np.zeros(1, dtype=np.int64),
     )
-    size, status = program(packed, table, options, places, steps, t, x, v)
-    return SchemeRun(t[:size].copy(), x[:size].copy(), v[:size].copy(), _STATUS[status])
+    size, status = program(
+        packed, table, options, places, steps, READINGS.index(reading), wanted, moments is not None, rows
+    )
+    t, x, v, memory = rows[:size].T.copy()
+    return SchemeRun(t, x, v, memory, _STATUS[status])
 
 
 @functools.lru_cache(maxsize=32)
@@ -163,10 +186,14 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
 
     @numba.njit(**options)  # type: ignore[untyped-decorator]
     def drive_value(time: float, table: Any, replace: bool) -> float:
-        firings, begins, segments = table
+        firings, begins, segments, fired = table
         longest = segments[segments.shape[0] - 1, 0]
         total = 0.0
-        for i in range(firings.size - 1, -1, -1):
+        # Firings before the step are counted already; one or two may lie within it.
+        last = fired[0]
+        while last < firings.size and firings[last] <= time:
+            last += 1
+        for i in range(last - 1, -1, -1):
             tau = time - firings[i]
             if tau < 0.0:
                 continue
@@ -303,33 +330,57 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
         return end
 
     @numba.njit(**options)  # type: ignore[untyped-decorator]
+    def keep(row: Array, time: float, x: float, v: float, peak: float, front: float) -> None:
+        row[0], row[1], row[2], row[3] = time, x, v, 0.0
+        if x > front and v < 0.0:
+            row[3] = max(peak, x)
+
+    @numba.njit(**options)  # type: ignore[untyped-decorator]
     def program(
-        packed: Any, table: Any, options: Any, places: Any, steps: Any, t: Array, x: Array, v: Array
+        packed: Any,
+        table: Any,
+        options: Any,
+        places: Any,
+        steps: Any,
+        reading: int,
+        moments: Array,
+        at_moments: bool,
+        rows: Array,
     ) -> tuple[int, int]:
         front, position, t_end, far = places[1], places[2], places[3], places[4]
         rigid, along = options[3], options[4]
-        firings = table[0]
-        time, place, speed, peak = 0.0, x[0], v[0], x[0]
-        t[0] = 0.0
-        n, fired, settling_since = 1, 0, 0.0
+        firings, fired = table[0], table[3]
+        time, place, speed, peak = 0.0, places[5], places[6], places[5]
+        n, settling_since, short = 0, 0.0, 0
+        if not at_moments or (moments.size > 0 and moments[0] <= 0.0):
+            keep(rows[0], time, place, speed, peak, front)
+            n = 1
         # A remainder of rounding is no step.
-        while time < t_end - 1e-9 * steps[1]:
-            while fired < firings.size and firings[fired] <= time:
-                settling_since = max(settling_since, firings[fired])
-                fired += 1
+        while time < t_end - 1e-9 * steps[1] and not (at_moments and n == moments.size):
+            while fired[0] < firings.size and firings[fired[0]] <= time:
+                settling_since = max(settling_since, firings[fired[0]])
+                fired[0] += 1
             inside = place < position
             if not inside:
                 settling_since = time
+            late = inside and time - settling_since >= LATE_AFTER
             h = steps[0]
-            if inside:
-                h = steps[2] if time - settling_since >= LATE_AFTER else steps[1]
+            if short > 0 or (inside and not late):
+                h = steps[1]
+            elif late:
+                h = steps[2]
+            if reading == 2 and h == steps[1] and short == 0:
+                short = 10
             h = min(h, t_end - time)
             new_place, new_speed, solved = step(time, place, speed, h, peak, packed, table, options, places)
-            if not inside and h > steps[1] and not (solved and new_place >= position):
+            ends_inside = not (solved and new_place >= position)
+            if reading != 1 and not inside and h > steps[1] and ends_inside:
                 h = steps[1]
+                short = 10 if reading == 2 else 0
                 new_place, new_speed, solved = step(
                     time, place, speed, h, peak, packed, table, options, places
                 )
+            short = max(short - 1, 0)
             if not solved:
                 return n, 1
             if not (abs(new_place) <= far and math.isfinite(new_speed)):
@@ -345,10 +396,21 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
                 peak = new_place
             elif speed >= 0.0:
                 peak = max(place, new_place)
+            if at_moments:
+                while n < moments.size and moments[n] <= time + h * (1.0 + 1e-9):
+                    s = min((moments[n] - time) / h, 1.0)
+                    rise = (new_place - place) / h
+                    c2, c3 = 3.0 * rise - 2.0 * speed - new_speed, speed + new_speed - 2.0 * rise
+                    x = place + h * s * (speed + s * (c2 + s * c3))
+                    v = speed + s * (2.0 * c2 + 3.0 * s * c3)
+                    keep(rows[n], moments[n], x, v, peak, front)
+                    n += 1
             time, place, speed = time + h, new_place, new_speed
-            t[n], x[n], v[n] = time, place, speed
-            n += 1
-        t[n - 1] = t_end
+            if not at_moments:
+                keep(rows[n], time, place, speed, peak, front)
+                n += 1
+        if not at_moments:
+            rows[n - 1, 0] = t_end
         return n, 0
 
     compiled: Callable[..., Any] = program

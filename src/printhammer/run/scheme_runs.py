@@ -47,6 +47,8 @@ class SchemeProblem(Problem):
         "trapezoid" or "runge-kutta-4".
     scale : float
         Factor on all steps of the paper's schedule.
+    reading : str
+        When its short steps begin and end, one of `printhammer.kernel.schemes_1983.READINGS`.
 
     Raises
     ------
@@ -61,13 +63,15 @@ class SchemeProblem(Problem):
         state: tuple[float, float],
         tolerance: float,
         scheme: schemes_1983.Scheme,
-        scale: float,
+        scale: float = 1.0,
+        reading: schemes_1983.Reading = "look-ahead",
     ) -> None:
         if not (math.isfinite(scale) and scale > 0.0):
             raise InputError(f"step_scale = {scale!r}, expected a positive number")
         super().__init__(hammer, drive, state, 0.0, tolerance)
         self._scheme: schemes_1983.Scheme = scheme
         self._scale = scale
+        self._reading: schemes_1983.Reading = reading
         self._modules = {role: import_module(part.module) for role, part in hammer.parts.items()}
         self._packed = {
             role: np.array(hammer.parts[role].packed(hammer.origin) if role in hammer.parts else ())
@@ -78,8 +82,8 @@ class SchemeProblem(Problem):
         module = self._modules.get(name.partition("_")[0], absent)
         return getattr(module, name, None) or getattr(absent, name)
 
-    def integrate(self, end: float) -> schemes_1983.SchemeRun:
-        """Integrate to time `end`, s, and return the ends of the steps as the scheme leaves them."""
+    def integrate(self, end: float, moments: FloatArray | None = None) -> schemes_1983.SchemeRun:
+        """Integrate to time `end`, s; return the ends of the steps, or the states at given moments."""
         hammer = self.hammer
         return schemes_1983.integrate(
             {name: self._law(name) for name in schemes_1983.LAW_NAMES},
@@ -92,6 +96,8 @@ class SchemeProblem(Problem):
             t_end=end,
             scheme=self._scheme,
             scale=self._scale,
+            reading=self._reading,
+            moments=moments,
             rigid=self._rigid,
             reload_along_unloading=self.laws.reload_along_unloading,
         )

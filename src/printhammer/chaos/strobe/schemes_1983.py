@@ -1,0 +1,126 @@
+"""Strobe points and verdicts as the two integrators of the paper compute them, on its schedule of steps.
+
+The panels of Fig. 11 were judged by eye from such points. Fixed steps that locate no contact are not the
+motion: they add errors of their own to it, at every touch, and these make a map of their own, which jumps
+where a step just reaches a contact or just does not. It has no tangent, so that no exponent backs a verdict:
+here a train is strange if no period up to 64 is found, which is what a reader of such a plot has to say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.chaos.strobe.points import POINTS, Strobe, strobe_of
+from printhammer.chaos.strobe.train import States, Train
+from printhammer.chaos.strobe.verdict import FIRST, LAST, verdict
+from printhammer.errors import InputError
+from printhammer.kernel.model.modes import BACKSTOP, FREE, LOADING, UNLOADING
+from printhammer.kernel.schemes_1983 import READINGS
+from printhammer.run.problem import TOLERANCE
+from printhammer.run.regime import regimes_of
+from printhammer.run.scheme_runs import SchemeProblem
+from printhammer.run.start import initial_state
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.chaos.strobe.verdict import Verdict
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.kernel.schemes_1983 import Reading, Scheme, SchemeRun
+    from printhammer.support.threads import Progress
+
+SCHEMES: Final[tuple[Scheme, ...]] = ("runge-kutta-4", "trapezoid")
+
+
+def scheme_strobes(
+    hammers: Hammer | Sequence[Hammer],
+    periods: Sequence[float],
+    scheme: Scheme,
+    *,
+    reading: Reading = "look-ahead",
+    points: int = POINTS,
+    firings: tuple[int, int] = (FIRST, LAST),
+    progress: Progress | None = None,
+) -> list[Strobe]:
+    """Return the strobe points of trains from rest, as a scheme of 1983 computes them.
+
+    Parameters
+    ----------
+    hammers : Hammer or sequence of Hammer
+        One for all trains, or one for each.
+    periods : sequence of float
+        Time between firings of each train, s.
+    scheme : str
+        "runge-kutta-4" or "trapezoid".
+    reading : str, optional
+        When the short step is taken, see `printhammer.kernel.schemes_1983.READINGS`.
+    points : int, optional
+        Points to return, from the first firing on.
+    firings : tuple of int, optional
+        First and last firing that the verdict is about.
+    progress : callable, optional
+        Called with the number of trains done and of all.
+
+    Returns
+    -------
+    list of Strobe
+        One for each train, with its verdict: a period, "strange" where no period up to 64 is found, or
+        "undecided" where the scheme failed on the way.
+
+    Raises
+    ------
+    InputError
+        The scheme or the reading is not known, or a hammer has no rest state or waveform.
+    """
+    if scheme not in SCHEMES or reading not in READINGS:
+        known = f"{' or '.join(SCHEMES)}, and {', '.join(READINGS)}"
+        raise InputError(f"scheme = {scheme!r} with reading = {reading!r}, expected {known}")
+    regimes = regimes_of(hammers, periods)
+    strobed = []
+    for done, regime in enumerate(regimes, 1):
+        train = Train.of(regime, max(points, firings[1]))
+        count = max(points, firings[1])
+        moments = train.times(np.arange(1, count + 1))
+        problem = SchemeProblem(
+            train.hammer, train.drive, initial_state(train.hammer, None), TOLERANCE, scheme, reading=reading
+        )
+        run = problem.integrate(float(moments[-1]) + train.period, moments)
+        states = _states(run, train, count)
+        chosen = np.arange(1, points + 1)
+        shown = _part(states, slice(0, points))
+        strobed.append(strobe_of(train, chosen, shown, TOLERANCE, _judged(states, train, firings)))
+        if progress is not None:
+            progress(done, len(regimes))
+    return strobed
+
+
+def _states(run: SchemeRun, train: Train, count: int) -> States:
+    """Return the states of a run at the firings; nan from where it failed."""
+    front = np.inf if train.hammer.front is None else train.hammer.front
+    position = -np.inf if train.hammer.position is None else train.hammer.position
+    table = np.full((4, count), np.nan)
+    for row, column in zip(table, (run.t, run.x, run.v, run.memory), strict=True):
+        row[: column.size] = column
+    t, x, v, memory = table
+    pack = np.where(v >= 0.0, LOADING, UNLOADING)
+    branch = np.where(x > front, pack, np.where(x < position, BACKSTOP, FREE))
+    branch[run.t.size :] = -1
+    return States(t, x, v, branch.astype(np.int64), memory, run.status)
+
+
+def _part(states: States, some: slice) -> States:
+    names = ("t", "x", "v", "branch", "memory")
+    return replace(states, **{name: getattr(states, name)[some] for name in names})
+
+
+def _judged(states: States, train: Train, firings: tuple[int, int]) -> Verdict:
+    first, last = firings
+    judged = _part(states, slice(first - 1, last))
+    stopped = states.status if np.isnan(states.x[last - 1]) else ""
+    result = verdict(judged.distances(train), firings, TOLERANCE, None, stopped)
+    if result.period is None and not stopped:
+        return replace(result, name="strange", reason="")
+    return result
