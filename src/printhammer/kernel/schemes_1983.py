@@ -9,8 +9,8 @@ point a step gets to: no switch is located, no step ends at a pulse edge. The lo
 taken from the ends of steps. Hence a contact costs accuracy, of either scheme, and the order of the method
 shows in smooth motion only. The schemes are here to be compared with, not to be relied on.
 
-The paper says "typical step sizes" and not when the short step begins and ends. `READINGS` are three ways to
-read that; the first is the one of the claims.
+The paper says "typical step sizes" and not when the short step begins and ends. `READINGS` are ways to read
+that; the first is the one of the claims.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Scheme = Literal["trapezoid", "runge-kutta-4"]
-Reading = Literal["look-ahead", "inside", "grid"]
+Reading = Literal["look-ahead", "inside", "grid", "no-late-step"]
 READINGS: Final[tuple[Reading, ...]] = get_args(Reading)
 """When the short step is taken. "look-ahead": where x < b, or where the next free step would end there.
 "inside": only where x < b, so that the first step into the backstop is a long one. "grid": a free step that
-begins or would end there is made of ten short ones, so that free steps always begin on a grid of 10 us."""
+begins or would end there is made of ten short ones, so that free steps always begin on a grid of 10 us.
+"no-late-step": as the first, with short steps late in the settle-out too."""
 
 FREE_STEP = 10e-6
 """Step off the backstop, s."""
@@ -363,7 +364,7 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
             inside = place < position
             if not inside:
                 settling_since = time
-            late = inside and time - settling_since >= LATE_AFTER
+            late = inside and reading != 3 and time - settling_since >= LATE_AFTER
             h = steps[0]
             if short > 0 or (inside and not late):
                 h = steps[1]
