@@ -37,7 +37,7 @@ SCHEMES: Final[tuple[Scheme, ...]] = ("runge-kutta-4", "trapezoid")
 
 def scheme_strobes(
     hammers: Hammer | Sequence[Hammer],
-    periods: Sequence[float],
+    periods: Sequence[float | str],
     scheme: Scheme,
     *,
     reading: Reading = "look-ahead",
@@ -51,8 +51,8 @@ def scheme_strobes(
     ----------
     hammers : Hammer or sequence of Hammer
         One for all trains, or one for each.
-    periods : sequence of float
-        Time between firings of each train, s.
+    periods : sequence
+        Time between firings of each train, s, or text with a unit.
     scheme : str
         "runge-kutta-4" or "trapezoid".
     reading : str, optional

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from printhammer.chaos import Strobe
     from printhammer.figures.elements.scales import Scale
     from printhammer.hammer.hammer import Hammer
+    from printhammer.kernel.schemes_1983 import Reading, Scheme
 
 PERIODS: Final = (
     1.35e-3,
@@ -53,6 +54,8 @@ def poincare(
     periods: Sequence[float | str] = PERIODS,
     points: int = POINTS,
     printed: Mapping[float, str] | None = None,
+    scheme: Scheme | None = None,
+    reading: Reading = "look-ahead",
 ) -> Figure:
     """Draw Fig. 11: the states at the first firings of trains, a panel for each strobe time.
 
@@ -70,11 +73,14 @@ def poincare(
     printed : mapping, optional
         Verdicts that the paper prints, such as "period-2", by strobe time, s; each is written in its panel
         where the verdict on the points is another.
+    scheme : str, optional
+        "runge-kutta-4" or "trapezoid": the points as that scheme computes them on the schedule of the paper,
+        see `printhammer.chaos.strobe.schemes_1983`.
+    reading : str, optional
+        When the short step of that schedule is taken.
     """
-    from printhammer.chaos import strobes as strobed
-
     waveform_of(hammer)
-    found = strobed(hammer, periods, points=points) if strobes is None else list(strobes)
+    found = _strobed(hammer, periods, points, scheme, reading) if strobes is None else list(strobes)
     if not found:
         raise InputError("strobes: expected at least one train to draw")
     window = found[0].window
@@ -96,8 +102,26 @@ def poincare(
         _edge(ax, "y", speed, column == 0, i + 1 == len(found) or column == columns - 1)
     if any(line.get_gid() == "cycle" for ax in figure.axes for line in ax.lines):
         _key(figure)
-    sign(figure, hammer, *_remarks(found))
+    by_scheme = [f"As {scheme} computes it on the schedule of 1983, short step: {reading}."] if scheme else []
+    sign(figure, hammer, *by_scheme, *_remarks(found))
     return figure
+
+
+def _strobed(
+    hammer: Hammer,
+    periods: Sequence[float | str],
+    points: int,
+    scheme: Scheme | None,
+    reading: Reading,
+) -> list[Strobe]:
+    """Return the strobe points of the panels, exact or as a scheme of 1983 computes them."""
+    if scheme is None:
+        from printhammer.chaos import strobes
+
+        return strobes(hammer, periods, points=points)
+    from printhammer.chaos.strobe.schemes_1983 import scheme_strobes
+
+    return scheme_strobes(hammer, periods, scheme, reading=reading, points=points)
 
 
 def _printed(strobe: Strobe, verdicts: Mapping[float, str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Job, verb
@@ -21,6 +21,16 @@ def figure(
     number: str = opt.argument("N", "Number of the figure in the paper.", default=...),
     hammer: Hammer = opt.HAMMER,
     out: Path = opt.folder("Where to write it.", default=Path("build/figures")),
+    scheme: str = opt.choice(
+        "exact|runge-kutta-4|trapezoid",
+        "Of Fig. 11: its points exactly, or as an integrator of 1983 computes them.",
+        default="exact",
+    ),
+    reading: str = opt.choice(
+        "look-ahead|inside|grid|no-late-step",
+        "With that: when its short step is taken, into and out of the backstop.",
+        default="look-ahead",
+    ),
 ) -> Answer:
     """Draw a figure of the paper as SVG, PNG and PDF."""
     from printhammer.figures import FIGURES, save
@@ -29,13 +39,23 @@ def figure(
     entry = FIGURES.get(opt.read_whole(number, "figure"))
     if entry is None:
         raise InputError(f"figure = {number}: expected one of {', '.join(map(str, FIGURES))}")
+    if scheme == "exact" and reading != "look-ahead":
+        raise InputError(
+            f"--reading = {reading}, expected it with --scheme, since the exact motion has no step"
+        )
+    if scheme != "exact" and entry.number != _POINCARE:
+        raise InputError(f"--scheme = {scheme}, expected it with figure {_POINCARE}, not {entry.number}")
     make_folder(out)
     job.screen.print(f"[bold]Figure {entry.number}[/bold]  {entry.title}")
-    options = {}
+    options: dict[str, Any] = {}
+    name = f"figure{entry.number:02d}"
     if entry.number == _POINCARE:
         from printhammer.claims.verdicts import printed_verdicts
 
         options["printed"] = printed_verdicts()
-    for path in save(entry.draw(hammer, **options), out, f"figure{entry.number:02d}"):
+        if scheme != "exact":
+            options |= {"scheme": scheme, "reading": reading}
+            name = f"{name}-{scheme}-{reading}"
+    for path in save(entry.draw(hammer, **options), out, name):
         job.wrote(path)
     return Answer()
