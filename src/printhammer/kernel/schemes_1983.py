@@ -45,6 +45,8 @@ LATE_STEP = 20e-6
 """Step in the backstop late in the settle-out, s."""
 LATE_AFTER = 200e-6
 """Time without leaving the backstop, and without a firing, from which on the settle-out is late, s."""
+SAME_TIME = 1e-15
+"""Difference of times, s, that is rounding: a firing at the end of a step belongs to the next one."""
 NEWTON_LIMIT = 50
 """Newton iterations after which a step of the trapezoidal rule has failed."""
 
@@ -192,12 +194,10 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
         total = 0.0
         # Firings before the step are counted already; one or two may lie within it.
         last = fired[0]
-        while last < firings.size and firings[last] <= time:
+        while last < firings.size and firings[last] <= time + SAME_TIME:
             last += 1
         for i in range(last - 1, -1, -1):
-            tau = time - firings[i]
-            if tau < 0.0:
-                continue
+            tau = max(time - firings[i], 0.0)
             if tau >= longest:
                 break
             k = begins[i]
@@ -358,7 +358,7 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
             n = 1
         # A remainder of rounding is no step.
         while time < t_end - 1e-9 * steps[1] and not (at_moments and n == moments.size):
-            while fired[0] < firings.size and firings[fired[0]] <= time:
+            while fired[0] < firings.size and firings[fired[0]] <= time + SAME_TIME:
                 settling_since = max(settling_since, firings[fired[0]])
                 fired[0] += 1
             inside = place < position
