@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from printhammer.run.contacts import Contact, Dot
     from printhammer.run.ensemble import DotTable, EnsembleResult
     from printhammer.run.motion import Motion
+    from printhammer.run.simulate import Scheme
 
 CYCLE: Final = 20e-3
 """Duration of the single-pulse cycle, s: from rest to rest, with ample time to settle."""
@@ -45,11 +46,14 @@ class Context:
         The hammer.
     tolerance : float
         Of the default integrator.
+    scheme : str
+        Integrator of the runs, as for `printhammer.simulate`.
     """
 
-    def __init__(self, hammer: Hammer, tolerance: float = TOLERANCE) -> None:
+    def __init__(self, hammer: Hammer, tolerance: float = TOLERANCE, scheme: Scheme = "default") -> None:
         self.hammer = hammer
         self.tolerance = tolerance
+        self.scheme: Scheme = scheme
         self._motions: dict[tuple[Any, ...], Motion] = {}
         self._found: dict[str, Any] = {}
 
@@ -101,7 +105,7 @@ class Context:
     ) -> Motion:
         """Run the hammer, or another one, under a drive; from the shelf if that was run before."""
         which = self.hammer if hammer is None else hammer
-        options = {"tolerance": self.tolerance, **options}
+        options = {"tolerance": self.tolerance, "scheme": self.scheme, **options}
         key = (which.fingerprint, drive.fingerprint, duration, state, *sorted(options.items()))
         if key not in self._motions:
             # The grid is not looked at; what is, is computed where it is asked for.

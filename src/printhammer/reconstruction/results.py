@@ -1,6 +1,6 @@
-"""What the reconstruction found, as it ships with the package: base rates, predictions, search and family.
+"""What the reconstruction found, as it ships with the package: base rates, search, family, schemes of 1983.
 
-Four JSON files in the folder `data` beside this module, each with ``"format": 1``; any of them may be absent.
+Five JSON files in the folder `data` beside this module, each with ``"format": 1``; any of them may be absent.
 All values are SI.
 """
 
@@ -173,11 +173,48 @@ class Family(_Table):
     conclusions: dict[str, Conclusion] = Field(description="what holds for all of them, and what does not")
 
 
+class FamilyPanels(_Table):
+    """Panels of Fig. 11 of one hammer of the family, of twelve."""
+
+    exact: _Count = Field(description="the number with the verdict of the paper, exactly")
+    computed: _Count = Field(description="the same as the Runge-Kutta method of 1983 computes them")
+    same: _Count = Field(description="the number whose two verdicts are the same")
+
+
+class Change(_Table):
+    """How often one way of computing gives another verdict on a panel than another way."""
+
+    first: str = Field(description="one way of computing")
+    second: str = Field(description="the other")
+    panels: _Some = Field(description="the number of panels")
+    differ: _Count = Field(description="the number of those with another verdict")
+    share: _Number = Field(description="their share")
+    share_error: _Number | None = Field(description="two standard errors of it, panels of a hammer as one")
+    periodic_to_strange: _Count = Field(description="periodic the first way, strange the second")
+    strange_to_periodic: _Count = Field(description="strange the first way, periodic the second")
+
+
+class Schemes(_Table):
+    """What the integrators of 1983 do to verdicts."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    shipped: str = Field(description="the fingerprint of the hammer of panels and claims")
+    panels: dict[str, list[str]] = Field(description="for each way of computing the verdicts on Fig. 11")
+    claims: dict[_ClaimName, Literal["holds", "fails"]] = Field(
+        description="for each claim that a scheme can compute its verdict from the Runge-Kutta method of 1983"
+    )
+    family: dict[str, FamilyPanels] = Field(description="panels of Fig. 11 of each hammer of the family")
+    hammers: _Some = Field(description="the number of random hammers")
+    seed: int = Field(description="the seed of the random hammers")
+    changes: list[Change] = Field(description="how often verdicts change over their panels")
+
+
 FILES: Final[dict[str, type[_Table]]] = {
     "base_rates": BaseRates,
     "predictions": Predictions,
     "search": Search,
     "family": Family,
+    "schemes": Schemes,
 }
 """Name of each file, less ".json", to what it holds."""
 
@@ -209,6 +246,11 @@ class Results:
     def family(self) -> Family | None:
         """Different hammers for which the claims hold as well."""
         return self._read("family", Family)
+
+    @cached_property
+    def schemes(self) -> Schemes | None:
+        """What the integrators of 1983 do to verdicts."""
+        return self._read("schemes", Schemes)
 
     def check(self) -> None:
         """Read all files.

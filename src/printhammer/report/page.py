@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.report.citations import linked_source
 from printhammer.report.family_views import family_view
 from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text, words_of
-from printhammer.report.views import failing_view, panels_view, predictions_view, rates_view, timings_view
+from printhammer.report.views import (
+    failing_view,
+    panels_view,
+    predictions_view,
+    rates_view,
+    schemes_view,
+    timings_view,
+)
 
 if TYPE_CHECKING:
     from printhammer.claims import Result
@@ -67,6 +74,7 @@ def view(report: Report) -> dict[str, Any]:
         "failing": failing_view(report),
         "rates": rates_view(report),
         "panels": panels_view(report),
+        "schemes": schemes_view(report),
         "search": report.search,
         "predictions": predictions_view(report),
         "family": family_view(report),
@@ -122,7 +130,8 @@ def _claim(result: Result, report: Report, drawn: set[int]) -> dict[str, Any]:
     long = {
         name: json.dumps(entry) for name, entry in rest.items() if isinstance(entry, (dict, list)) and entry
     }
-    rates = report.reconstruction.base_rates
+    rates, schemes = report.reconstruction.base_rates, report.reconstruction.schemes
+    computed = schemes is not None and schemes.shipped == report.hammer.fingerprint
     return {
         "result": result,
         "source": linked_source(result.claim.source, drawn),
@@ -131,4 +140,5 @@ def _claim(result: Result, report: Report, drawn: set[int]) -> dict[str, Any]:
         "long": long,
         "measured": result.value is not None,
         "share": None if rates is None else rates.share(result.claim.name),
+        "in_1983": schemes.claims.get(result.claim.name) if schemes is not None and computed else None,
     }

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _SHOWN = (
     *("has_reconstructed", "statuses", "parts", "verdicts", "kinds", "by_kind", "claims", "failing", "rates"),
-    *("panels", "search", "predictions", "family"),
+    *("panels", "schemes", "search", "predictions", "family"),
 )
 
 

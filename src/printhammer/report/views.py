@@ -88,6 +88,41 @@ def panels_view(report: Report) -> list[dict[str, Any]]:
     return rows
 
 
+def schemes_view(report: Report) -> dict[str, Any] | None:
+    """Return what the integrators of 1983 do to verdicts; None where that is about another hammer."""
+    found = report.reconstruction.schemes
+    if found is None or found.shipped != report.hammer.fingerprint:
+        return None
+    printed = list(printed_verdicts().values())
+    rows = [
+        {
+            "way": way,
+            "panels": [
+                {"text": name.replace("-", " "), "same": name == wanted}
+                for name, wanted in zip(names, printed, strict=True)
+            ],
+            "as_printed": sum(map(str.__eq__, names, printed)),
+        }
+        for way, names in found.panels.items()
+    ]
+    changes = [
+        {
+            **row.model_dump(),
+            "rate": percent(row.share),
+            "interval": "" if row.share_error is None else f"± {percent(row.share_error)}",
+        }
+        for row in found.changes
+    ]
+    return {
+        "found": found,
+        "names": [panel_name(period) for period in printed_verdicts()],
+        "printed": [name.replace("-", " ") for name in printed],
+        "rows": rows,
+        "changes": changes,
+        "family": list(found.family.values()),
+    }
+
+
 def predictions_view(report: Report) -> dict[str, Any] | None:
     """Return what the search on the stated claims alone predicts; None where there is nothing."""
     found = report.reconstruction.predictions

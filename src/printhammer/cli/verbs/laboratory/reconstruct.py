@@ -6,11 +6,14 @@ import json
 import math
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
 from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from printhammer.hammer.hammer import Hammer
 
 GROUP: Final = (
     "Search for hammers that do what the paper tells, judge them, and make tables of what was found."
@@ -183,6 +186,34 @@ def predictions(log: Path = _LOG, judged: Path = _JUDGED) -> Answer:
         raise InputError(f"{log}: aim = {heading['aim']!r}, expected the log of a search on stated claims")
     table = count(read_judged(judged, some=True), heading["seed"], len(rows))
     return Answer(files={"out": Content.text(partial(_json, table))})
+
+
+@verb(
+    "reconstruct schemes",
+    "printhammer reconstruct schemes schemes.json --hammers 2",
+    out=_written("JSON file to write."),
+)
+def schemes(
+    job: Job,
+    hammer: Hammer = opt.HAMMER_OPTION,
+    hammers: int = opt.bounded(1, "Number of random hammers.", default=100),
+    seed: int = _SEED,
+    workers: int = _WORKERS,
+) -> Answer:
+    """Count how often an integrator of 1983 gives another verdict on Fig. 11 than the exact motion."""
+    from printhammer.cli.verbs.laboratory.workers import worker_pool
+    from printhammer.reconstruction.judging.schemes import schemes_json
+
+    announce_compiling()
+    with job.counting("random hammers") as tell, worker_pool(workers) as pool:
+        table = schemes_json(hammer, hammers, seed, pool=pool, tell=tell)
+    return Answer(
+        [
+            f"{row['first']} to {row['second']}: {row['differ']} of {row['panels']} verdicts differ"
+            for row in table["changes"]
+        ],
+        files={"out": Content.text(partial(_json, table))},
+    )
 
 
 @verb("reconstruct family", "printhammer reconstruct family judged.jsonl --out family")

@@ -1,0 +1,85 @@
+"""The claims as the integrators of 1983 would have judged them: the same measures on what a scheme computes.
+
+The paper read its figures from such computations. Claims without a motion are the same either way; left out
+are those that are about the schemes themselves, and those whose measure takes ensembles or a search, which
+the schemes have no engine for.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.strobe.schemes_1983 import scheme_strobes
+from printhammer.claims.context import TAIL, Context
+from printhammer.claims.definition import claims
+from printhammer.claims.judging import judge
+from printhammer.claims.verdicts import PANELS, printed_verdicts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from printhammer.claims.judging import Result
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.kernel.schemes_1983 import Scheme
+
+COMPUTED: Final = (
+    "single_pulse_stroke",
+    "settle_out",
+    "low_restitution",
+    "backstop_force_dominates",
+    "quiet_look_loud_force",
+    "two_pulses_660us",
+    "two_pulses_700us",
+    "independent_at_low_rate",
+    "order_of_onset",
+    "second_dot_lost",
+    "poincare_window",
+    "low_rate_fixed_point",
+    "cloud_grows",
+    "successive_points_apart",
+    "points_on_single_pulse_orbit",
+    "flight_time_spread",
+)
+"""Claims about motions of which a scheme computes all that their measures look at."""
+
+
+class SchemeContext(Context):
+    """A hammer and its motions as a scheme of 1983 computes them, on the schedule as the claims read it."""
+
+    def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> Any:
+        """Return what the firings of many drives do: struck, peak force, N, and flight time, s."""
+        rows = [self.run(drive, float(drive.times[-1]) + tail).dots for drive in drives]
+        return SimpleNamespace(
+            struck=np.array([[dot.struck for dot in row] for row in rows]),
+            peak_force=np.array([[dot.peak_force or np.nan for dot in row] for row in rows]),
+            flight_time=np.array([[dot.flight_time or np.nan for dot in row] for row in rows]),
+        )
+
+
+def judge_as_in_1983(
+    hammer: Hammer, scheme: Scheme = "runge-kutta-4", progress: Callable[[str], None] | None = None
+) -> list[Result]:
+    """Judge the claims in `COMPUTED` from what a scheme of 1983 computes.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The hammer.
+    scheme : str, optional
+        "runge-kutta-4" or "trapezoid".
+    progress : callable, optional
+        Called with the name of each claim before it is judged.
+    """
+    context = SchemeContext(hammer, scheme=scheme)
+    points = claims()["poincare_window"].settings["points"]
+    context.once(PANELS, lambda: scheme_strobes(hammer, [*printed_verdicts()], scheme, points=points))
+    results = []
+    for name in COMPUTED:
+        if progress is not None:
+            progress(name)
+        results.append(judge(context, claims()[name]))
+    return results
