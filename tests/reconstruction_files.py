@@ -54,6 +54,27 @@ SAMPLE: dict[str, Any] = {
         ],
         "conclusions": {"safe_rate_Hz": {"low": 600.0, "high": 610.0, "robust": True, "text": "so"}},
     },
+    "schemes": {
+        "format": 1,
+        "shipped": "ab" * 32,
+        "panels": {"exact": ["period-1"] * 12, "runge-kutta-4, look-ahead": ["strange"] * 12},
+        "claims": {"settle_out": "holds", "two_pulses_660us": "fails"},
+        "family": {"family-01": {"exact": 9, "computed": 5, "same": 6}},
+        "hammers": 10,
+        "seed": 7,
+        "changes": [
+            {
+                "first": "exact",
+                "second": "runge-kutta-4, look-ahead",
+                "panels": 120,
+                "differ": 30,
+                "share": 0.25,
+                "share_error": 0.06,
+                "periodic_to_strange": 14,
+                "strange_to_periodic": 1,
+            }
+        ],
+    },
 }
 
 

@@ -71,7 +71,8 @@ def results_of(hammer: "ph.Hammer", folder: Path, **changes: object) -> Results:
     place = folder / "results"
     place.mkdir(parents=True)
     search = {**reconstruction_files.SAMPLE["search"], "shipped": hammer.fingerprint}
-    return results_in(reconstruction_files.write(place, **{"search": search, **changes}))
+    schemes = {**reconstruction_files.SAMPLE["schemes"], "shipped": hammer.fingerprint}
+    return results_in(reconstruction_files.write(place, **{"search": search, "schemes": schemes, **changes}))
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +103,7 @@ def test_the_page_needs_nothing_else(folder: Path, page: Page) -> None:
 
 
 def test_every_section_is_listed(page: Page) -> None:
-    for name in ("hammer", "claims", "failing", "rates", "reconstruction", "family", "provenance"):
+    for name in ("hammer", "claims", "failing", "rates", "schemes", "reconstruction", "family", "provenance"):
         assert name in page.ids
         # In the bar and in the contents.
         assert page.links.count(f"#{name}") >= 2
@@ -144,6 +145,13 @@ def test_the_claims_for_machines(folder: Path) -> None:
     assert rates["geometry"] is None
     assert (rates["settle_out"]["measured"], rates["settle_out"]["holds"]) == (900, 9)
     assert rates["settle_out"]["low"] < rates["settle_out"]["rate"] == 0.01 < rates["settle_out"]["high"]
+
+
+def test_what_the_integrators_of_1983_do_is_told(page: Page) -> None:
+    assert "As computed in 1983" in page.text
+    assert "25\xa0% ± 6\xa0%" in page.text
+    assert "over the panels of 10 random plausible hammers" in " ".join(page.text.split())
+    assert "as computed in 1983: holds" in page.text
 
 
 def test_what_the_reconstruction_found_is_told(page: Page) -> None:

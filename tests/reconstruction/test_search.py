@@ -16,7 +16,7 @@ from printhammer.errors import InputError
 from printhammer.reconstruction.search import evaluation
 from printhammer.reconstruction.search import search as module
 from printhammer.reconstruction.search.explorer import CHEAP, Explorer
-from printhammer.reconstruction.search.search import Plan, search, starts_of
+from printhammer.reconstruction.search.search import Plan, known_starts, search, starts_of
 from printhammer.reconstruction.search.space import VARIABLES
 
 PLAN = Plan("all", seed=3, sample=16)
@@ -77,6 +77,30 @@ def test_aims_have_searches_of_their_own(bowl: list[int], tmp_path: Path) -> Non
     assert stated[0]["measured"] == {"aim": "stated"}
     assert stated[0]["point"] != run(tmp_path / "b.jsonl", 16)[0]["point"]
     assert bowl
+
+
+def test_waveforms_have_searches_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shapes: list[str] = []
+
+    def scored(points: list[Any], _aim: str, _pool: Any, shape: str) -> list[dict[str, Any]]:
+        shapes.append(shape)
+        return [{"point": point.tolist(), "total": 1.0, "constants": {}} for point in points]
+
+    monkeypatch.setattr(module, "scored", scored)
+    plain = run(tmp_path / "a.jsonl", SAMPLED)
+    other = run(tmp_path / "b.jsonl", SAMPLED, Plan("all", seed=3, sample=16, shape="half-sine"))
+    assert set(shapes) == {"rectangle", "half-sine"}
+    assert plain[0]["point"] != other[0]["point"]
+    with pytest.raises(InputError, match=r"shape = .rectangle., expected .half-sine."):
+        run(tmp_path / "a.jsonl", SAMPLED, Plan("all", seed=3, sample=16, shape="half-sine"))
+
+
+def test_known_hammers_are_starts() -> None:
+    starts = known_starts("buzz")
+    assert len(starts) > 10
+    assert all(len(point) == len(VARIABLES) for point in starts)
+    with pytest.raises(InputError, match="aim = 'stated', expected no start"):
+        known_starts("stated")
 
 
 def test_it_finds_the_bottom(bowl: list[int], tmp_path: Path) -> None:
@@ -183,10 +207,10 @@ def test_what_interrupts_leaves_the_log_as_far_as_it_was(
     plain = module.scored
     calls = iter(range(100))
 
-    def stopped(points: list[Any], aim: Any, pool: Any) -> list[dict[str, Any]]:
+    def stopped(points: list[Any], aim: Any, pool: Any, shape: Any) -> list[dict[str, Any]]:
         if next(calls) == 3:
             raise KeyboardInterrupt
-        return plain(points, aim, pool)
+        return plain(points, aim, pool, shape)
 
     monkeypatch.setattr(module, "scored", stopped)
     with pytest.raises(KeyboardInterrupt):
@@ -326,7 +350,11 @@ def test_rows_come_in_the_order_of_the_points(
     monkeypatch: pytest.MonkeyPatch, threads: ThreadPoolExecutor
 ) -> None:
     monkeypatch.setattr(evaluation, "PIECE", 3)
-    monkeypatch.setattr(evaluation, "rows", lambda points, aim: [{"point": p, "aim": aim} for p in points])
+    monkeypatch.setattr(
+        evaluation,
+        "rows",
+        lambda points, aim, shape: [{"point": p, "aim": aim, "shape": shape} for p in points],
+    )
     points = [np.array([float(number)]) for number in range(10)]
     found = evaluation.scored(points, "all", threads)
     assert [row["point"] for row in found] == points

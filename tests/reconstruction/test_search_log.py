@@ -32,8 +32,14 @@ def test_the_log_of_a_search_is_read_but_for_a_line_that_breaks_off(tmp_path: Pa
     ("content", "said"),
     [
         (b"", "expected the log of a search, and there is nothing"),
-        (b'{"aim": "shape", "seed": 4}\n', "line 1: aim = 'shape', expected stated or all"),
-        (b'{"aim": ["all"], "seed": 4}\n', r"line 1: aim = \['all'\], expected stated or all"),
+        (
+            b'{"aim": "shape", "seed": 4}\n',
+            "line 1: aim = 'shape', expected one of stated, all, panels, buzz",
+        ),
+        (
+            b'{"aim": ["all"], "seed": 4}\n',
+            r"line 1: aim = \['all'\], expected one of stated, all, panels, buzz",
+        ),
         (b'{"aim": "all", "seed": "4"}\n', "line 1: seed = '4', expected a whole number"),
         (b'{"aim": "all", "seed": true}\n', "line 1: seed = True, expected a whole number"),
         (b"{}\n", "line 1: expected the heading of the log of a search, not '{}'"),

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,8 @@ from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.static_force import StaticForce
 from printhammer.reconstruction.family.choice import scaled
 from printhammer.reconstruction.search.space import (
+    BEYOND,
+    CURRENT,
     PRINT_FORCE,
     VARIABLES,
     constants_at,
@@ -54,6 +57,23 @@ def test_shares_of_a_range_are_even_over_it_or_over_its_logarithm() -> None:
 def test_values_to_constants_and_back(point: np.ndarray, mass: float) -> None:
     values = values_at(point)
     assert values_of(constants_at(values, mass, 200.0)) == pytest.approx(values, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["trapezoid", "half-sine"])
+@given(point=POINTS.map(lambda point: np.clip(point, 0.02, 0.98)), mass=MASSES)
+def test_other_waveforms_to_constants_and_back(point: np.ndarray, mass: float, shape: Any) -> None:
+    values = values_at(point)
+    constants = constants_at(values, mass, 200.0, shape)
+    # Only the width counts for a half sine.
+    free = {"rise", "decay"} if shape == "half-sine" else set()
+    again = values_of(constants)
+    for name in set(values) - free:
+        assert again[name] == pytest.approx(values[name], rel=1e-9, abs=1e-12)
+    waveform = hammer_of(constants).waveform
+    assert waveform is not None
+    assert waveform.shape == shape
+    largest = CURRENT if values["release"] * BEYOND * 2.0 < CURRENT else values["release"] * BEYOND * 2.0
+    assert waveform.peak == pytest.approx(largest, rel=1e-9)
 
 
 @given(POINTS, MASSES, st.floats(0.01, 100.0), st.floats(0.1, 10.0))

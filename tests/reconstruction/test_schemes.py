@@ -1,0 +1,51 @@
+"""How verdicts of two ways of computing are compared."""
+
+import math
+
+import pytest
+
+from printhammer.claims.schemes_1983 import COMPUTED
+from printhammer.claims.verdicts import printed_verdicts
+from printhammer.reconstruction.judging import schemes as module
+from printhammer.reconstruction.judging.schemes import EXACT, PAIRS, PLAIN, changes, named, schemes_json
+from printhammer.reconstruction.results import Schemes, shipped_results
+
+
+def test_changes_are_counted_with_panels_of_a_hammer_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = {0: ["period-1"] * 12, 1: ["strange"] * 12}
+    other = {0: ["period-1"] * 6 + ["strange"] * 6, 1: ["strange"] * 12}
+    monkeypatch.setattr(module, "draw", lambda count, seed: list(range(count)))
+    monkeypatch.setattr(module, "hammer_of", lambda number: number)
+    monkeypatch.setattr(
+        module, "panel_verdicts", lambda which, way: (names if way == EXACT else other)[which]
+    )
+    told: list[tuple[int, int]] = []
+    rows = changes(2, 1, tell=lambda done, of: told.append((done, of)))
+    assert told == [(1, 2), (2, 2)]
+    assert [(row["first"], row["second"]) for row in rows] == [(named(a), named(b)) for a, b in PAIRS]
+    first = rows[0]
+    assert (first["panels"], first["differ"]) == (24, 6)
+    assert (first["periodic_to_strange"], first["strange_to_periodic"]) == (6, 0)
+    # Shares of the hammers: a half and none; the error of their mean is a quarter.
+    assert first["share"] == pytest.approx(0.25)
+    assert first["share_error"] == pytest.approx(2.0 * math.sqrt(0.125) / math.sqrt(2.0))
+    assert rows[-1]["differ"] == 0
+
+
+@pytest.mark.slow
+def test_what_ships_can_be_made_again_and_is_about_all_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    import printhammer as ph
+
+    monkeypatch.setattr(module, "family_hammers", list)
+    monkeypatch.setattr(module, "changes", lambda *_, **__: [])
+    hammer = ph.load("hendriks-1983")
+    made = Schemes.model_validate(schemes_json(hammer, 1, 1))
+    assert set(made.panels) == {named(way) for way in (EXACT, *PLAIN)}
+    assert set(made.claims) == set(COMPUTED)
+    assert made.panels["exact"] != made.panels[named(PLAIN[1])]
+    assert all(len(names) == len(printed_verdicts()) for names in made.panels.values())
+    shipped = shipped_results().schemes
+    assert shipped is not None
+    assert shipped.shipped == hammer.fingerprint
+    assert shipped.panels == made.panels
+    assert shipped.claims == made.claims
