@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from printhammer.claims import schemes_1983 as claims_of_1983
 from printhammer.claims.schemes_1983 import COMPUTED
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.reconstruction.judging import schemes as module
@@ -38,14 +39,18 @@ def test_what_ships_can_be_made_again_and_is_about_all_ways(monkeypatch: pytest.
 
     monkeypatch.setattr(module, "family_hammers", list)
     monkeypatch.setattr(module, "changes", lambda *_, **__: [])
+    # Those that take whole scans of rates are left out.
+    quick = [name for name in COMPUTED if name not in ("order_of_onset", "second_dot_lost")]
+    monkeypatch.setattr(claims_of_1983, "COMPUTED", quick)
     hammer = ph.load("hendriks-1983")
     made = Schemes.model_validate(schemes_json(hammer, 1, 1))
     assert set(made.panels) == {named(way) for way in (EXACT, *PLAIN)}
-    assert set(made.claims) == set(COMPUTED)
+    assert list(made.claims) == quick
     assert made.panels["exact"] != made.panels[named(PLAIN[1])]
     assert all(len(names) == len(printed_verdicts()) for names in made.panels.values())
     shipped = shipped_results().schemes
     assert shipped is not None
     assert shipped.shipped == hammer.fingerprint
     assert shipped.panels == made.panels
-    assert shipped.claims == made.claims
+    assert {name: shipped.claims[name] for name in quick} == made.claims
+    assert set(shipped.claims) == set(COMPUTED)
