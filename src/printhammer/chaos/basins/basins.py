@@ -247,7 +247,7 @@ def _decided(
     """Return places of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings, statuses, attractors."""
     firings, most, tolerance = counts
     (scales,) = scales_of_columns([regime])
-    attractors = Attractors(regime, scales, tolerance, threads)
+    attractors = Attractors(regime, scales, tolerance)
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)
     status = np.full(len(cells), OK, "U16")

@@ -19,8 +19,7 @@ from printhammer.chaos.bifurcation.columns import (
     scales_of_columns,
     usable,
 )
-from printhammer.chaos.bifurcation.diagram import train_from, window_of_exponent
-from printhammer.chaos.strobe.train import exponents_of
+from printhammer.chaos.strobe.train import exponents_onward
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -103,24 +102,22 @@ class DiagramBuilder:
         """Run trains between neighbours that differ; the state comes from the neighbour before."""
         order = np.argsort(self.values, kind="stable").tolist()
         pairs = [pair for pair in itertools.pairwise(order) if self.differ(*pair)]
-        middles = np.array([0.5 * (self.values[one] + self.values[other]) for one, other in pairs])
+        middles = [0.5 * (self.values[low] + self.values[high]) for low, high in pairs]
         new = [
-            k for k, (one, other) in enumerate(pairs) if self.values[one] < middles[k] < self.values[other]
+            (pair, middle)
+            for pair, middle in zip(pairs, middles, strict=True)
+            if self.values[pair[0]] < middle < self.values[pair[1]]
         ]
         if not new:
             return
-        places = self.add(middles[new], level)
+        places = self.add(np.array([middle for _pair, middle in new]), level)
         rows: list[int] = []
         states: list[State] = []
         for way, name in enumerate(self.ways):
-            for place, k in zip(places, new, strict=True):
-                (row,) = self.rows([place], way)
-                begin = self.begin
-                if name != "from rest":
-                    (before,) = self.rows([pairs[k][0 if name == "up" else 1]], way)
-                    x, v, branch, memory = self.table.columns.last[before].tolist()
-                    begin = (x, v, branch, memory)
-                rows.append(row)
+            rows += self.rows(places, way)
+            befores = self.rows([pair[0 if name == "up" else 1] for pair, _middle in new], way)
+            for row, before in zip(self.rows(places, way), befores, strict=True):
+                begin = self.begin if name == "from rest" else self.table.columns.handed(before)
                 states.append(usable(self.table.regimes[row], begin))
         self.run(rows, np.array(states))
 
@@ -145,20 +142,21 @@ class DiagramBuilder:
     def trial(self, rows: Sequence[int], states: FloatArray) -> tuple[Any, Any, Any]:
         """Run trains from states; return their states, periods and distances."""
         regimes = [self.table.regimes[row] for row in rows]
-        begin = self.done
-
-        def tell(part: int, _all: int) -> None:
-            self.tell(begin + part)
-
-        found = run_columns(regimes, states, *self.counts, threads=self.threads, progress=tell)
+        done = self.done
+        columns = run_columns(
+            regimes,
+            states,
+            *self.counts,
+            threads=self.threads,
+            progress=lambda part, _all: self.tell(done + part),
+        )
         fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
-        cycles, distances = cycles_of(found, fronts, self.table.scales[list(rows)])
-        return found, cycles, distances
+        return columns, *cycles_of(columns, fronts, self.table.scales[list(rows)])
 
     def run(self, rows: Sequence[int], states: FloatArray) -> None:
         """Run trains from states and keep what is found."""
-        found, cycles, distances = self.trial(rows, states)
-        put(self.table.columns, rows, found)
+        columns, cycles, distances = self.trial(rows, states)
+        put(self.table.columns, rows, columns)
         self.table.cycles[list(rows)] = cycles
         self.table.distances[list(rows)] = distances
         self.done += len(rows)
@@ -171,23 +169,22 @@ class DiagramBuilder:
     def measure(self) -> None:
         """Compute the exponents of the trains without a period, over as many firings as there are points."""
         columns, table = self.table.columns, self.table
-        trains = []
+        begun = {}
         for row, regime in enumerate(table.regimes):
             x, v, branch, _memory = columns.last[row].tolist()
             # A start inside the pack would need its memory; such a train stays undecided.
-            if columns.status[row] != OK or table.cycles[row] or branch >= 0.0 or math.isnan(x):
-                continue
-            trains.append((row, train_from(regime, (x, v), self.points)))
-        self.known += len(trains)
-        begun = self.done
-        found = exponents_of(
-            [train for _row, train in trains],
-            window_of_exponent(self.points),
+            if columns.status[row] == OK and not table.cycles[row] and branch < 0.0 and not math.isnan(x):
+                begun[row] = regime, (x, v)
+        self.known += len(begun)
+        done = self.done
+        exponents = exponents_onward(
+            list(begun.values()),
+            self.points,
             self.counts[2],
             threads=self.threads,
-            progress=lambda done, _all: self.tell(begun + done),
+            progress=lambda part, _all: self.tell(done + part),
         )
-        for (row, _train), exponent in zip(trains, found, strict=True):
+        for row, exponent in zip(begun, exponents, strict=True):
             if exponent.ok and exponent.smooth:
                 self.exponents[row], self.errors[row] = exponent.value, exponent.standard_error
-        self.done += len(trains)
+        self.done += len(begun)

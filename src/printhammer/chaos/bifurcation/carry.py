@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.columns import OK, orbit_distance, put, usable
+from printhammer.chaos.bifurcation.columns import OK, Columns, orbit_distance, put, usable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.chaos.bifurcation.columns import Columns, State
+    from printhammer.chaos.bifurcation.columns import State
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
@@ -77,20 +77,10 @@ def carry(
     run: Callable[[list[int], FloatArray], None],
     trial: Callable[[list[int], FloatArray], tuple[Columns, Any, Any]],
 ) -> None:
-    """Run the trains of some strands and close their joints.
+    """Run the trains of strands of one or several directions, and close their joints.
 
-    Parameters
-    ----------
-    table : Trains
-        Where the results go.
-    strands : sequence of Strand
-        Those of one or several directions.
-    start : tuple
-        State with which a strand begins.
-    run : callable
-        Runs some rows from states and puts what it finds into the table.
-    trial : callable
-        Runs some rows from states and returns what it finds: columns, periods, distances.
+    `start` is the state with which a strand begins; `run` runs rows of the table from states and keeps the
+    results there, `trial` returns them: columns, periods, distances.
     """
     for k in range(max(len(strand.rows) for strand in strands)):
         long = [strand.rows for strand in strands if k < len(strand.rows)]
@@ -104,27 +94,20 @@ def carry(
         # Every open joint is taken one train further, all of them side by side.
         order = sorted(open_)
         rows = [strands[number].rows[place] for number, place in order]
-        last = [_row_before(strands, number, place) for number, place in order]
-        states = [_from(table, one, row) for one, row in zip(last, rows, strict=True)]
+        befores = [_row_before(strands, number, place) for number, place in order]
+        states = [_from(table, before, row) for before, row in zip(befores, rows, strict=True)]
         columns, cycles, distances = trial(rows, np.array(states))
         table.carried += len(rows)
         open_ = set()
         for i, ((number, place), row) in enumerate(zip(order, rows, strict=True)):
             if same_attractor(table, row, columns, i, int(cycles[i])):
                 continue
-            put(table.columns, [row], one_of(columns, i))
+            put(table.columns, [row], Columns(*(values[[i]] for values in vars(columns).values())))
             table.cycles[row], table.distances[row] = cycles[i], distances[i]
             if place + 1 < len(strands[number].rows):
                 open_.add((number, place + 1))
             else:
                 open_ |= {(n, 0) for n, other in enumerate(strands) if other.before == number}
-
-
-def one_of(columns: Columns, place: int) -> Columns:
-    """Return one of several columns."""
-    part = slice(place, place + 1)
-    names = ("x", "v", "branch", "memory", "status", "last")
-    return type(columns)(**{name: getattr(columns, name)[part] for name in names})
 
 
 def _row_before(strands: Sequence[Strand], number: int, place: int) -> int:
@@ -136,8 +119,7 @@ def _row_before(strands: Sequence[Strand], number: int, place: int) -> int:
 
 
 def _from(table: Trains, before: int, row: int) -> State:
-    x, v, branch, memory = table.columns.last[before].tolist()
-    return usable(table.regimes[row], (x, v, branch, memory))
+    return usable(table.regimes[row], table.columns.handed(before))
 
 
 def same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle: int) -> bool:
@@ -153,8 +135,8 @@ def same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle:
     if cycle != table.cycles[row]:
         return False
     one, other = (
-        np.column_stack([found.x[at], found.v[at]]) / table.scales[row, :2]
-        for found, at in ((columns, place), (was, row))
+        np.column_stack([states.x[at], states.v[at]]) / table.scales[row, :2]
+        for states, at in ((columns, place), (was, row))
     )
     if cycle:
         return orbit_distance(one[-cycle:], other[-cycle:]) <= SAME

@@ -31,17 +31,7 @@ _PIECE: Final = 30_000
 
 
 class ExactMaps:
-    """Images with derivatives from the tangent flow, one at a time in threads.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer, periodic drive and phase of the section.
-    tolerance : float
-        Of the integration.
-    threads : int, optional
-        By default as many as there are cores.
-    """
+    """Images with derivatives from the tangent flow, one at a time in threads."""
 
     def __init__(self, regime: Regime, tolerance: float, threads: int | None = None) -> None:
         self.regime, self.tolerance = regime, tolerance
@@ -53,27 +43,15 @@ class ExactMaps:
         def image(i: int) -> Image:
             return image_of(self.regime, states[i], int(firings[i]), self.tolerance, contacts=False)
 
-        found = Images.empty(len(states))
-        for i, one in enumerate(mapped(image, range(len(states)), self.threads)):
-            found.states[i], found.jacobians[i], found.smooth[i] = one.state, one.jacobian, one.smooth
-            found.reasons[i] = CLOSED if one.ok else one.status
-        return found
+        images = Images.empty(len(states))
+        for i, own in enumerate(mapped(image, range(len(states)), self.threads)):
+            images.states[i], images.jacobians[i], images.smooth[i] = own.state, own.jacobian, own.smooth
+            images.reasons[i] = CLOSED if own.ok else own.status
+        return images
 
 
 class FastMaps:
-    """Images with derivatives from differences, in an ensemble.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer, periodic drive and phase of the section.
-    tolerance : float
-        Of the integration.
-    longest : int
-        Largest number of firings.
-    threads : int, optional
-        By default as many as there are cores; the images do not depend on it.
-    """
+    """Images after `longest` firings at most with derivatives from differences, in an ensemble."""
 
     def __init__(self, regime: Regime, tolerance: float, longest: int, threads: int | None = None) -> None:
         self.regime, self.tolerance, self.threads = regime, tolerance, threads
@@ -83,19 +61,19 @@ class FastMaps:
 
     def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
         """Return the images of states, each after its own number of firings."""
-        found = Images.empty(len(states))
+        images = Images.empty(len(states))
         step = _SPACING * self.scales
         neighbours = states[:, np.newaxis] + np.array([[0.0, 0.0], [step[0], 0.0], [0.0, step[1]]])
         allowed = np.array([all(self._possible(row) for row in three) for three in neighbours], np.bool_)
-        found.reasons[~allowed] = RANGE_LEFT
+        images.reasons[~allowed] = RANGE_LEFT
         out = np.array(
             [not all(usable(self.regime.hammer, x, v) for x, v in three) for three in neighbours], np.bool_
         )
-        found.reasons[allowed & out] = IN_PACK
+        images.reasons[allowed & out] = IN_PACK
         rows = np.flatnonzero(allowed & ~out)
         for begin in range(0, len(rows), _PIECE // 3):
-            self._piece(rows[begin : begin + _PIECE // 3], neighbours, firings, found, step)
-        return found
+            self._piece(rows[begin : begin + _PIECE // 3], neighbours, firings, images, step)
+        return images
 
     def _possible(self, state: FloatArray) -> bool:
         try:
@@ -109,7 +87,7 @@ class FastMaps:
         rows: npt.NDArray[np.int64],
         neighbours: FloatArray,
         firings: npt.NDArray[np.int64],
-        found: Images,
+        images: Images,
         step: FloatArray,
     ) -> None:
         ends = np.repeat(self.moments[firings[rows]], 3)
@@ -129,12 +107,11 @@ class FastMaps:
         kept = np.isin(table.branch[:, 0].reshape(shape), WITH_MEMORY).any(axis=1)
         names = np.array(result.status_names).reshape(shape)
         stopped = ~result.ok.reshape(shape)
-        found.states[rows] = final[:, 0]
-        found.jacobians[rows] = np.stack(
-            [(final[:, 1 + k] - final[:, 0]) / step[k] for k in range(2)], axis=2
-        )
-        found.smooth[rows] = True
+        images.states[rows] = final[:, 0]
+        slopes = [(final[:, 1 + k] - final[:, 0]) / step[k] for k in range(2)]
+        images.jacobians[rows] = np.stack(slopes, axis=2)
+        images.smooth[rows] = True
         why = np.where(kept, IN_PACK, CLOSED)
         first = np.argmax(stopped, axis=1)
         failed = stopped.any(axis=1)
-        found.reasons[rows] = np.where(failed, names[np.arange(len(rows)), first], why)
+        images.reasons[rows] = np.where(failed, names[np.arange(len(rows)), first], why)

@@ -92,27 +92,10 @@ def close_orbits(
 ) -> list[Closing]:
     """Make guesses of orbits, all of as many segments, close by Newton's method with shortened steps.
 
-    Parameters
-    ----------
-    maps : callable
-        Makes the images.
-    guesses : array, shape (n, m, 2)
-        States at the starts of the segments of each orbit.
-    firings : int array, shape (n, m)
-        Numbers of firings in the segments.
-    scales : array, shape (2,)
-        Half-widths of the window, m and m/s.
-    goal : float
-        Residual, in half-widths, at which no more is asked for.
-    enough : float
-        Residual which will do where it gets no smaller.
-    iterations : int
-        Largest number of evaluations of each orbit.
-
-    Returns
-    -------
-    list of Closing
-        One for each guess.
+    Guesses are states at the starts of the segments, shape (n, m, 2), with numbers of firings, shape (n, m);
+    the scales are the half-widths of the window, m and m/s. In units of these, `goal` is the residual at
+    which no more is asked for, and `enough` that which will do where it gets no smaller; `iterations` is the
+    largest number of evaluations of each orbit.
     """
     search = _Search(maps, guesses, firings, scales)
     search.start()

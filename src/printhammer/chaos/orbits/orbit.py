@@ -270,17 +270,7 @@ def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orb
 
 
 def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
-    """Return all about an orbit that Newton's method has closed.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer, periodic drive and phase of the section.
-    closing : Closing
-        The orbit.
-    tolerance : float
-        Of the integration.
-    """
+    """Return all about an orbit that Newton's method has closed, or why it has not."""
     firings = int(closing.firings.sum())
     if not closing.closed:
         return no_orbit(regime, firings, tolerance, closing.reason)
@@ -364,8 +354,8 @@ class _Run:
         firings = self.regime.moments(self.train, self.periods, 0.0)
         marks = firings[:-1] if self.regime.phase == 0.0 else firings[1:]
         marks = np.concatenate([self.sections[:1], marks])
-        found = follow(self.problem, marks, np.eye(3), renormalise=False).states[1:]
-        return found if self.regime.phase == 0.0 else np.roll(found, 1, axis=0)
+        states = follow(self.problem, marks, np.eye(3), renormalise=False).states[1:]
+        return states if self.regime.phase == 0.0 else np.roll(states, 1, axis=0)
 
 
 def _contacts_and_dots(
@@ -388,10 +378,10 @@ def _contacts_and_dots(
     contacts.sort(key=lambda contact: contact.t_in)
     if regime.drive is not None:
         return tuple(contacts), ()
-    found = motion.dots[before + skipped : before + skipped + firings]
+    fired_dots = motion.dots[before + skipped : before + skipped + firings]
     dots = [
         replace(dot, index=k, fired_at=k * regime.period)
-        for k, dot in enumerate([*found[firings - skipped :], *found[: firings - skipped]])
+        for k, dot in enumerate([*fired_dots[firings - skipped :], *fired_dots[: firings - skipped]])
     ]
     return tuple(contacts), tuple(dots)
 

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
-__all__ = ["IN_PACK", "MAP_TOLERANCE", "Image", "strobe_map", "strobe_maps", "strobe_slope"]
-
 MAP_TOLERANCE: Final = 1e-13
 """Tolerance with which the map is computed: its noise limits how well a fixed point can be known."""
 
@@ -143,19 +141,13 @@ def strobe_map(
 
 
 def read_state(state: npt.ArrayLike) -> FloatArray:
-    """Read displacement, m, and velocity, m/s.
-
-    Raises
-    ------
-    InputError
-        It is not two finite numbers.
-    """
-    found = np.asarray(state, dtype=np.float64)
-    if found.shape != (2,) or not np.isfinite(found).all():
+    """Read displacement, m, and velocity, m/s; InputError where it is not two finite numbers."""
+    pair = np.asarray(state, dtype=np.float64)
+    if pair.shape != (2,) or not np.isfinite(pair).all():
         raise InputError(
             f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
         )
-    return found
+    return pair
 
 
 def strobe_maps(
@@ -312,11 +304,11 @@ def margin_of(problem: Problem, record: Record) -> float:
     hammer, (way, speed) = problem.hammer, problem.scales
     surfaces = [place for place in (hammer.position, hammer.front) if place is not None]
     x, sign = _turns(problem, record)
-    found = [sign * (x - place) / way for place in surfaces]
+    margins = [sign * (x - place) / way for place in surfaces]
     nodes = record.nodes
     rebound = (nodes[1:, 0] == nodes[:-1, 0]) & (nodes[:-1, 2] < 0.0) & (nodes[1:, 2] >= 0.0)
-    found.append((nodes[:-1, 2][rebound] / speed) ** 2)
-    every = np.concatenate(found)
+    margins.append((nodes[:-1, 2][rebound] / speed) ** 2)
+    every = np.concatenate(margins)
     return float(every[np.argmin(np.abs(every))]) if every.size else math.nan
 
 

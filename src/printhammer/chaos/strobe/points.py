@@ -139,7 +139,7 @@ def strobe(
     InputError
         An argument is not what is described above, or the hammer has no waveform or no rest state.
     """
-    (found,) = strobes(
+    (points_of_train,) = strobes(
         Regime.of(hammer, **firing),
         points=points,
         transient=transient,
@@ -148,7 +148,7 @@ def strobe(
         verdict=verdict,
         every_exponent=True,
     )
-    return found
+    return points_of_train
 
 
 def strobes(
@@ -206,13 +206,13 @@ def strobes(
     many = regimes_of(hammers, periods, drives, waveform=waveform, overlap=overlap, phase=phase)
     rows = None if states is None else np.asarray(states, dtype=np.float64).reshape(-1, 2).tolist()
     size = max(len(many), 0 if rows is None else len(rows)) if many and rows != [] else 0
-    for name, given in (("hammers and periods", many), ("states", rows)):
-        if given is not None and len(given) not in (1, size):
-            raise InputError(f"{name}: {len(given)} are given, expected 1 or {size}")
+    for name, entries in (("hammers and periods", many), ("states", rows)):
+        if entries is not None and len(entries) not in (1, size):
+            raise InputError(f"{name}: {len(entries)} are given, expected 1 or {size}")
     begun = [None] if rows is None else [(x, v) for x, v in rows]
     trains = [Train.of(many[i % len(many)], fired, begun[i % len(begun)]) for i in range(size)]
     chosen = np.arange(skipped + 1, skipped + count + 1)
-    found, verdicts = run_trains(
+    every, verdicts = run_trains(
         trains,
         chosen,
         tolerance,
@@ -222,8 +222,8 @@ def strobes(
         progress=progress,
     )
     return [
-        strobe_of(train, chosen, states_found, tolerance, judged)
-        for train, states_found, judged in zip(trains, found, verdicts, strict=True)
+        strobe_of(train, chosen, states_of_train, tolerance, judged)
+        for train, states_of_train, judged in zip(trains, every, verdicts, strict=True)
     ]
 
 
@@ -252,12 +252,7 @@ def strobe_of(
         period=train.period,
         phase=train.regime.phase,
         firing=firing,
-        t=states.t,
-        x=states.x,
-        v=states.v,
-        branch=states.branch,
-        memory=states.memory,
-        status=states.status,
+        **vars(states),
         tolerance=tolerance,
         verdict=judged,
     )
