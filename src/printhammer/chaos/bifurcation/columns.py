@@ -14,6 +14,7 @@ from printhammer.errors import InputError
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.start import check_branch, initial_state
 from printhammer.run.window import window_of
+from printhammer.support.threads import shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -124,14 +125,9 @@ def run_columns(
         rows = np.flatnonzero(kind)
         for first in range(0, len(rows), piece):
             some = rows[first : first + piece]
-            begin = done
-
-            def tell(part: int, _all: int, begin: int = begin) -> None:
-                if progress is not None:
-                    progress(begin + part, len(regimes))
-
-            counts = firings, transient, tolerance
-            put(columns, some, _run([regimes[row] for row in some], states[some], counts, threads, tell))
+            own = [regimes[row] for row in some]
+            tell = shifted(progress, done, len(regimes))
+            put(columns, some, _run(own, states[some], (firings, transient, tolerance), threads, tell))
             done += len(some)
     return columns
 
@@ -141,7 +137,7 @@ def _run(
     states: FloatArray,
     counts: tuple[int, int, float],
     threads: int | None,
-    progress: Progress,
+    progress: Progress | None,
 ) -> Columns:
     """Run trains that begin alike: all from rest, all inside the pack, or all elsewhere."""
     firings, transient, tolerance = counts
