@@ -18,13 +18,13 @@ import numpy as np
 from printhammer.chaos.basins.attractors import Attractor, Attractors
 from printhammer.chaos.basins.entropy import BOX, BasinEntropy, basin_entropy
 from printhammer.chaos.bifurcation.columns import OK, TOLERANCE, run_columns, scales_of_columns
+from printhammer.chaos.strobe.map import possible
 from printhammer.chaos.strobe.verdict import LARGEST_PERIOD
 from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, coordinate, part
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Regime
-from printhammer.run.start import initial_state
 from printhammer.support.threads import shifted
 
 if TYPE_CHECKING:
@@ -249,8 +249,8 @@ def _decided(
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)
     status = np.full(len(cells), OK, "U16")
-    possible = {x: _possible(regime.hammer, x) for x in np.unique(cells[:, 0]).tolist()}
-    absent = np.array([not possible[x] for x in cells[:, 0].tolist()])
+    known_states = {x: possible(regime.hammer, x, 0.0) for x in np.unique(cells[:, 0]).tolist()}
+    absent = np.array([not known_states[x] for x in cells[:, 0].tolist()])
     places[absent], status[absent] = NO_STATE - 1, NO_STATE_STATUS
     states = cells.copy()
     done, known = 0, int((~absent).sum())
@@ -275,14 +275,6 @@ def _decided(
             done += len(rows)
         known = done + int((places == UNDECIDED - 1).sum())
     return places, used, status, attractors.found
-
-
-def _possible(hammer: Hammer, x: float) -> bool:
-    try:
-        initial_state(hammer, (x, 0.0))
-    except InputError:
-        return False
-    return True
 
 
 def _key(attractor: Attractor) -> tuple[int, float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -33,29 +34,24 @@ JUMP: Final = 0.2
 """Distance of neighbouring orbits of the same period, in half-widths of the window, that is refined."""
 
 
+@dataclass
 class DiagramBuilder:
     """A diagram under way. Trains are numbered as they come, those of all directions at a value in a row."""
 
-    def __init__(
-        self,
-        regime: Regime,
-        name: str,
-        ways: tuple[str, ...],
-        counts: tuple[int, int, float],
-        begin: State,
-        threads: int | None,
-        progress: Progress | None,
-    ) -> None:
-        self.regime, self.name, self.ways, self.counts, self.begin = regime, name, ways, counts, begin
-        self.threads, self.progress = threads, progress
-        self.points = counts[0] - counts[1]
-        self.values = np.zeros(0)
-        self.levels = np.zeros(0, np.int64)
-        none = np.zeros(0)
-        self.table = Trains([], blank_columns(0, self.points), np.zeros(0, np.int64), none, np.zeros((0, 3)))
-        self.exponents, self.errors = none.copy(), none.copy()
-        self.done = 0
-        self.known = 0
+    regime: Regime
+    name: str
+    ways: tuple[str, ...]
+    counts: tuple[int, int, float]
+    begin: State
+    threads: int | None
+    progress: Progress | None
+
+    def __post_init__(self) -> None:
+        self.points = self.counts[0] - self.counts[1]
+        whole, none = np.zeros(0, np.int64), np.zeros(0)
+        self.values, self.levels, self.exponents, self.errors = none, whole, none, none
+        self.table = Trains([], blank_columns(0, self.points), whole, none, np.zeros((0, 3)))
+        self.done = self.known = 0
 
     def add(self, values: FloatArray, level: int) -> list[int]:
         """Make room for trains at new values; return the places of the values."""
@@ -121,11 +117,11 @@ class DiagramBuilder:
                 states.append(usable(self.table.regimes[row], begin))
         self.run(rows, np.array(states))
 
-    def differ(self, one: int, other: int) -> bool:
+    def differ(self, place: int, neighbour: int) -> bool:
         """Tell whether the trains at two values differ: in period, or by a jump of the orbit."""
         table = self.table
         for way in range(len(self.ways)):
-            a, b = self.rows([one, other], way)
+            a, b = self.rows([place, neighbour], way)
             q = int(table.cycles[a])
             if q != table.cycles[b] or table.columns.status[a] != table.columns.status[b]:
                 return True

@@ -43,8 +43,8 @@ class Strand:
 
     rows: list[int]
     """Their rows in the table of all trains, in the order in which the state is carried."""
-    before: int | None = None
-    """Number of the strand that ends where this one begins; None for the first one."""
+    before: int
+    """Number of the strand that ends where this one begins; -1 for the first one."""
 
 
 @dataclass
@@ -67,7 +67,7 @@ class Trains:
 def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
     """Cut trains, in the order in which the state is carried, into strands numbered from `first` on."""
     cut = [list(rows[k : k + STRAND]) for k in range(0, len(rows), STRAND)]
-    return [Strand(part, first + k - 1 if k else None) for k, part in enumerate(cut)]
+    return [Strand(part, first + k - 1 if k else -1) for k, part in enumerate(cut)]
 
 
 def carry(
@@ -85,17 +85,22 @@ def carry(
     for k in range(max(len(strand.rows) for strand in strands)):
         long = [strand.rows for strand in strands if k < len(strand.rows)]
         begun = [
-            _from(table, rows[k - 1], rows[k]) if k else usable(table.regimes[rows[k]], start)
-            for rows in long
+            usable(table.regimes[rows[k]], table.columns.handed(rows[k - 1]) if k else start) for rows in long
         ]
         run([rows[k] for rows in long], np.array(begun))
-    open_ = {(number, 0) for number, strand in enumerate(strands) if strand.before is not None}
+    open_ = {(number, 0) for number, strand in enumerate(strands) if strand.before >= 0}
     while open_:
         # Every open joint is taken one train further, all of them side by side.
         order = sorted(open_)
         rows = [strands[number].rows[place] for number, place in order]
-        befores = [_row_before(strands, number, place) for number, place in order]
-        states = [_from(table, before, row) for before, row in zip(befores, rows, strict=True)]
+        ended = [
+            strands[number].rows[place - 1] if place else strands[strands[number].before].rows[-1]
+            for number, place in order
+        ]
+        states = [
+            usable(table.regimes[row], table.columns.handed(before))
+            for before, row in zip(ended, rows, strict=True)
+        ]
         columns, cycles, distances = trial(rows, np.array(states))
         table.carried += len(rows)
         open_ = set()
@@ -108,18 +113,6 @@ def carry(
                 open_.add((number, place + 1))
             else:
                 open_ |= {(n, 0) for n, other in enumerate(strands) if other.before == number}
-
-
-def _row_before(strands: Sequence[Strand], number: int, place: int) -> int:
-    strand = strands[number]
-    if place:
-        return strand.rows[place - 1]
-    assert strand.before is not None
-    return strands[strand.before].rows[-1]
-
-
-def _from(table: Trains, before: int, row: int) -> State:
-    return usable(table.regimes[row], table.columns.handed(before))
 
 
 def same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle: int) -> bool:

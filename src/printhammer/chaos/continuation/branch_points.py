@@ -155,7 +155,9 @@ def points_of(
             share, node = locate(follower, here, ahead, tests[kind])
             if kind == "Neimark-Sacker" and not _has_pair(node if node is not None else here):
                 continue
-            points.append((share, kind, _point(kind, here, ahead, after, share, node)))
+            chord = _on_chord(here, ahead, share, here.arc + share * (ahead.arc - here.arc))
+            labels, sharp = (here.value.label, ahead.value.label), node is not None
+            points.append((share, kind, BranchPoint(kind, node or chord, after, labels, sharp)))
         if {"fold", "branching"} <= set(kinds):
             shares = {kind: share for share, kind, _ in points}
             if abs(shares["fold"] - shares["branching"]) < _NEAR:
@@ -170,19 +172,11 @@ def _changes_sign(before: float, after: float) -> bool:
     return before * after < 0.0 and max(abs(before), abs(after)) > _ROUNDING
 
 
-def _point(kind: Kind, here: Node, ahead: Node, after: int, share: float, node: Node | None) -> BranchPoint:
-    labels = (here.value.label, ahead.value.label)
-    if node is not None:
-        return BranchPoint(kind, node, after, labels)
-    middle = _on_chord(here, ahead, share, here.arc + share * (ahead.arc - here.arc))
-    return BranchPoint(kind, middle, after, labels, sharp=False)
-
-
-def _on_chord(one: Node, other: Node, share: float, arc: float) -> Node:
+def _on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
     """Return the place at a share of the straight way between two nodes."""
-    state = one.state + share * (other.state - one.state)
+    state = begin.state + share * (end.state - begin.state)
     return replace(
-        one, state=state, parameter=one.parameter + share * (other.parameter - one.parameter), arc=arc
+        begin, state=state, parameter=begin.parameter + share * (end.parameter - begin.parameter), arc=arc
     )
 
 

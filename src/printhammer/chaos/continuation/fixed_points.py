@@ -88,14 +88,8 @@ class Node:
 class Corrector:
     """Corrects points onto the curves of one map family.
 
-    Parameters
-    ----------
-    family : callable
-        The map.
-    scales : array, shape (n + 1,)
-        By which the components of the state, and last the parameter, are divided.
-    precision : float
-        Scaled correction below which a point is on a curve.
+    The components of the state, and last the parameter, are divided by the scales, shape (n + 1,); a point is
+    on a curve where its scaled correction is below the precision.
     """
 
     def __init__(self, family: MapFamily, scales: npt.ArrayLike, precision: float) -> None:
@@ -191,15 +185,15 @@ def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node 
 
     The way is measured along the tangent of the first; the guess is the cubic through both.
     """
-    one, other = follower.point(here), follower.point(ahead)
-    chord = float(np.linalg.norm(other - one))
+    begin, end = follower.point(here), follower.point(ahead)
+    chord = float(np.linalg.norm(end - begin))
     h = share
     z = (
-        (1.0 + 2.0 * h) * (1.0 - h) ** 2 * one
+        (1.0 + 2.0 * h) * (1.0 - h) ** 2 * begin
         + h * (1.0 - h) ** 2 * chord * here.tangent
-        + h * h * (3.0 - 2.0 * h) * other
+        + h * h * (3.0 - 2.0 * h) * end
         - h * h * (1.0 - h) * chord * ahead.tangent
     )
-    level = float(here.tangent @ one) + share * float(here.tangent @ (other - one))
+    level = float(here.tangent @ begin) + share * float(here.tangent @ (end - begin))
     z = z + (level - float(here.tangent @ z)) * here.tangent
     return follower.correct(z, here.tangent, arc=here.arc + share * (ahead.arc - here.arc))

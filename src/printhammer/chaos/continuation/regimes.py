@@ -153,12 +153,8 @@ def regimes(
         How often the orbits born at period doublings are followed as well.
     waveform, overlap
         Of a hammer: as for `printhammer.Regime.of`.
-    most : int, optional
-        Number of steps of a branch in either direction.
-    tolerance : float, optional
-        Error allowed in one step of the runs.
-    threads : int, optional
-        By default as many as there are cores; the branches do not depend on it.
+    most, tolerance, threads
+        As for `printhammer.continuation`, for every branch.
     progress : callable, optional
         Called now and then with the amount of work that is done and of all that is known yet.
 

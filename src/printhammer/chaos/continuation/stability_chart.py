@@ -232,7 +232,9 @@ def stability_chart(
     if min(grid) < 0:
         raise InputError(f"grid = {grid!r}, expected two numbers of values, not negative")
     chart = _Chart(branch, second, ends, Steps(most=read_count(most, "most"), precision=_PRECISION))
-    limits = [event for event in branch.events if event.kind in _TESTS and _is_limit(event)]
+    # The other multiplier lies inside the unit circle there.
+    lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + _SAME]
+    limits = [event for event in lost if event.kind in _TESTS]
     curves, refused = chart.curves(limits, thread_count(threads), progress)
     axes, settled = _grid(branch, second, ends, grid, threads)
     return StabilityChart(
@@ -246,11 +248,6 @@ def stability_chart(
         settled=settled,
         refused=tuple(refused),
     )
-
-
-def _is_limit(event: BranchEvent) -> bool:
-    """Return whether the other multiplier lies inside the unit circle at an event."""
-    return bool(np.abs(event.multipliers).max() < 1.0 + _SAME)
 
 
 class _Chart:
@@ -342,27 +339,21 @@ class _Chart:
         branch, test = self.branch, _TESTS[kind]
         scale = float(self.scales[2])
 
-        def images(points: list[tuple[FloatArray, float]]) -> list[tuple[FloatArray, FloatArray]] | str:
-            values = []
-            for whole, other in points:
-                try:
-                    regime = branch.regime.with_(self.second, other).with_(branch.parameter, float(whole[2]))
-                except InputError as error:
-                    return str(error)
-                image = image_of(regime, whole[:2], branch.firings, branch.tolerance, contacts=False)
-                if not image.ok or not np.isfinite(image.jacobian).all():
-                    return image.status if not image.ok else "no derivative"
-                values.append((image.state, image.jacobian))
-            return values
-
         def family(whole: FloatArray, other: float) -> MapValue:
             moves = _SPACING * self.scales
             points = [(whole, other)]
             points += [(whole + moves[k] * np.eye(3)[k], other) for k in range(3)]
             points.append((whole, other + moves[3]))
-            values = images(points)
-            if isinstance(values, str):
-                return MapValue.none(3, values)
+            values = []
+            for point, second in points:
+                try:
+                    regime = branch.regime.with_(self.second, second).with_(branch.parameter, float(point[2]))
+                except InputError as error:
+                    return MapValue.none(3, str(error))
+                end = image_of(regime, point[:2], branch.firings, branch.tolerance, contacts=False)
+                if not end.ok or not np.isfinite(end.jacobian).all():
+                    return MapValue.none(3, "no derivative" if end.ok else end.status)
+                values.append((end.state, end.jacobian))
             (image, jacobian), *beside = values
             value = scale * test(jacobian)
             slopes = [(scale * test(near) - value) / moves[k] for k, (_, near) in enumerate(beside)]

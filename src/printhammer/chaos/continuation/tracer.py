@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -48,13 +48,7 @@ _DIGITS: Final = ".9g"
 def read_bounds(
     regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
 ) -> tuple[float, float]:
-    """Return the ends of a range of a constant, SI.
-
-    Raises
-    ------
-    InputError
-        There is no such constant, or the ends are not two ascending numbers.
-    """
+    """Return the ends of a range of a constant, SI; InputError where they are not two ascending numbers."""
     unit = regime.quantity(parameter).si
     try:
         low, high = bounds
@@ -66,20 +60,19 @@ def read_bounds(
     return ends
 
 
+@dataclass
 class Tracer:
     """What all branches along one constant of one regime have in common."""
 
-    def __init__(
-        self,
-        regime: Regime,
-        parameter: str,
-        bounds: tuple[float, float],
-        tolerance: float,
-        threads: int | None,
-    ) -> None:
-        self.regime, self.parameter, self.bounds = regime, parameter, bounds
-        self.tolerance, self.threads = tolerance, threads
-        self.scales = np.append(regime.window.half_widths, (bounds[1] - bounds[0]) / _PARTS)
+    regime: Regime
+    parameter: str
+    bounds: tuple[float, float]
+    tolerance: float
+    threads: int | None
+
+    def __post_init__(self) -> None:
+        part = (self.bounds[1] - self.bounds[0]) / _PARTS
+        self.scales = np.append(self.regime.window.half_widths, part)
 
     def family(self, firings: int) -> RegimeFamily:
         """Return the strobe map over so many firings."""

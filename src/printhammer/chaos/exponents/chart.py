@@ -76,7 +76,8 @@ class LyapunovChart(Result, rows="period"):
             raise InputError("periods: expected at least one train")
         points = trains[0].points
         firings = int(points.firing[0]), int(points.firing[-1])
-        return _chart(points.hammer, points.drive, firings, points.tolerance, [_row(one) for one in trains])
+        rows = [_row(train) for train in trains]
+        return _chart(points.hammer, points.drive, firings, points.tolerance, rows)
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
         """Return all columns over `period`, and both exponents side by side."""
@@ -111,10 +112,8 @@ def lyapunovs(
         Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
     firings, transient, tolerance
         As for `lyapunov`, for all trains.
-    threads : int, optional
-        By default as many as there are cores; the results do not depend on it.
-    progress : callable, optional
-        Called now and then with the number of trains that are done and of all.
+    threads, progress
+        As for `printhammer.chaos.strobes`.
 
     Returns
     -------

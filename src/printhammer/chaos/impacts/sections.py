@@ -179,10 +179,8 @@ def sections(
         Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
     surface, touches, transient, firings, tolerance
         As for `section`, for all trains.
-    threads : int, optional
-        By default as many as there are cores; the touches do not depend on it.
-    progress : callable, optional
-        Called now and then with the number of trains that are done and of all.
+    threads, progress
+        As for `printhammer.chaos.strobes`.
 
     Returns
     -------

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.chaos.orbits.newton import Guess
 from printhammer.chaos.strobe.map import WITH_MEMORY, front_with_memory
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.chaos.orbits.newton import Closing
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
@@ -52,16 +52,6 @@ class Records:
     """Displacement, m, and velocity, m/s; NaN where a run did not get. Shape (M, n, 2)."""
     usable: npt.NDArray[np.bool_]
     """Whether that is the whole state, shape (M, n)."""
-
-
-@dataclass(frozen=True)
-class Guess:
-    """A stretch of a motion that nearly closes."""
-
-    states: FloatArray
-    """States at the starts of the segments, shape (m, 2)."""
-    firings: npt.NDArray[np.int64]
-    """Number of firings in each, shape (m,)."""
 
 
 def record(
@@ -175,20 +165,20 @@ def close_returns(records: Records, period: int, most: int, scales: FloatArray) 
     return guesses
 
 
-def joined(shorter: Sequence[Closing], period: int, most: int, scales: FloatArray) -> list[Guess]:
+def joined(shorter: Sequence[Guess], period: int, most: int, scales: FloatArray) -> list[Guess]:
     """Return guesses of `period` firings made of two shorter orbits, one run through after the other.
 
     `most` at most, those with the smallest jump from one orbit to the other first.
     """
     guesses: list[tuple[float, Guess]] = []
-    for k, one in enumerate(shorter):
+    for k, orbit in enumerate(shorter):
         for other in shorter[:k]:
-            if int(one.firings.sum() + other.firings.sum()) != period:
+            if int(orbit.firings.sum() + other.firings.sum()) != period:
                 continue
-            gaps = np.abs((one.states[:, np.newaxis] - other.states) / scales).max(axis=2)
+            gaps = np.abs((orbit.states[:, np.newaxis] - other.states) / scales).max(axis=2)
             here, there = (int(place) for place in np.unravel_index(np.argmin(gaps), gaps.shape))
-            states = [np.roll(one.states, -here, axis=0), np.roll(other.states, -there, axis=0)]
-            firings = [np.roll(one.firings, -here), np.roll(other.firings, -there)]
+            states = [np.roll(orbit.states, -here, axis=0), np.roll(other.states, -there, axis=0)]
+            firings = [np.roll(orbit.firings, -here), np.roll(other.firings, -there)]
             guess = Guess(np.concatenate(states), np.concatenate(firings))
             guesses.append((float(gaps[here, there]), guess))
     return [guess for _gap, guess in sorted(guesses, key=lambda pair: pair[0])[:most]]

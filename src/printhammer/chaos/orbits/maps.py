@@ -6,15 +6,21 @@ derivative from their differences: good enough for Newton's method to come close
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.chaos.orbits.newton import CLOSED, Images
-from printhammer.chaos.strobe.map import IN_PACK, WITH_MEMORY, Image, image_of, usable
-from printhammer.errors import InputError
+from printhammer.chaos.strobe.map import (
+    IN_PACK,
+    RANGE_LEFT,
+    WITH_MEMORY,
+    Image,
+    image_of,
+    possible,
+    usable,
+)
 from printhammer.run.ensemble import Ensemble
-from printhammer.run.start import initial_state
 from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
@@ -23,7 +29,6 @@ if TYPE_CHECKING:
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
-RANGE_LEFT: Final = "range left"
 _SPACING: Final = 1e-5
 """Distance of neighbours, in half-widths of the window."""
 _PIECE: Final = 30_000
@@ -62,56 +67,40 @@ class FastMaps:
     def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
         """Return the images of states, each after its own number of firings."""
         images = Images.empty(len(states))
-        step = _SPACING * self.scales
+        step, hammer = _SPACING * self.scales, self.regime.hammer
         neighbours = states[:, np.newaxis] + np.array([[0.0, 0.0], [step[0], 0.0], [0.0, step[1]]])
-        allowed = np.array([all(self._possible(row) for row in three) for three in neighbours], np.bool_)
+        allowed, whole = (
+            np.array([all(test(hammer, x, v) for x, v in three) for three in neighbours], np.bool_)
+            for test in (possible, usable)
+        )
         images.reasons[~allowed] = RANGE_LEFT
-        out = np.array(
-            [not all(usable(self.regime.hammer, x, v) for x, v in three) for three in neighbours], np.bool_
-        )
-        images.reasons[allowed & out] = IN_PACK
-        rows = np.flatnonzero(allowed & ~out)
-        for begin in range(0, len(rows), _PIECE // 3):
-            self._piece(rows[begin : begin + _PIECE // 3], neighbours, firings, images, step)
+        images.reasons[allowed & ~whole] = IN_PACK
+        every = np.flatnonzero(allowed & whole)
+        for begin in range(0, len(every), _PIECE // 3):
+            rows = every[begin : begin + _PIECE // 3]
+            ends = np.repeat(self.moments[firings[rows]], 3)
+            ensemble = Ensemble(
+                hammer,
+                self.drive,
+                ends,
+                states=neighbours[rows].reshape(-1, 2),
+                starts=float(self.moments[0]),
+                tolerance=self.tolerance,
+            )
+            strobes: Any = ends[:, np.newaxis]
+            result = ensemble.run(strobes=strobes, threads=self.threads)
+            table = result.strobes
+            assert table is not None
+            shape = (len(rows), 3)
+            final = np.stack([table.x[:, 0].reshape(shape), table.v[:, 0].reshape(shape)], axis=2)
+            kept = np.isin(table.branch[:, 0].reshape(shape), WITH_MEMORY).any(axis=1)
+            names = np.array(result.status_names).reshape(shape)
+            stopped = ~result.ok.reshape(shape)
+            images.states[rows] = final[:, 0]
+            slopes = [(final[:, 1 + k] - final[:, 0]) / step[k] for k in range(2)]
+            images.jacobians[rows] = np.stack(slopes, axis=2)
+            images.smooth[rows] = True
+            why = np.where(kept, IN_PACK, CLOSED)
+            first = np.argmax(stopped, axis=1)
+            images.reasons[rows] = np.where(stopped.any(axis=1), names[np.arange(len(rows)), first], why)
         return images
-
-    def _possible(self, state: FloatArray) -> bool:
-        try:
-            initial_state(self.regime.hammer, (float(state[0]), float(state[1])))
-        except InputError:
-            return False
-        return True
-
-    def _piece(
-        self,
-        rows: npt.NDArray[np.int64],
-        neighbours: FloatArray,
-        firings: npt.NDArray[np.int64],
-        images: Images,
-        step: FloatArray,
-    ) -> None:
-        ends = np.repeat(self.moments[firings[rows]], 3)
-        ensemble = Ensemble(
-            self.regime.hammer,
-            self.drive,
-            ends,
-            states=neighbours[rows].reshape(-1, 2),
-            starts=float(self.moments[0]),
-            tolerance=self.tolerance,
-        )
-        result = ensemble.run(strobes=ends[:, np.newaxis], threads=self.threads)  # type: ignore[arg-type]
-        table = result.strobes
-        assert table is not None
-        shape = (len(rows), 3)
-        final = np.stack([table.x[:, 0].reshape(shape), table.v[:, 0].reshape(shape)], axis=2)
-        kept = np.isin(table.branch[:, 0].reshape(shape), WITH_MEMORY).any(axis=1)
-        names = np.array(result.status_names).reshape(shape)
-        stopped = ~result.ok.reshape(shape)
-        images.states[rows] = final[:, 0]
-        slopes = [(final[:, 1 + k] - final[:, 0]) / step[k] for k in range(2)]
-        images.jacobians[rows] = np.stack(slopes, axis=2)
-        images.smooth[rows] = True
-        why = np.where(kept, IN_PACK, CLOSED)
-        first = np.argmax(stopped, axis=1)
-        failed = stopped.any(axis=1)
-        images.reasons[rows] = np.where(failed, names[np.arange(len(rows)), first], why)

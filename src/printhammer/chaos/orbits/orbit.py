@@ -373,8 +373,16 @@ def _contacts_and_dots(
         if contact.initial or not begin <= contact.t_in < begin + period:
             continue
         back = run.fired_at + (period if contact.t_in - run.fired_at >= period else 0.0)
-        fired = None if contact.firing is None else (contact.firing - before) % firings
-        contacts.append(_earlier(contact, back, fired if regime.drive is None else None))
+        fired = contact.firing if regime.drive is None else None
+        contacts.append(
+            replace(
+                contact,
+                t_in=contact.t_in - back,
+                t_out=None if contact.t_out is None else contact.t_out - back,
+                t_peak=contact.t_peak - back,
+                firing=None if fired is None else (fired - before) % firings,
+            )
+        )
     contacts.sort(key=lambda contact: contact.t_in)
     if regime.drive is not None:
         return tuple(contacts), ()
@@ -386,27 +394,16 @@ def _contacts_and_dots(
     return tuple(contacts), tuple(dots)
 
 
-def _earlier(contact: Contact, back: float, firing: int | None) -> Contact:
-    """Return a contact with times on another axis."""
-    return replace(
-        contact,
-        t_in=contact.t_in - back,
-        t_out=None if contact.t_out is None else contact.t_out - back,
-        t_peak=contact.t_peak - back,
-        firing=firing,
-    )
-
-
 def _numbers(values: Iterable[float | None]) -> FloatArray:
     return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
 
 
-def orbits_table(found: Sequence[Orbit], attributes: Mapping[str, Any]) -> pd.DataFrame:
+def orbits_table(orbits: Sequence[Orbit], attributes: Mapping[str, Any]) -> pd.DataFrame:
     """Return orbits as a table, a row for each firing of each."""
     import pandas as pd
 
     tables = []
-    for number, orbit in enumerate(found):
+    for number, orbit in enumerate(orbits):
         columns: dict[str, Any] = {"orbit": np.full(orbit.firings, number)}
         entries = orbit.entries()
         for name, (note, value) in entries.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
 
-    from printhammer.chaos.orbits.guesses import Guess, Records
+    from printhammer.chaos.orbits.guesses import Records
+    from printhammer.chaos.orbits.newton import Guess
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
@@ -173,8 +174,7 @@ def orbits(
     if most > MOST_FIRINGS:
         raise InputError(f"longest = {most}, expected at most {MOST_FIRINGS} firings")
     check_tolerance(tolerance)
-    search = _Search(regime, most, several, tolerance, thread_count(threads), progress)
-    return search.run(count)
+    return _Search(regime, most, several, tolerance, thread_count(threads), progress).run(count)
 
 
 def orbit(
@@ -199,10 +199,8 @@ def orbit(
     phase : float, optional
         Instead of that of the regime. The armature must not be on its way out of the pack there, where the
         state has a memory.
-    tolerance : float, optional
-        Error allowed in one step of the runs.
-    threads : int, optional
-        By default as many as there are cores.
+    tolerance, threads
+        As for `orbits`.
 
     Returns
     -------
@@ -249,23 +247,21 @@ def shortest(closing: Closing, scales: FloatArray) -> Closing:
     return closing
 
 
+@dataclass
 class _Search:
     """A search that is under way."""
 
-    def __init__(
-        self,
-        regime: Regime,
-        longest: int,
-        several: int,
-        tolerance: float,
-        threads: int,
-        progress: Progress | None,
-    ) -> None:
-        self.regime, self.longest, self.several = regime, longest, several
-        self.tolerance, self.threads, self.progress = tolerance, threads, progress
-        self.scales = regime.window.half_widths
+    regime: Regime
+    longest: int
+    several: int
+    tolerance: float
+    threads: int
+    progress: Progress | None
+
+    def __post_init__(self) -> None:
+        self.scales = self.regime.window.half_widths
         self.failures: Counter[str] = Counter()
-        self.tried = [0] * longest
+        self.tried = [0] * self.longest
         self.repeats = 0
         self.done, self.all = 0, 1
 
@@ -348,20 +344,20 @@ class _Search:
             different, key=lambda orbit: (orbit.firings, KINDS.index(orbit.kind), *orbit.x, *orbit.v)
         )
 
-    def _same(self, one: Orbit, other: Orbit) -> bool:
-        if one.firings != other.firings:
+    def _same(self, orbit: Orbit, other: Orbit) -> bool:
+        if orbit.firings != other.firings:
             return False
         gaps = np.maximum(
-            np.abs(one.x[0] - other.x) / self.scales[0], np.abs(one.v[0] - other.v) / self.scales[1]
+            np.abs(orbit.x[0] - other.x) / self.scales[0], np.abs(orbit.v[0] - other.v) / self.scales[1]
         )
         nearest = int(np.argmin(gaps))
-        memory = abs(one.memory[0] - other.memory[nearest]) / self.scales[0]
-        return bool(max(gaps[nearest], memory) <= _SAME and one.branch[0] == other.branch[nearest])
+        memory = abs(orbit.memory[0] - other.memory[nearest]) / self.scales[0]
+        return bool(max(gaps[nearest], memory) <= _SAME and orbit.branch[0] == other.branch[nearest])
 
 
 def _closed(
     maps: ExactMaps | FastMaps,
-    tried: Sequence[Guess] | Sequence[Closing],
+    tried: Sequence[Guess],
     scales: FloatArray,
     options: Mapping[str, Any],
 ) -> list[Closing]:

@@ -49,7 +49,9 @@ WITH_MEMORY: Final = tuple(
 )
 """Modes whose state has a memory."""
 _OK: Final = "ok"
-_RANGE_LEFT: Final = "range left"
+RANGE_LEFT: Final = "range left"
+"""Status where no motion can be at a displacement."""
+
 _TURN_STEPS: Final = 60
 _STILL: Final = 1e-9
 """Speed, in units of the typical one, below which an extremum is found: its place is exact to the square."""
@@ -171,10 +173,8 @@ def strobe_maps(
         Displacements, m, and velocities, m/s.
     firings, phase, tolerance, contacts
         As for `strobe_map`, for all.
-    threads : int, optional
-        By default as many as there are cores; the images do not depend on it.
-    progress : callable, optional
-        Called now and then with the number of images that are done and of all.
+    threads, progress
+        As for `printhammer.chaos.strobes`.
 
     Raises
     ------
@@ -255,11 +255,10 @@ def image_of(
     """Do as `strobe_map` with arguments that are known to be right."""
     train, _ = regime.train(firings)
     moments = regime.moments(train, firings)
-    try:
-        start = initial_state(regime.hammer, (float(state[0]), float(state[1])))
-    except InputError:
-        return _no_image(_RANGE_LEFT)
-    if not usable(regime.hammer, start[0], start[1]):
+    start = float(state[0]), float(state[1])
+    if not possible(regime.hammer, *start):
+        return _no_image(RANGE_LEFT)
+    if not usable(regime.hammer, *start):
         return _no_image(IN_PACK)
     problem = Problem(regime.hammer, train, start, float(moments[0]), tolerance)
     followed = follow(problem, moments[[0, -1]], np.eye(3), renormalise=False)
@@ -281,6 +280,15 @@ def image_of(
         contacts=touched,
         margin=margin,
     )
+
+
+def possible(hammer: Hammer, x: float, v: float) -> bool:
+    """Whether a motion can begin with a displacement, m, and a velocity, m/s."""
+    try:
+        initial_state(hammer, (x, v))
+    except InputError:
+        return False
+    return True
 
 
 def usable(hammer: Hammer, x: float, v: float) -> bool:

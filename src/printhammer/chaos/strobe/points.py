@@ -185,7 +185,7 @@ def strobes(
         Whether to compute the exponent of periodic trains too, which takes several times as long as their
         points and does not change the verdict.
     threads : int, optional
-        By default as many as there are cores; the points do not depend on it.
+        By default as many as there are cores; the results do not depend on it.
     progress : callable, optional
         Called now and then with the amount of work that is done and of all.
 
@@ -228,12 +228,9 @@ def strobes(
 
 
 def points_of(series: Any, firing: Firing) -> Any:
-    """Return the settled strobe points of a regime, or of a hammer and how it is fired; else what is given.
+    """Return the settled strobe points of a regime, or of a hammer and how it is fired; others as they are.
 
-    Raises
-    ------
-    InputError
-        As for `strobe`; or points are given, and how to fire beside them.
+    InputError as for `strobe`, or where there are points, and how to fire beside them.
     """
     if isinstance(series, Hammer | Regime):
         return strobe(series, points=_SETTLED, transient=_SETTLED, verdict=False, **firing)

@@ -11,7 +11,7 @@ import numpy as np
 from printhammer.chaos.strobe.verdict import period_of, repeats, verdict
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.window import window_of
-from printhammer.support.threads import mapped
+from printhammer.support.threads import mapped, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -122,11 +122,6 @@ def run_trains(
     if not trains:
         return [], []
     total = len(trains)
-
-    def tell(done: int) -> None:
-        if progress is not None:
-            progress(done, total if judged is None else 2 * total)
-
     firings = np.arange(judged[0], judged[1] + 1) if judged is not None else np.zeros(0, np.int64)
     own = [train.times(chosen) + train.regime.phase * train.period for train in trains]
     theirs = [train.times(firings) for train in trains]
@@ -141,7 +136,8 @@ def run_trains(
         states=None if None in begun else np.array(begun),
         tolerance=tolerance,
     )
-    result = ensemble.run(strobes=every, threads=threads, progress=lambda done, _all: tell(done))
+    tell = shifted(progress, 0, total if judged is None else 2 * total)
+    result = ensemble.run(strobes=every, threads=threads, progress=tell)
     table, names = result.strobes, result.status_names
     assert table is not None
 
@@ -160,13 +156,9 @@ def run_trains(
     open_cases = [
         i for i in range(total) if not stopped[i] and (every_exponent or period_of(distances[i]) is None)
     ]
-    before = 2 * total - len(open_cases)
+    tell = shifted(progress, 2 * total - len(open_cases), 2 * total)
     exponents = exponents_of(
-        [trains[i] for i in open_cases],
-        judged,
-        tolerance,
-        threads=threads,
-        progress=lambda done, _all: tell(before + done),
+        [trains[i] for i in open_cases], judged, tolerance, threads=threads, progress=tell
     )
     growth = dict(zip(open_cases, exponents, strict=True))
     return states, [verdict(distances[i], judged, tolerance, growth.get(i), stopped[i]) for i in range(total)]
