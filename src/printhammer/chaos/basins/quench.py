@@ -232,16 +232,14 @@ def quench_map(
     alone = simulate(hammer, PulseTrain(pulse), duration=pulse.support + wait, tolerance=tolerance).dots[0]
     seconds = [type(pulse)(**{**dict(pulse), "width": width}) for width in wide.tolist()]
     drives = two_pulse_drives(pulse, seconds, float(times[-1]) + max(wait, pulse.support))
-    shape = times.size, wide.size
-    struck, status = np.zeros(shape, np.bool_), np.full(shape, "ok", "U16")
-    peak, force, flight = (np.full(shape, np.nan) for _ in range(3))
     rows = max(1, _PIECE // wide.size)
+    pieces = []
     for first in range(0, times.size, rows):
-        part = slice(first, min(first + rows, times.size))
         tell = shifted(progress, first * wide.size, times.size * wide.size)
-        pieces = _piece(hammer, drives, times[part], wait, tolerance, threads, tell)
-        for whole, piece in zip((struck, status, peak, force, flight), pieces, strict=True):
-            whole[part] = piece.reshape(whole[part].shape)
+        pieces.append(_piece(hammer, drives, times[first : first + rows], wait, tolerance, threads, tell))
+    struck, status, peak, force, flight = (
+        np.concatenate(parts).reshape(times.size, wide.size) for parts in zip(*pieces, strict=True)
+    )
     return QuenchMap(
         hammer=hammer,
         waveform=pulse,

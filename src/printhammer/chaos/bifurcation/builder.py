@@ -63,18 +63,14 @@ class DiagramBuilder:
         put(longer, np.arange(len(table.regimes)), table.columns)
         scales = np.repeat(scales_of_columns(regimes), len(self.ways), axis=0)
         nothing = np.full(len(every), np.nan)
-        self.table = Trains(
-            [*table.regimes, *every],
-            longer,
-            np.concatenate([table.cycles, np.zeros(len(every), np.int64)]),
-            np.concatenate([table.distances, nothing]),
-            np.concatenate([table.scales, scales]),
-            table.carried,
-        )
-        self.exponents = np.concatenate([self.exponents, nothing])
-        self.errors = np.concatenate([self.errors, nothing])
-        self.values = np.concatenate([self.values, values])
-        self.levels = np.concatenate([self.levels, np.full(len(values), level)])
+        table.regimes += every
+        table.columns = longer
+        table.cycles = np.append(table.cycles, np.zeros(len(every), np.int64))
+        table.distances = np.append(table.distances, nothing)
+        table.scales = np.concatenate([table.scales, scales])
+        self.exponents, self.errors = np.append(self.exponents, nothing), np.append(self.errors, nothing)
+        self.values = np.append(self.values, values)
+        self.levels = np.append(self.levels, np.full(len(values), level))
         self.known += len(every)
         return list(range(first, len(self.values)))
 
