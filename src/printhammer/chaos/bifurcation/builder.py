@@ -18,7 +18,7 @@ from printhammer.chaos.bifurcation.columns import (
     put,
     run_columns,
     scales_of_columns,
-    usable,
+    state_or_rest,
 )
 from printhammer.chaos.strobe.train import exponents_onward
 
@@ -82,7 +82,7 @@ class DiagramBuilder:
         """Run the trains at the values that were given."""
         places = self.add(grid, 0)
         if self.ways == ("from rest",):
-            self.run(places, np.array([usable(self.table.regimes[row], self.begin) for row in places]))
+            self.run(places, np.array([state_or_rest(self.table.regimes[row], self.begin) for row in places]))
             return
         strands: list[Strand] = []
         for way, name in enumerate(self.ways):
@@ -110,7 +110,7 @@ class DiagramBuilder:
             befores = self.rows([pair[0 if name == "up" else 1] for pair, _middle in new], way)
             for row, before in zip(self.rows(places, way), befores, strict=True):
                 begin = self.begin if name == "from rest" else self.table.columns.handed(before)
-                states.append(usable(self.table.regimes[row], begin))
+                states.append(state_or_rest(self.table.regimes[row], begin))
         self.run(rows, np.array(states))
 
     def differ(self, place: int, neighbour: int) -> bool:

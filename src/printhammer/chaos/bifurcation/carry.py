@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.columns import OK, Columns, orbit_distance, put, usable
+from printhammer.chaos.bifurcation.columns import OK, Columns, orbit_distance, put, state_or_rest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -85,7 +85,8 @@ def carry(
     for k in range(max(len(strand.rows) for strand in strands)):
         long = [strand.rows for strand in strands if k < len(strand.rows)]
         begun = [
-            usable(table.regimes[rows[k]], table.columns.handed(rows[k - 1]) if k else start) for rows in long
+            state_or_rest(table.regimes[rows[k]], table.columns.handed(rows[k - 1]) if k else start)
+            for rows in long
         ]
         run([rows[k] for rows in long], np.array(begun))
     open_ = {(number, 0) for number, strand in enumerate(strands) if strand.before >= 0}
@@ -98,7 +99,7 @@ def carry(
             for number, place in order
         ]
         states = [
-            usable(table.regimes[row], table.columns.handed(before))
+            state_or_rest(table.regimes[row], table.columns.handed(before))
             for before, row in zip(ended, rows, strict=True)
         ]
         columns, cycles, distances = trial(rows, np.array(states))

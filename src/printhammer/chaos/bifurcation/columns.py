@@ -209,7 +209,7 @@ def handed_on(hammer: Hammer, x: float, v: float, mode: int, memory: float) -> S
     return x, v, float(branch), memory
 
 
-def usable(regime: Regime, state: State) -> State:
+def state_or_rest(regime: Regime, state: State) -> State:
     """Return a state that was handed on, or `FROM_REST` where this hammer cannot begin with it."""
     if math.isnan(state[0]):
         return FROM_REST

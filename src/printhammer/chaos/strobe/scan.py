@@ -16,12 +16,11 @@ standard errors, more than the verdict asks for; where it is not, it is computed
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.chaos.strobe.train import Train, exponents_of, run_trains
+from printhammer.chaos.strobe.train import Train, exponents_of, exponents_onward, run_trains
 from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, period_of, verdict
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
@@ -46,10 +45,9 @@ CLOSER: Final = 1e-2
 LARGEST_MULTIPLIER: Final = 0.99
 """Largest absolute value of an eigenvalue with which it does."""
 
-_BEFORE: Final = 100
-_SHORT: Final = 300
+_SHORT: Final = 301
 _SURE: Final = 5.0
-"""Firings before an exponent counts, firings over which it does, standard errors that it takes."""
+"""Firings over which an exponent counts at first, and standard errors that it takes then."""
 
 
 def scan(
@@ -173,15 +171,11 @@ def _followed(
         for i, (row, why) in enumerate(zip(distances, stopped, strict=True))
         if why or not exponents or period_of(row) is not None
     }
-    short = (_BEFORE + 1, _BEFORE + _SHORT + 1)
     left = [i for i in range(len(trains)) if i not in verdicts]
     # A start inside the pack would need its memory; such a train gets its exponent the long way.
     on_it = [i for i in left if not _in_pack(trains[i], states[i], 0)]
-    # The train goes on from the first of its states, as if nothing had been fired before.
-    begun = [
-        replace(trains[i], drive=trains[i].regime.pulses(short[1]), state=_state(states[i], 0)) for i in on_it
-    ]
-    for i, exponent in zip(on_it, exponents_of(begun, short, tolerance, threads=threads), strict=True):
+    begun = [(trains[i].regime, _state(states[i], 0)) for i in on_it]
+    for i, exponent in zip(on_it, exponents_onward(begun, _SHORT, tolerance, threads=threads), strict=True):
         if exponent.smooth and exponent.value > _SURE * exponent.standard_error:
             verdicts[i] = verdict(distances[i], judged, tolerance, exponent)
     left = [i for i in left if i not in verdicts]

@@ -172,7 +172,10 @@ def exponents_onward(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> list[Exponent]:
-    """Return the largest exponents of trains that go on from states at a firing, over so many firings."""
+    """Return the largest exponents of trains that go on from states at a firing.
+
+    Over so many points, after a hundred firings.
+    """
     window = _BEFORE + 1, _BEFORE + points
     # What is left of the pulses before is left out: it is the same for all neighbouring motions.
     trains = [Train(regime, regime.pulses(window[1] + 2), state) for regime, state in begun]
