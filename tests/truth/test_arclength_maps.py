@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from printhammer.chaos.continuation.arclength import Corrector, Curve, MapFamily, MapValue, Steps, follow
-from printhammer.chaos.continuation.branch_points import birth_of, follow_doubled, iterated, points_of
+from printhammer.chaos.continuation.arclength import Curve, Steps, follow
+from printhammer.chaos.continuation.branch_points import birth_of, follow_doubled, points_of
+from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, MapValue
 
 STEPS = Steps(precision=1e-12, most=200)
 SHARP = 1e-9
@@ -44,6 +45,23 @@ def delayed_logistic(u: Any, p: float) -> MapValue:
 def ring(u: Any, p: float) -> MapValue:
     """Fixed points on the unit circle of state and parameter."""
     return MapValue(u + 0.3 * (1.0 - u * u - p * p), np.array([[1.0 - 0.6 * u[0]]]), np.array([-0.6 * p]))
+
+
+def iterated(family: MapFamily, times: int) -> MapFamily:
+    """A map applied so many times, with its derivatives by the chain rule and the sequence of its labels."""
+
+    def repeated(u: Any, p: float) -> MapValue:
+        image, jacobian, slope = u, np.eye(len(u)), np.zeros(len(u))
+        labels: list[Any] = []
+        for _ in range(times):
+            value = family(image, p)
+            if value.trouble:
+                return MapValue.none(len(u), value.trouble)
+            image, labels = value.image, [*labels, value.label]
+            jacobian, slope = value.jacobian @ jacobian, value.jacobian @ slope + value.slope
+        return MapValue(image, jacobian, slope, tuple(labels))
+
+    return repeated
 
 
 def places(family: MapFamily, curve: Curve, scales: Any) -> dict[str, list[float]]:

@@ -7,7 +7,8 @@ import pytest
 from tests.truth.impact_orbits import BouncingBall, LinearImpacts
 
 import printhammer as ph
-from printhammer.chaos.continuation.continuation import Branch, continuation
+from printhammer.chaos.continuation.branch import Branch
+from printhammer.chaos.continuation.continuation import continuation
 from printhammer.chaos.continuation.stability_chart import stability_chart
 
 SHARP = 1e-8

@@ -36,6 +36,11 @@ def thread_count(threads: int | None) -> int:
     return int(threads)
 
 
+def shifted(progress: Progress | None, begun: int, total: int) -> Progress | None:
+    """Return what a part of some work calls as its progress: after `begun` numbers, of `total` in all."""
+    return None if progress is None else lambda done, _all: progress(begun + done, total)
+
+
 def mapped(
     function: Callable[[A], B],
     items: Sequence[A],

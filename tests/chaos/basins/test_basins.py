@@ -126,7 +126,7 @@ def columns_of(points: np.ndarray) -> Columns:
 
 
 def test_orbits_are_known_again_whatever_their_phase(hammer: "ph.Hammer") -> None:
-    attractors = Attractors(Regime.of(hammer, period=1e-3), np.ones(3), 1e-9, 1)
+    attractors = Attractors(Regime.of(hammer, period=1e-3), np.ones(3), 1e-9)
     first = np.array([[3.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
     other = np.array([[3.0, 0.0], [2.0, 0.0], [1.0, 0.0]])
     trains = np.stack(

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.chaos.basins.quench import QuenchMap, two_pulse_drive
+from printhammer.chaos.basins.quench import QuenchMap, TwoPulseDrive, two_pulse_drives
 from printhammer.drive.segments import table
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
 
@@ -91,7 +91,8 @@ def test_the_drive_fires_two_different_pulses(
     more = {} if shape is HalfSine else more
     pulses = [shape(amplitude=0.9, width=width, **more) for width in (first, second)]
     last = gap + 1e-3
-    drive = two_pulse_drive(*pulses, gap, last)
+    (drive,) = two_pulse_drives(pulses[0], pulses[1:], last)
+    drive = drive.with_firings(TwoPulseDrive.firings(0.5 * drive.begin, gap))
     t = at * last
     expected = pulses[0].value(t) + pulses[1].value(t - gap)
     # Times count from later on in the drive, and are rounded there.

@@ -297,7 +297,7 @@ def test_windows_and_the_series_of_doublings() -> None:
 
 
 def test_trains_that_settle_slowly_do_not_hide_a_series(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept, "_is_strange", lambda *_arguments: False)
+    monkeypatch.setattr(Bifurcation, "_is_strange", lambda *_arguments: False)
     found = diagram({"from rest": [1, 0, 2, 2, 0, 4, 0, 0, 8, -1]}, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10])
     rising, falling = found.routes()
     assert rising.cascade

@@ -3,8 +3,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from printhammer.chaos.continuation.arclength import MapValue, Node, Steps, Stop, follow
+from printhammer.chaos.continuation.arclength import Steps, Stop, follow
 from printhammer.chaos.continuation.branch_points import points_of
+from printhammer.chaos.continuation.fixed_points import MapValue, Node
 from printhammer.errors import InputError
 
 ONE = np.ones(2)

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from printhammer.chaos.bifurcation.columns import OK, cycles_of, run_columns
-from printhammer.chaos.strobe.train import Train, exponents_of
-from printhammer.chaos.strobe.verdict import SIGNIFICANT
+from printhammer.chaos.strobe.train import exponents_onward
+from printhammer.chaos.strobe.verdict import is_positive
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -37,8 +37,6 @@ INSIDE: Final = 0.95
 
 ATTEMPTS: Final = 12
 """Trains without a period that are followed for long, at most, to find strange attractors."""
-
-_BEFORE: Final = 100
 
 
 @dataclass(frozen=True)
@@ -68,23 +66,11 @@ class Attractor:
 class Attractors:
     """The attractors that were found so far, in the order in which they were.
 
-    Parameters
-    ----------
-    regime : Regime
-        Hammer and periodic drive.
-    scales : array, shape (3,)
-        By which differences of displacement, velocity and memory are divided.
-    tolerance : float
-        Of the integration.
-    threads : int or None
-        As for `printhammer.Ensemble.run`.
+    Differences of displacement, velocity and memory are divided by the `scales`, shape (3,).
     """
 
-    def __init__(self, regime: Regime, scales: FloatArray, tolerance: float, threads: int | None) -> None:
-        self.regime = regime
-        self.scales = scales
-        self.tolerance = tolerance
-        self.threads = threads
+    def __init__(self, regime: Regime, scales: FloatArray, tolerance: float) -> None:
+        self.regime, self.scales, self.tolerance = regime, scales, tolerance
         self.found: list[Attractor] = []
         self._trees: dict[int, tuple[cKDTree, float]] = {}
         self._attempts = 0
@@ -168,10 +154,8 @@ class Attractors:
         x, v, branch, _memory = longer.last[0].tolist()
         if branch >= 0.0:
             return None
-        window = (_BEFORE + 1, _BEFORE + CLOUD)
-        train = Train(self.regime, self.regime.pulses(window[1] + 2), (x, v))
-        (exponent,) = exponents_of([train], window, self.tolerance, threads=1)
-        if not (exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error):
+        (exponent,) = exponents_onward([(self.regime, (x, v))], CLOUD, self.tolerance, threads=1)
+        if not is_positive(exponent):
             return None
         cloud = self._scaled(longer.x[0], longer.v[0])
         half = CLOUD // 2

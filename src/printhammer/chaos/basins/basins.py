@@ -18,13 +18,14 @@ import numpy as np
 from printhammer.chaos.basins.attractors import Attractor, Attractors
 from printhammer.chaos.basins.entropy import BOX, BasinEntropy, basin_entropy
 from printhammer.chaos.bifurcation.columns import OK, TOLERANCE, run_columns, scales_of_columns
+from printhammer.chaos.strobe.map import possible
 from printhammer.chaos.strobe.verdict import LARGEST_PERIOD
 from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, coordinate, part
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Regime
-from printhammer.run.start import initial_state
+from printhammer.support.threads import shifted
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -46,7 +47,7 @@ CELLS: Final = 128
 """Cells along each side unless told otherwise."""
 
 MOST_CELLS: Final = 10_000_000
-"""Number of cells above which a plane is refused."""
+"""Number of cells above which a plane is refused, here and by `printhammer.quench_map`."""
 
 UNDECIDED: Final = 0
 FAILED: Final = -1
@@ -206,22 +207,19 @@ def basins(
     if count < _FEWEST:
         raise InputError(f"firings = {firings!r}, expected at least {_FEWEST}")
     window = regime.window
-    across, up = (
-        _axis(given, name, unit, ends)
-        for given, name, unit, ends in ((x, "x", "m", window.x), (v, "v", "m/s", window.v))
-    )
-    if across.size * up.size > MOST_CELLS:
-        raise InputError(f"{across.size} x {up.size} cells, expected at most {MOST_CELLS}")
+    across = read_axis((*window.x, CELLS) if x is None else x, "x", "m")
+    up = read_axis((*window.v, CELLS) if v is None else v, "v", "m/s")
+    check_cells(across.size, up.size)
     cells = np.zeros((up.size, across.size, 4))
     cells[..., 0], cells[..., 1] = across, up[:, np.newaxis]
     cells[..., 2] = -1.0
-    labels, used, status, found = _decided(
+    labels, used, status, attractors = _decided(
         regime, cells.reshape(-1, 4), (count, most, tolerance), threads, progress
     )
     shape = up.size, across.size
-    order = sorted(range(len(found)), key=lambda place: _key(found[place]))
-    number = np.zeros(len(found) + 1, np.int64)
-    number[np.array(order, np.int64)] = np.arange(1, len(found) + 1)
+    order = sorted(range(len(attractors)), key=lambda place: _key(attractors[place]))
+    number = np.zeros(len(attractors) + 1, np.int64)
+    number[np.array(order, np.int64)] = np.arange(1, len(order) + 1)
     known = labels >= 0
     labels[known] = number[labels[known]]
     labels[~known] += 1
@@ -230,7 +228,7 @@ def basins(
         x=across,
         v=up,
         labels=labels.reshape(shape),
-        attractors=tuple(found[place] for place in order),
+        attractors=tuple(attractors[place] for place in order),
         firings=used.reshape(shape),
         status=status.reshape(shape),
         tolerance=tolerance,
@@ -247,12 +245,12 @@ def _decided(
     """Return places of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings, statuses, attractors."""
     firings, most, tolerance = counts
     (scales,) = scales_of_columns([regime])
-    attractors = Attractors(regime, scales, tolerance, threads)
+    attractors = Attractors(regime, scales, tolerance)
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)
     status = np.full(len(cells), OK, "U16")
-    possible = {x: _possible(regime.hammer, x) for x in np.unique(cells[:, 0]).tolist()}
-    absent = np.array([not possible[x] for x in cells[:, 0].tolist()])
+    known_states = {x: possible(regime.hammer, x, 0.0) for x in np.unique(cells[:, 0]).tolist()}
+    absent = np.array([not known_states[x] for x in cells[:, 0].tolist()])
     places[absent], status[absent] = NO_STATE - 1, NO_STATE_STATUS
     states = cells.copy()
     done, known = 0, int((~absent).sum())
@@ -261,37 +259,22 @@ def _decided(
         left = np.flatnonzero((places == UNDECIDED - 1) & np.isfinite(states[:, 0]))
         for first in range(0, len(left), _PIECE):
             rows = left[first : first + _PIECE]
-            begun = done
-
-            def tell(part: int, _all: int, begun: int = begun, known: int = known) -> None:
-                if progress is not None:
-                    progress(begun + part, known)
-
-            found = run_columns(
+            columns = run_columns(
                 [regime] * len(rows),
                 states[rows],
                 firings,
                 transient,
                 tolerance,
                 threads=threads,
-                progress=tell,
+                progress=shifted(progress, done, known),
             )
-            judged = attractors.judge(found)
-            failed = found.status != OK
-            places[rows] = np.where(failed, FAILED - 1, judged)
-            status[rows], states[rows] = found.status, found.last
+            judged = attractors.judge(columns)
+            places[rows] = np.where(columns.status != OK, FAILED - 1, judged)
+            status[rows], states[rows] = columns.status, columns.last
             used[rows] += firings
             done += len(rows)
         known = done + int((places == UNDECIDED - 1).sum())
     return places, used, status, attractors.found
-
-
-def _possible(hammer: Hammer, x: float) -> bool:
-    try:
-        initial_state(hammer, (x, 0.0))
-    except InputError:
-        return False
-    return True
 
 
 def _key(attractor: Attractor) -> tuple[int, float, float]:
@@ -300,13 +283,18 @@ def _key(attractor: Attractor) -> tuple[int, float, float]:
     return LARGEST_PERIOD + 1 if attractor.period is None else attractor.period, x, v
 
 
-def _axis(given: Any, name: str, unit: str, window: tuple[float, float]) -> FloatArray:
-    if given is None:
-        return np.linspace(*window, CELLS)
-    if not isinstance(given, tuple | list) or len(given) != 3:
-        raise InputError(f"{name} = {given!r}, expected least and largest value and their number")
-    low, high = (read_number(end, unit, name) for end in given[:2])
-    count = read_count(given[2], f"{name}: number of values")
+def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
+    """Read the least and the largest value of an axis and their number; InputError where it is none."""
+    if not isinstance(entry, tuple | list) or len(entry) != 3:
+        raise InputError(f"{name} = {entry!r}, expected least and largest value and their number")
+    low, high = (read_number(end, unit, name) for end in entry[:2])
+    count = read_count(entry[2], f"{name}: number of values")
     if not low < high or count < 2:
-        raise InputError(f"{name} = {given!r}, expected two ends, the second the larger one, and 2 or more")
+        raise InputError(f"{name} = {entry!r}, expected two ends, the second the larger one, and 2 or more")
     return np.linspace(low, high, count)
+
+
+def check_cells(across: int, up: int) -> None:
+    """Refuse a plane of more than `MOST_CELLS` cells."""
+    if across * up > MOST_CELLS:
+        raise InputError(f"{across} x {up} cells, expected at most {MOST_CELLS}")

@@ -15,11 +15,12 @@ from __future__ import annotations
 
 import math
 from copy import copy
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, SupportsIndex
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
 import numpy as np
 
-from printhammer.drive.input import read_count, read_number, read_positive
+from printhammer.chaos.basins.basins import check_cells, read_axis
+from printhammer.drive.input import read_positive
 from printhammer.drive.segments import table
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
@@ -27,12 +28,14 @@ from printhammer.errors import InputError
 from printhammer.results import Result, column, coordinate, derived, part, provenance, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.run.simulate import simulate
+from printhammer.support.threads import shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
+    from printhammer.chaos.basins.basins import Range
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
@@ -40,14 +43,9 @@ if TYPE_CHECKING:
 TAIL: Final = 1e-3
 """Time after the second firing, s, within which a second dot is waited for unless told otherwise."""
 
-MOST_CELLS: Final = 10_000_000
-"""Number of cells above which a map is refused."""
-
 _PIECE: Final = 8192
 _SPACING: Final = 5e-6
 _FIRST, _SECOND = 2, 3
-
-Range = tuple[float | str, float | str, SupportsIndex]
 
 
 class QuenchMap(Result):
@@ -224,27 +222,24 @@ def quench_map(
         raise InputError(f"waveform: a {pulse.shape} has no width, expected a pulse that has one")
     if hammer.front is None:
         raise InputError(f"the hammer {hammer.name!r} has no pack, expected one that a dot is made on")
-    times = _axis(gaps, "gaps")
-    wide = _axis((0.5 * width, 1.5 * width, 128) if widths is None else widths, "widths")
+    times = read_axis(gaps, "gaps", "s")
+    wide = read_axis((0.5 * width, 1.5 * width, 128) if widths is None else widths, "widths", "s")
+    for name, axis in (("gaps", times), ("widths", wide)):
+        if not axis[0] > 0.0:
+            raise InputError(f"{name}: {axis[0]:.9g} s, expected times above 0 s")
     wait = read_positive(tail, "s", "tail")
-    if times.size * wide.size > MOST_CELLS:
-        raise InputError(f"{times.size} x {wide.size} cells, expected at most {MOST_CELLS}")
+    check_cells(times.size, wide.size)
     alone = simulate(hammer, PulseTrain(pulse), duration=pulse.support + wait, tolerance=tolerance).dots[0]
-    drives = _drives(pulse, wide, float(times[-1]) + max(wait, pulse.support))
-    shape = times.size, wide.size
-    struck, status = np.zeros(shape, np.bool_), np.full(shape, "ok", "U16")
-    peak, force, flight = (np.full(shape, np.nan) for _ in range(3))
+    seconds = [type(pulse)(**{**dict(pulse), "width": width}) for width in wide.tolist()]
+    drives = two_pulse_drives(pulse, seconds, float(times[-1]) + max(wait, pulse.support))
     rows = max(1, _PIECE // wide.size)
+    pieces = []
     for first in range(0, times.size, rows):
-        part = slice(first, min(first + rows, times.size))
-
-        def tell(done: int, _all: int, begun: int = first * wide.size) -> None:
-            if progress is not None:
-                progress(begun + done, times.size * wide.size)
-
-        found = _piece(hammer, drives, times[part], wait, tolerance, threads, tell)
-        for whole, piece in zip((struck, status, peak, force, flight), found, strict=True):
-            whole[part] = piece.reshape(whole[part].shape)
+        tell = shifted(progress, first * wide.size, times.size * wide.size)
+        pieces.append(_piece(hammer, drives, times[first : first + rows], wait, tolerance, threads, tell))
+    struck, status, peak, force, flight = (
+        np.concatenate(parts).reshape(times.size, wide.size) for parts in zip(*pieces, strict=True)
+    )
     return QuenchMap(
         hammer=hammer,
         waveform=pulse,
@@ -262,26 +257,18 @@ def quench_map(
     )
 
 
-def two_pulse_drive(first: Waveform, second: Waveform, gap: float, last: float) -> TwoPulseDrive:
-    """Return a drive that fires one pulse, and another one `gap` later, for runs of `last` seconds at most.
+def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) -> list[TwoPulseDrive]:
+    """Return drives that fire one pulse, and then one of some others, for runs of `last` seconds at most.
 
-    The run has to begin at the time `begin` of the drive, with the rest state; times, s, count from there.
+    Runs begin at the time `begin` of a drive, with the rest state; times, s, count from there. The second
+    pulse comes half-way; other times are put in by `with_firings`.
     """
+    largest = max(first.peak, *(second.peak for second in seconds))
     # A power of two, so that sums of it with other times are rounded the same way everywhere.
-    apart = 2.0 ** math.ceil(math.log2(max(last, gap + first.support)))
-    largest = max(first.peak, second.peak)
-    pair = TwoPulses(first=first, second=second, apart=apart, largest=largest, quantity=first.quantity)
-    return TwoPulseDrive(pair, gap)
-
-
-def _drives(pulse: Waveform, widths: FloatArray, last: float) -> list[TwoPulseDrive]:
-    """Return a drive for each width; the times are put in later."""
-    seconds = [type(pulse)(**{**dict(pulse), "width": width}) for width in widths.tolist()]
-    largest = max(pulse.peak, *(second.peak for second in seconds))
-    apart = 2.0 ** math.ceil(math.log2(last + pulse.support))
+    apart = 2.0 ** math.ceil(math.log2(last + first.support))
     return [
         TwoPulseDrive(
-            TwoPulses(first=pulse, second=second, apart=apart, largest=largest, quantity=pulse.quantity),
+            TwoPulses(first=first, second=second, apart=apart, largest=largest, quantity=first.quantity),
             0.5 * last,
         )
         for second in seconds
@@ -295,7 +282,7 @@ def _piece(
     tail: float,
     tolerance: float,
     threads: int | None,
-    progress: Progress,
+    progress: Progress | None,
 ) -> tuple[npt.NDArray[Any], ...]:
     """Return second dot, status, peak, force and flight time of some gaps, each for all widths."""
     begin = drives[0].begin
@@ -325,16 +312,9 @@ def _piece(
 
 
 def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the largest local maximum after some times, from samples; NaN where there is none.
+    """Return the largest local maximum after some times, shape (M,), from samples; NaN where there is none.
 
-    Parameters
-    ----------
-    grid : array, shape (T,)
-        Times of the samples, evenly spaced.
-    x : array, shape (M, T)
-        The samples, NaN where there is none.
-    after : array, shape (M,)
-        Times, one for each row.
+    The samples, shape (M, T), are evenly spaced, and NaN where there is none.
     """
     before, here, following = x[:, :-2], x[:, 1:-1], x[:, 2:]
     bend = before - 2.0 * here + following
@@ -344,15 +324,3 @@ def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> FloatArray:
     late = grid[1:-1] + shift * (grid[1] - grid[0]) > after[:, np.newaxis]
     heights = np.where(top & late, here + 0.5 * slope * shift, -np.inf).max(axis=1)
     return np.where(np.isfinite(heights), heights, np.nan)
-
-
-def _axis(given: Any, name: str) -> FloatArray:
-    if not isinstance(given, tuple | list) or len(given) != 3:
-        raise InputError(f"{name} = {given!r}, expected least and largest time and their number")
-    low, high = (read_number(end, "s", name) for end in given[:2])
-    count = read_count(given[2], f"{name}: number of values")
-    if not 0.0 < low < high or count < 2:
-        raise InputError(
-            f"{name} = {given!r}, expected two times above 0 s, the second longer, and 2 or more"
-        )
-    return np.linspace(low, high, count)

@@ -137,29 +137,29 @@ def bifurcation(
     begin = FROM_REST
     if state is not None:
         begin = (*initial_state(regime.hammer, state), -1.0, 0.0)
-    work = DiagramBuilder(regime, name, ways, (count, skipped, tolerance), begin, threads, progress)
+    builder = DiagramBuilder(regime, name, ways, (count, skipped, tolerance), begin, threads, progress)
     try:
-        work.base(grid)
+        builder.base(grid)
         for level in range(1, halvings + 1):
-            work.refine(level)
+            builder.refine(level)
         if exponents:
-            work.measure()
+            builder.measure()
     except KeyboardInterrupt:
-        raise InterruptedDiagram(_result(work)) from None
-    return _result(work)
+        raise InterruptedDiagram(_result(builder)) from None
+    return _result(builder)
 
 
-def _result(work: DiagramBuilder) -> Bifurcation:
+def _result(builder: DiagramBuilder) -> Bifurcation:
     """Return the diagram as far as it is."""
-    order = np.argsort(work.values, kind="stable")
-    rows = (len(work.ways) * order + np.arange(len(work.ways))[:, np.newaxis]).astype(np.int64)
-    table = work.table
-    firings, transient, tolerance = work.counts
+    order = np.argsort(builder.values, kind="stable")
+    rows = (len(builder.ways) * order + np.arange(len(builder.ways))[:, np.newaxis]).astype(np.int64)
+    table = builder.table
+    firings, transient, tolerance = builder.counts
     return Bifurcation(
-        regime=work.regime,
-        parameter=work.name,
-        values=work.values[order],
-        directions=work.ways,
+        regime=builder.regime,
+        parameter=builder.name,
+        values=builder.values[order],
+        directions=builder.ways,
         firing=np.arange(transient + 1, firings + 1),
         x=table.columns.x[rows],
         v=table.columns.v[rows],
@@ -167,9 +167,9 @@ def _result(work: DiagramBuilder) -> Bifurcation:
         status=table.columns.status[rows],
         cycles=table.cycles[rows],
         distances=table.distances[rows],
-        exponents=work.exponents[rows],
-        standard_errors=work.errors[rows],
-        levels=work.levels[order],
+        exponents=builder.exponents[rows],
+        standard_errors=builder.errors[rows],
+        levels=builder.levels[order],
         carried=table.carried,
         tolerance=tolerance,
     )
@@ -177,11 +177,11 @@ def _result(work: DiagramBuilder) -> Bifurcation:
 
 def _parameter(
     hammer: Hammer | Regime,
-    given: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
+    choice: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
     firing: Firing,
 ) -> tuple[str, FloatArray, Regime]:
     """Return the name of the parameter, its values, and the regime in which it is changed."""
-    periods, rates, parameter, values = given
+    periods, rates, parameter, values = choice
     if sum(entry is not None for entry in (periods, rates, parameter)) != 1:
         raise InputError("periods, rates and parameter: expected one of them")
     if (parameter is None) != (values is None):
@@ -201,13 +201,13 @@ def _parameter(
 
 def _ascending(values: npt.ArrayLike | None, name: str) -> FloatArray:
     try:
-        found = np.atleast_1d(np.array(values, dtype=np.float64))
+        grid = np.atleast_1d(np.array(values, dtype=np.float64))
     except (TypeError, ValueError):
         raise InputError(f"{name}: expected numbers in SI") from None
-    if found.ndim != 1 or found.size == 0 or not np.isfinite(found).all():
+    if grid.ndim != 1 or grid.size == 0 or not np.isfinite(grid).all():
         raise InputError(f"{name}: expected a list of at least one finite number in SI")
-    falling = np.flatnonzero(np.diff(found) <= 0.0)
+    falling = np.flatnonzero(np.diff(grid) <= 0.0)
     if falling.size:
-        before, after = found[falling[0] : falling[0] + 2].tolist()
+        before, after = grid[falling[0] : falling[0] + 2].tolist()
         raise InputError(f"{name}: {after:.9g} follows {before:.9g}, expected ascending values")
-    return found
+    return grid

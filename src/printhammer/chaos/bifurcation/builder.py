@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,10 +18,9 @@ from printhammer.chaos.bifurcation.columns import (
     put,
     run_columns,
     scales_of_columns,
-    usable,
+    state_or_rest,
 )
-from printhammer.chaos.bifurcation.diagram import train_from, window_of_exponent
-from printhammer.chaos.strobe.train import exponents_of
+from printhammer.chaos.strobe.train import exponents_onward
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,29 +34,24 @@ JUMP: Final = 0.2
 """Distance of neighbouring orbits of the same period, in half-widths of the window, that is refined."""
 
 
+@dataclass
 class DiagramBuilder:
     """A diagram under way. Trains are numbered as they come, those of all directions at a value in a row."""
 
-    def __init__(
-        self,
-        regime: Regime,
-        name: str,
-        ways: tuple[str, ...],
-        counts: tuple[int, int, float],
-        begin: State,
-        threads: int | None,
-        progress: Progress | None,
-    ) -> None:
-        self.regime, self.name, self.ways, self.counts, self.begin = regime, name, ways, counts, begin
-        self.threads, self.progress = threads, progress
-        self.points = counts[0] - counts[1]
-        self.values = np.zeros(0)
-        self.levels = np.zeros(0, np.int64)
-        none = np.zeros(0)
-        self.table = Trains([], blank_columns(0, self.points), np.zeros(0, np.int64), none, np.zeros((0, 3)))
-        self.exponents, self.errors = none.copy(), none.copy()
-        self.done = 0
-        self.known = 0
+    regime: Regime
+    name: str
+    ways: tuple[str, ...]
+    counts: tuple[int, int, float]
+    begin: State
+    threads: int | None
+    progress: Progress | None
+
+    def __post_init__(self) -> None:
+        self.points = self.counts[0] - self.counts[1]
+        whole, none = np.zeros(0, np.int64), np.zeros(0)
+        self.values, self.levels, self.exponents, self.errors = none, whole, none, none
+        self.table = Trains([], blank_columns(0, self.points), whole, none, np.zeros((0, 3)))
+        self.done = self.known = 0
 
     def add(self, values: FloatArray, level: int) -> list[int]:
         """Make room for trains at new values; return the places of the values."""
@@ -68,18 +63,14 @@ class DiagramBuilder:
         put(longer, np.arange(len(table.regimes)), table.columns)
         scales = np.repeat(scales_of_columns(regimes), len(self.ways), axis=0)
         nothing = np.full(len(every), np.nan)
-        self.table = Trains(
-            [*table.regimes, *every],
-            longer,
-            np.concatenate([table.cycles, np.zeros(len(every), np.int64)]),
-            np.concatenate([table.distances, nothing]),
-            np.concatenate([table.scales, scales]),
-            table.carried,
-        )
-        self.exponents = np.concatenate([self.exponents, nothing])
-        self.errors = np.concatenate([self.errors, nothing])
-        self.values = np.concatenate([self.values, values])
-        self.levels = np.concatenate([self.levels, np.full(len(values), level)])
+        table.regimes += every
+        table.columns = longer
+        table.cycles = np.append(table.cycles, np.zeros(len(every), np.int64))
+        table.distances = np.append(table.distances, nothing)
+        table.scales = np.concatenate([table.scales, scales])
+        self.exponents, self.errors = np.append(self.exponents, nothing), np.append(self.errors, nothing)
+        self.values = np.append(self.values, values)
+        self.levels = np.append(self.levels, np.full(len(values), level))
         self.known += len(every)
         return list(range(first, len(self.values)))
 
@@ -91,7 +82,7 @@ class DiagramBuilder:
         """Run the trains at the values that were given."""
         places = self.add(grid, 0)
         if self.ways == ("from rest",):
-            self.run(places, np.array([usable(self.table.regimes[row], self.begin) for row in places]))
+            self.run(places, np.array([state_or_rest(self.table.regimes[row], self.begin) for row in places]))
             return
         strands: list[Strand] = []
         for way, name in enumerate(self.ways):
@@ -103,32 +94,30 @@ class DiagramBuilder:
         """Run trains between neighbours that differ; the state comes from the neighbour before."""
         order = np.argsort(self.values, kind="stable").tolist()
         pairs = [pair for pair in itertools.pairwise(order) if self.differ(*pair)]
-        middles = np.array([0.5 * (self.values[one] + self.values[other]) for one, other in pairs])
+        middles = [0.5 * (self.values[low] + self.values[high]) for low, high in pairs]
         new = [
-            k for k, (one, other) in enumerate(pairs) if self.values[one] < middles[k] < self.values[other]
+            (pair, middle)
+            for pair, middle in zip(pairs, middles, strict=True)
+            if self.values[pair[0]] < middle < self.values[pair[1]]
         ]
         if not new:
             return
-        places = self.add(middles[new], level)
+        places = self.add(np.array([middle for _pair, middle in new]), level)
         rows: list[int] = []
         states: list[State] = []
         for way, name in enumerate(self.ways):
-            for place, k in zip(places, new, strict=True):
-                (row,) = self.rows([place], way)
-                begin = self.begin
-                if name != "from rest":
-                    (before,) = self.rows([pairs[k][0 if name == "up" else 1]], way)
-                    x, v, branch, memory = self.table.columns.last[before].tolist()
-                    begin = (x, v, branch, memory)
-                rows.append(row)
-                states.append(usable(self.table.regimes[row], begin))
+            rows += self.rows(places, way)
+            befores = self.rows([pair[0 if name == "up" else 1] for pair, _middle in new], way)
+            for row, before in zip(self.rows(places, way), befores, strict=True):
+                begin = self.begin if name == "from rest" else self.table.columns.handed(before)
+                states.append(state_or_rest(self.table.regimes[row], begin))
         self.run(rows, np.array(states))
 
-    def differ(self, one: int, other: int) -> bool:
+    def differ(self, place: int, neighbour: int) -> bool:
         """Tell whether the trains at two values differ: in period, or by a jump of the orbit."""
         table = self.table
         for way in range(len(self.ways)):
-            a, b = self.rows([one, other], way)
+            a, b = self.rows([place, neighbour], way)
             q = int(table.cycles[a])
             if q != table.cycles[b] or table.columns.status[a] != table.columns.status[b]:
                 return True
@@ -145,20 +134,21 @@ class DiagramBuilder:
     def trial(self, rows: Sequence[int], states: FloatArray) -> tuple[Any, Any, Any]:
         """Run trains from states; return their states, periods and distances."""
         regimes = [self.table.regimes[row] for row in rows]
-        begin = self.done
-
-        def tell(part: int, _all: int) -> None:
-            self.tell(begin + part)
-
-        found = run_columns(regimes, states, *self.counts, threads=self.threads, progress=tell)
+        done = self.done
+        columns = run_columns(
+            regimes,
+            states,
+            *self.counts,
+            threads=self.threads,
+            progress=lambda part, _all: self.tell(done + part),
+        )
         fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
-        cycles, distances = cycles_of(found, fronts, self.table.scales[list(rows)])
-        return found, cycles, distances
+        return columns, *cycles_of(columns, fronts, self.table.scales[list(rows)])
 
     def run(self, rows: Sequence[int], states: FloatArray) -> None:
         """Run trains from states and keep what is found."""
-        found, cycles, distances = self.trial(rows, states)
-        put(self.table.columns, rows, found)
+        columns, cycles, distances = self.trial(rows, states)
+        put(self.table.columns, rows, columns)
         self.table.cycles[list(rows)] = cycles
         self.table.distances[list(rows)] = distances
         self.done += len(rows)
@@ -171,23 +161,22 @@ class DiagramBuilder:
     def measure(self) -> None:
         """Compute the exponents of the trains without a period, over as many firings as there are points."""
         columns, table = self.table.columns, self.table
-        trains = []
+        begun = {}
         for row, regime in enumerate(table.regimes):
             x, v, branch, _memory = columns.last[row].tolist()
             # A start inside the pack would need its memory; such a train stays undecided.
-            if columns.status[row] != OK or table.cycles[row] or branch >= 0.0 or math.isnan(x):
-                continue
-            trains.append((row, train_from(regime, (x, v), self.points)))
-        self.known += len(trains)
-        begun = self.done
-        found = exponents_of(
-            [train for _row, train in trains],
-            window_of_exponent(self.points),
+            if columns.status[row] == OK and not table.cycles[row] and branch < 0.0 and not math.isnan(x):
+                begun[row] = regime, (x, v)
+        self.known += len(begun)
+        done = self.done
+        exponents = exponents_onward(
+            list(begun.values()),
+            self.points,
             self.counts[2],
             threads=self.threads,
-            progress=lambda done, _all: self.tell(begun + done),
+            progress=lambda part, _all: self.tell(done + part),
         )
-        for (row, _train), exponent in zip(trains, found, strict=True):
+        for row, exponent in zip(begun, exponents, strict=True):
             if exponent.ok and exponent.smooth:
                 self.exponents[row], self.errors[row] = exponent.value, exponent.standard_error
-        self.done += len(trains)
+        self.done += len(begun)

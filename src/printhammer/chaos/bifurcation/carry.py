@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.columns import OK, orbit_distance, put, usable
+from printhammer.chaos.bifurcation.columns import OK, Columns, orbit_distance, put, state_or_rest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.chaos.bifurcation.columns import Columns, State
+    from printhammer.chaos.bifurcation.columns import State
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
@@ -43,8 +43,8 @@ class Strand:
 
     rows: list[int]
     """Their rows in the table of all trains, in the order in which the state is carried."""
-    before: int | None = None
-    """Number of the strand that ends where this one begins; None for the first one."""
+    before: int
+    """Number of the strand that ends where this one begins; -1 for the first one."""
 
 
 @dataclass
@@ -67,7 +67,7 @@ class Trains:
 def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
     """Cut trains, in the order in which the state is carried, into strands numbered from `first` on."""
     cut = [list(rows[k : k + STRAND]) for k in range(0, len(rows), STRAND)]
-    return [Strand(part, first + k - 1 if k else None) for k, part in enumerate(cut)]
+    return [Strand(part, first + k - 1 if k else -1) for k, part in enumerate(cut)]
 
 
 def carry(
@@ -77,67 +77,43 @@ def carry(
     run: Callable[[list[int], FloatArray], None],
     trial: Callable[[list[int], FloatArray], tuple[Columns, Any, Any]],
 ) -> None:
-    """Run the trains of some strands and close their joints.
+    """Run the trains of strands of one or several directions, and close their joints.
 
-    Parameters
-    ----------
-    table : Trains
-        Where the results go.
-    strands : sequence of Strand
-        Those of one or several directions.
-    start : tuple
-        State with which a strand begins.
-    run : callable
-        Runs some rows from states and puts what it finds into the table.
-    trial : callable
-        Runs some rows from states and returns what it finds: columns, periods, distances.
+    `start` is the state with which a strand begins; `run` runs rows of the table from states and keeps the
+    results there, `trial` returns them: columns, periods, distances.
     """
     for k in range(max(len(strand.rows) for strand in strands)):
         long = [strand.rows for strand in strands if k < len(strand.rows)]
         begun = [
-            _from(table, rows[k - 1], rows[k]) if k else usable(table.regimes[rows[k]], start)
+            state_or_rest(table.regimes[rows[k]], table.columns.handed(rows[k - 1]) if k else start)
             for rows in long
         ]
         run([rows[k] for rows in long], np.array(begun))
-    open_ = {(number, 0) for number, strand in enumerate(strands) if strand.before is not None}
+    open_ = {(number, 0) for number, strand in enumerate(strands) if strand.before >= 0}
     while open_:
         # Every open joint is taken one train further, all of them side by side.
         order = sorted(open_)
         rows = [strands[number].rows[place] for number, place in order]
-        last = [_row_before(strands, number, place) for number, place in order]
-        states = [_from(table, one, row) for one, row in zip(last, rows, strict=True)]
+        ended = [
+            strands[number].rows[place - 1] if place else strands[strands[number].before].rows[-1]
+            for number, place in order
+        ]
+        states = [
+            state_or_rest(table.regimes[row], table.columns.handed(before))
+            for before, row in zip(ended, rows, strict=True)
+        ]
         columns, cycles, distances = trial(rows, np.array(states))
         table.carried += len(rows)
         open_ = set()
         for i, ((number, place), row) in enumerate(zip(order, rows, strict=True)):
             if same_attractor(table, row, columns, i, int(cycles[i])):
                 continue
-            put(table.columns, [row], one_of(columns, i))
+            put(table.columns, [row], Columns(*(values[[i]] for values in vars(columns).values())))
             table.cycles[row], table.distances[row] = cycles[i], distances[i]
             if place + 1 < len(strands[number].rows):
                 open_.add((number, place + 1))
             else:
                 open_ |= {(n, 0) for n, other in enumerate(strands) if other.before == number}
-
-
-def one_of(columns: Columns, place: int) -> Columns:
-    """Return one of several columns."""
-    part = slice(place, place + 1)
-    names = ("x", "v", "branch", "memory", "status", "last")
-    return type(columns)(**{name: getattr(columns, name)[part] for name in names})
-
-
-def _row_before(strands: Sequence[Strand], number: int, place: int) -> int:
-    strand = strands[number]
-    if place:
-        return strand.rows[place - 1]
-    assert strand.before is not None
-    return strands[strand.before].rows[-1]
-
-
-def _from(table: Trains, before: int, row: int) -> State:
-    x, v, branch, memory = table.columns.last[before].tolist()
-    return usable(table.regimes[row], (x, v, branch, memory))
 
 
 def same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle: int) -> bool:
@@ -153,8 +129,8 @@ def same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle:
     if cycle != table.cycles[row]:
         return False
     one, other = (
-        np.column_stack([found.x[at], found.v[at]]) / table.scales[row, :2]
-        for found, at in ((columns, place), (was, row))
+        np.column_stack([states.x[at], states.v[at]]) / table.scales[row, :2]
+        for states, at in ((columns, place), (was, row))
     )
     if cycle:
         return orbit_distance(one[-cycle:], other[-cycle:]) <= SAME

@@ -14,6 +14,7 @@ from printhammer.errors import InputError
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.start import check_branch, initial_state
 from printhammer.run.window import window_of
+from printhammer.support.threads import shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -73,6 +74,11 @@ class Columns:
         """Return the number of trains."""
         return len(self.x)
 
+    def handed(self, row: int) -> State:
+        """Return the state with which the next train can go on."""
+        x, v, branch, memory = self.last[row].tolist()
+        return x, v, branch, memory
+
 
 def blank_columns(count: int, points: int) -> Columns:
     """Return columns of trains that have not been run."""
@@ -86,11 +92,11 @@ def blank_columns(count: int, points: int) -> Columns:
     )
 
 
-def put(columns: Columns, rows: Sequence[int] | npt.NDArray[np.int64], found: Columns) -> None:
-    """Write some columns into rows of others."""
+def put(columns: Columns, rows: Sequence[int] | npt.NDArray[np.int64], others: Columns) -> None:
+    """Write the states of other trains into rows of columns."""
     where = np.asarray(rows, dtype=np.int64)
-    for name in ("x", "v", "branch", "memory", "status", "last"):
-        getattr(columns, name)[where] = getattr(found, name)
+    for name, values in vars(others).items():
+        getattr(columns, name)[where] = values
 
 
 def run_columns(
@@ -103,28 +109,14 @@ def run_columns(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Columns:
-    """Fire many trains and keep their states at the last firings.
+    """Fire many trains and keep their states at the last `firings` - `transient` firings.
 
-    Parameters
-    ----------
-    regimes : sequence of Regime
-        Hammers and periodic drives, one for each train.
-    states : array, shape (M, 4)
-        Displacement, velocity, branch of the pack (negative: as follows from the state) and memory at the
-        first firing, with the pulses before it under way; a row of NaN is a train from rest with nothing
-        fired before (`FROM_REST`).
-    firings, transient : int
-        Number of firings, and of those at the beginning that are left out.
-    tolerance, threads, progress
-        As for `printhammer.Ensemble`.
-
-    Returns
-    -------
-    Columns
-        Of `firings` - `transient` points each.
+    States, shape (M, 4), are displacement, velocity, branch of the pack (negative: as follows from the state)
+    and memory at the first firing, with the pulses before it under way; a row of NaN is a train from rest
+    with nothing fired before (`FROM_REST`).
     """
     points = firings - transient
-    found = blank_columns(len(regimes), points)
+    columns = blank_columns(len(regimes), points)
     at_rest = np.isnan(states[:, 0])
     in_pack = ~at_rest & (states[:, 2] >= 0.0)
     piece = max(1, MOST_STATES // (points + 1))
@@ -133,22 +125,11 @@ def run_columns(
         rows = np.flatnonzero(kind)
         for first in range(0, len(rows), piece):
             some = rows[first : first + piece]
-            begin = done
-
-            def tell(part: int, _all: int, begin: int = begin) -> None:
-                if progress is not None:
-                    progress(begin + part, len(regimes))
-
-            part = _run(
-                [regimes[row] for row in some],
-                states[some],
-                (firings, transient, tolerance),
-                threads,
-                tell,
-            )
-            put(found, some, part)
+            own = [regimes[row] for row in some]
+            tell = shifted(progress, done, len(regimes))
+            put(columns, some, _run(own, states[some], (firings, transient, tolerance), threads, tell))
             done += len(some)
-    return found
+    return columns
 
 
 def _run(
@@ -156,7 +137,7 @@ def _run(
     states: FloatArray,
     counts: tuple[int, int, float],
     threads: int | None,
-    progress: Progress,
+    progress: Progress | None,
 ) -> Columns:
     """Run trains that begin alike: all from rest, all inside the pack, or all elsewhere."""
     firings, transient, tolerance = counts
@@ -228,7 +209,7 @@ def handed_on(hammer: Hammer, x: float, v: float, mode: int, memory: float) -> S
     return x, v, float(branch), memory
 
 
-def usable(regime: Regime, state: State) -> State:
+def state_or_rest(regime: Regime, state: State) -> State:
     """Return a state that was handed on, or `FROM_REST` where this hammer cannot begin with it."""
     if math.isnan(state[0]):
         return FROM_REST
@@ -252,8 +233,8 @@ def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
         drive = regime.train(1)[0] if regime.hammer.front is None or regime.hammer.position is None else None
         key = (id(regime.hammer), 0.0 if drive is None else regime.period)
         if key not in known or regime.drive is not None:
-            found = window_of(regime.hammer, drive if drive is not None else regime.train(1)[0])
-            way, speed = found.half_widths.tolist()
+            window = window_of(regime.hammer, drive if drive is not None else regime.train(1)[0])
+            way, speed = window.half_widths.tolist()
             known[key] = (way, speed, way)
         rows.append(known[key])
     return np.array(rows)
@@ -264,22 +245,10 @@ def cycles_of(
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """Return the periods of trains, in firings, by the rule of `printhammer.chaos.strobe.verdict`.
 
-    Parameters
-    ----------
-    columns : Columns
-        The states.
-    fronts : array, shape (M,)
-        Front of the pack of each hammer, m; infinity where there is none.
-    scales : array, shape (M, 3)
-        From `scales_of_columns`.
-
-    Returns
-    -------
-    cycles : int array, shape (M,)
-        Smallest q, at most 64 and half of the points, whose states q firings apart agree; 0 where there is
-        none.
-    distances : array, shape (M,)
-        How far these are from each other at most, in half-widths of the window; NaN where there is no q.
+    A period is the smallest q, at most 64 and half of the points, whose states q firings apart agree, 0 where
+    there is none. The second array is how far these are from each other at most, in half-widths of the
+    window, NaN where there is no q. Fronts of the packs, m, are infinite where there is none; the scales are
+    those of `scales_of_columns`.
     """
     branch = pack_branches(columns.x, columns.branch, fronts[:, np.newaxis])
     states = np.stack([columns.x, columns.v, columns.memory], axis=2) / scales[:, np.newaxis]
@@ -302,15 +271,8 @@ def cycles_of(
 def orbit_distance(one: FloatArray, other: FloatArray) -> float:
     """Return how far two periodic orbits of the same period lie apart, whatever their phase.
 
-    Parameters
-    ----------
-    one, other : array, shape (q, 2)
-        Their states in units of the scales, in the order of the firings.
-
-    Returns
-    -------
-    float
-        Largest difference of a component over the orbit, for that shift of firings with which it is least.
+    Of their states, shape (q, 2), in units of the scales, the largest difference of a component, for that
+    shift of firings with which it is least.
     """
     count = len(one)
     shifted = other[(np.arange(count) + np.arange(count)[:, np.newaxis]) % count]

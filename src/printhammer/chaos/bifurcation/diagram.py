@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from printhammer.chaos.bifurcation.carry import SAME
 from printhammer.chaos.bifurcation.columns import orbit_distance
 from printhammer.chaos.bifurcation.windows import MOST_UNDECIDED, Route, Window, cells
-from printhammer.chaos.strobe.train import Train, exponents_of
-from printhammer.chaos.strobe.verdict import SIGNIFICANT
+from printhammer.chaos.strobe.train import exponents_onward
+from printhammer.chaos.strobe.verdict import SIGNIFICANT, is_positive
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD, RATE
 from printhammer.results import Column, Result, column, coordinate, derived, part, scalar
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
-
-_BEFORE: Final = 100
-"""Firings before an exponent counts."""
 
 
 class Bifurcation(Result, rows="direction column"):
@@ -135,124 +132,73 @@ class Bifurcation(Result, rows="direction column"):
         return {"verdict": own.pop("verdict"), **own}
 
     def windows(self, direction: str | None = None) -> list[Window]:
-        """Return the intervals of the parameter with one verdict, of one direction."""
-        return windows_of(self, direction)
+        """Return the intervals of the parameter with one verdict, from the least value to the largest.
+
+        Of one direction, by default the first; InputError where the diagram has no such direction.
+        """
+        return self._grouped(self._row(direction), range(len(self.values)))
 
     def routes(self, direction: str | None = None) -> tuple[Route, Route]:
-        """Return what comes before the first strange train, with the parameter rising and falling."""
-        return routes_of(self, direction)
+        """Return what comes before the first strange train, with the parameter rising and falling.
 
+        Of one direction, as for `windows`. Of trains without a period whose exponent is not known it is
+        computed here, from one end of the range on up to the first strange one.
+        """
+        row = self._row(direction)
+        names = self.verdicts[row].tolist()
+        known: dict[int, bool] = {}
 
-def window_of_exponent(points: int) -> tuple[int, int]:
-    """Return the first and last firing over which the exponent of a train with so many points is taken."""
-    return _BEFORE + 1, _BEFORE + points
+        def strange(k: int) -> bool:
+            if names[k] == "undecided" and k not in known:
+                known[k] = self._is_strange(row, k)
+            return names[k] == "strange" or known.get(k, False)
 
+        def route(way: Literal["rising", "falling"], order: Sequence[int]) -> Route:
+            undecided = 0
+            for place, k in enumerate(order):
+                before = order[:place]
+                if strange(k):
+                    return Route(way, tuple(self._grouped(row, before)), float(self.values[k]), True)
+                undecided += names[k] == "undecided"
+                if undecided > MOST_UNDECIDED:
+                    return Route(way, tuple(self._grouped(row, before)), None, False)
+            return Route(way, tuple(self._grouped(row, order)), None, True)
 
-def train_from(regime: Regime, state: tuple[float, float], points: int) -> Train:
-    """Return a train that goes on from a state at a firing, for its exponent."""
-    _first, last = window_of_exponent(points)
-    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
-    return Train(regime, regime.pulses(last + 2), state)
+        columns = range(len(names))
+        return route("rising", columns), route("falling", columns[::-1])
 
+    def _row(self, direction: str | None) -> int:
+        if direction is None:
+            return 0
+        if direction not in self.directions:
+            known = " and ".join(self.directions)
+            raise InputError(f"direction = {direction!r}, expected what the diagram has: {known}")
+        return self.directions.index(direction)
 
-def windows_of(diagram: Bifurcation, direction: str | None = None) -> list[Window]:
-    """Return the windows of a diagram, from the least value to the largest.
+    def _grouped(self, row: int, order: Sequence[int]) -> list[Window]:
+        """Return the windows of neighbouring columns, which may ascend or descend."""
+        names, cycles = self.verdicts[row].tolist(), self.cycles[row].tolist()
+        widths = cells(self.values)
+        windows = []
+        for name, group in itertools.groupby(order, key=lambda k: names[k]):
+            places = sorted(group)
+            first, last = places[0], places[-1]
+            low, high = float(self.values[first]), float(self.values[last])
+            width = float(widths[first : last + 1].sum())
+            windows.append(Window(name, int(cycles[first]), low, high, width, len(places)))
+        return windows
 
-    Parameters
-    ----------
-    diagram : Bifurcation
-        The diagram.
-    direction : str, optional
-        Which direction, where it has two; by default the first.
-
-    Raises
-    ------
-    InputError
-        The diagram has no such direction.
-    """
-    row = _row(diagram, direction)
-    return _grouped(diagram, row, range(len(diagram.values)))
-
-
-def _grouped(diagram: Bifurcation, row: int, order: Sequence[int]) -> list[Window]:
-    """Return the windows of neighbouring columns, which may ascend or descend."""
-    names, cycles = diagram.verdicts[row].tolist(), diagram.cycles[row].tolist()
-    widths = cells(diagram.values)
-    found = []
-    for name, group in itertools.groupby(order, key=lambda k: names[k]):
-        places = sorted(group)
-        first, last = places[0], places[-1]
-        found.append(
-            Window(
-                verdict=name,
-                period=int(cycles[first]),
-                low=float(diagram.values[first]),
-                high=float(diagram.values[last]),
-                width=float(widths[first : last + 1].sum()),
-                columns=len(places),
-            )
-        )
-    return found
-
-
-def routes_of(diagram: Bifurcation, direction: str | None = None) -> tuple[Route, Route]:
-    """Return the routes to the first strange train of a diagram, with rising and with falling values.
-
-    Of trains without a period whose exponent is not known it is computed here, from one end of the range on
-    up to the first strange one.
-
-    Parameters
-    ----------
-    diagram : Bifurcation
-        The diagram.
-    direction : str, optional
-        Which direction, where it has two; by default the first.
-
-    Raises
-    ------
-    InputError
-        The diagram has no such direction.
-    """
-    row = _row(diagram, direction)
-    names = diagram.verdicts[row].tolist()
-    ends = diagram.values.tolist()
-    known: dict[int, bool] = {}
-
-    def strange(k: int) -> bool:
-        if names[k] == "undecided" and k not in known:
-            known[k] = _is_strange(diagram, row, k)
-        return names[k] == "strange" or known.get(k, False)
-
-    def route(way: Literal["rising", "falling"], order: Sequence[int]) -> Route:
-        undecided = 0
-        first = None
-        for place, k in enumerate(order):
-            if strange(k):
-                first = place
-                break
-            undecided += names[k] == "undecided"
-            if undecided > MOST_UNDECIDED:
-                return Route(way, tuple(_grouped(diagram, row, order[:place])), None, False)
-        before = tuple(_grouped(diagram, row, order[:first]))
-        return Route(way, before, None if first is None else ends[order[first]], True)
-
-    columns = range(len(names))
-    return route("rising", columns), route("falling", columns[::-1])
-
-
-def _is_strange(diagram: Bifurcation, row: int, k: int) -> bool:
-    """Tell whether a train without a period is strange, by its exponent from its last point on."""
-    x, v = (float(states[row, k, -1]) for states in (diagram.x, diagram.v))
-    regime = diagram.regime.with_(diagram.parameter, float(diagram.values[k]))
-    front = regime.hammer.front
-    # Inside the pack, and between firings, the state that is kept is not all that a train goes on from.
-    if diagram.status[row, k] != "ok" or diagram.phase or (front is not None and x > front):
-        return False
-    points = diagram.x.shape[2]
-    (found,) = exponents_of(
-        [train_from(regime, (x, v), points)], window_of_exponent(points), diagram.tolerance, threads=1
-    )
-    return bool(found.ok and found.smooth and found.value > SIGNIFICANT * found.standard_error)
+    def _is_strange(self, row: int, k: int) -> bool:
+        """Tell whether a train without a period is strange, by its exponent from its last point on."""
+        x, v = (float(states[row, k, -1]) for states in (self.x, self.v))
+        regime = self.regime.with_(self.parameter, float(self.values[k]))
+        front = regime.hammer.front
+        # Inside the pack, and between firings, the state that is kept is not all that a train goes on from.
+        if self.status[row, k] != "ok" or self.phase or (front is not None and x > front):
+            return False
+        points = self.x.shape[2]
+        (exponent,) = exponents_onward([(regime, (x, v))], points, self.tolerance, threads=1)
+        return is_positive(exponent)
 
 
 def hysteresis(diagram: Bifurcation) -> npt.NDArray[np.bool_]:
@@ -262,25 +208,15 @@ def hysteresis(diagram: Bifurcation) -> npt.NDArray[np.bool_]:
     `printhammer.chaos.bifurcation.carry.SAME`; trains without a period are only told from periodic ones. All
     false where there is but one direction.
     """
-    found = np.zeros(len(diagram.values), np.bool_)
+    different = np.zeros(len(diagram.values), np.bool_)
     if len(diagram.directions) < 2:
-        return found
+        return different
     half = diagram.regime.window.half_widths
-    for k, (one, other) in enumerate(diagram.cycles.T.tolist()):
-        if one != other:
-            found[k] = True
-        elif one:
+    for k, (q, other) in enumerate(diagram.cycles.T.tolist()):
+        different[k] = q != other
+        if q and q == other:
             orbits = [
-                np.column_stack([diagram.x[way, k, -one:], diagram.v[way, k, -one:]]) / half for way in (0, 1)
+                np.column_stack([diagram.x[way, k, -q:], diagram.v[way, k, -q:]]) / half for way in (0, 1)
             ]
-            found[k] = orbit_distance(*orbits) > SAME
-    return found
-
-
-def _row(diagram: Bifurcation, direction: str | None) -> int:
-    if direction is None:
-        return 0
-    if direction not in diagram.directions:
-        known = " and ".join(diagram.directions)
-        raise InputError(f"direction = {direction!r}, expected what the diagram has: {known}")
-    return diagram.directions.index(direction)
+            different[k] = orbit_distance(*orbits) > SAME
+    return different

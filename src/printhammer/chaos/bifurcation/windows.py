@@ -93,9 +93,9 @@ class Route:
             )
         if self.first is None:
             return f"With {self.way} values no strange train comes: {way}."
-        told = "a series of doublings" if self.cascade else "no series of doublings"
+        series = "a series of doublings" if self.cascade else "no series of doublings"
         return (
-            f"With {self.way} values the first strange train comes at {self.first:.9g} after {told}: {way}."
+            f"With {self.way} values the first strange train comes at {self.first:.9g} after {series}: {way}."
         )
 
 

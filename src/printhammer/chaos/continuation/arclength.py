@@ -19,31 +19,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, MapValue, Node, between
+from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, Node
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.support.arrays import FloatArray
-
-__all__ = [
-    "Corrector",
-    "Curve",
-    "MapFamily",
-    "MapValue",
-    "Node",
-    "Steps",
-    "Stop",
-    "Watch",
-    "between",
-    "follow",
-]
 
 _GROWTH: Final = 1.5
 _LEAST_COSINE: Final = 0.97
@@ -165,19 +152,19 @@ def follow(
         raise InputError(f"parameter = {parameter:g}, expected one within the bounds {low:g} to {high:g}")
     follower = Corrector(family, scales, chosen.precision)
     z = follower.scaled(state, parameter)
-    given = None if row is None else np.asarray(row, dtype=np.float64)
-    start = follower.onto(z) if given is None else follower.correct(z, given)
+    leaving = None if row is None else np.asarray(row, dtype=np.float64)
+    start = follower.onto(z) if leaving is None else follower.correct(z, leaving)
     if start is None:
         why = f": {follower.trouble}" if follower.trouble else ""
         raise InputError(f"there is no fixed point near the parameter {parameter:.9g}{why}")
-    upward = start.tangent if given is not None or start.tangent[-1] >= 0.0 else -start.tangent
+    upward = start.tangent if leaving is not None or start.tangent[-1] >= 0.0 else -start.tangent
     halves: list[tuple[list[Node], Stop]] = []
     for sign in (-1.0, 1.0):
         if directions != "both" and (directions == "up") != (sign > 0.0):
-            told = f"the curve was not followed beyond the parameter {start.parameter:.9g}"
-            halves.append(([], Stop("not asked", start.parameter, start.state, told)))
+            sentence = f"the curve was not followed beyond the parameter {start.parameter:.9g}"
+            halves.append(([], Stop("not asked", start.parameter, start.state, sentence)))
             continue
-        begin = _turned(start, sign * upward)
+        begin = replace(start, tangent=sign * upward)
         nodes, stop = _half(follower, begin, (low, high), chosen, watch)
         halves.append((nodes, stop))
         if stop.reason == "closed":
@@ -187,16 +174,11 @@ def follow(
                 return Curve(whole, (stop, stop))
             return Curve([begin, *nodes], (stop, stop))
     (before, first), (after, last) = halves
-    middle = _turned(start, upward)
-    return Curve([*_reversed(before), middle, *after], (first, last))
-
-
-def _turned(node: Node, tangent: FloatArray, arc: float = 0.0) -> Node:
-    return Node(node.state, node.parameter, tangent, arc, node.value, node.residual)
+    return Curve([*_reversed(before), replace(start, tangent=upward), *after], (first, last))
 
 
 def _reversed(nodes: list[Node]) -> list[Node]:
-    return [_turned(node, -node.tangent, -node.arc) for node in reversed(nodes)]
+    return [replace(node, tangent=-node.tangent, arc=-node.arc) for node in reversed(nodes)]
 
 
 def _half(
@@ -205,65 +187,56 @@ def _half(
     """Follow a curve along the tangent of its start; nodes after it."""
     nodes: list[Node] = []
     here, length = start, steps.first
-    home = follower.scaled(start.state, start.parameter)
+    home = follower.point(start)
     outside = _beyond(start, bounds)
     if outside is not None:
         return nodes, _bound_stop(start, outside)
     while len(nodes) < steps.most:
-        z = follower.scaled(here.state, here.parameter)
+        z = follower.point(here)
         ahead = follower.correct(z + length * here.tangent, here.tangent, arc=here.arc + length)
-        trouble = follower.trouble
-        if ahead is None or not _joined(follower, here, ahead, length):
+        trouble, reached = follower.trouble, None
+        if ahead is not None and not _joined(follower, here, ahead, length):
+            ahead = None
+        if ahead is not None:
+            ahead = replace(ahead, arc=here.arc + float(np.linalg.norm(follower.point(ahead) - z)))
+            reached = _beyond_between(here, ahead, bounds)
+        if ahead is not None and reached is not None:
+            ahead = _at_parameter(follower, here, ahead, reached)
+        if ahead is None:
             length *= 0.5
             if length < steps.smallest:
                 return nodes, _lost(here, trouble)
             continue
-        moved = float(np.linalg.norm(follower.scaled(ahead.state, ahead.parameter) - z))
-        ahead = _turned(ahead, ahead.tangent, here.arc + moved)
-        reached = _beyond_between(here, ahead, bounds)
-        if reached is not None:
-            end = _at_parameter(follower, here, ahead, reached)
-            if end is None:
-                length *= 0.5
-                if length < steps.smallest:
-                    return nodes, _lost(here, trouble)
-                continue
-            stop = watch(here, end) if watch is not None else None
-            nodes.append(end if stop is None or stop.node is None else stop.node)
-            return nodes, stop or _bound_stop(end, reached)
-        if len(nodes) > 2 and _passes(follower, here, ahead, home, start):
-            end = _turned(start, start.tangent, here.arc + float(np.linalg.norm(home - z)))
-            nodes.append(end)
-            told = f"the curve closes upon itself at the parameter {start.parameter:.9g}"
-            return nodes, Stop("closed", start.parameter, start.state, told)
+        if reached is None and len(nodes) > 2 and _passes(follower, here, ahead, home, start):
+            nodes.append(replace(start, arc=here.arc + float(np.linalg.norm(home - z))))
+            sentence = f"the curve closes upon itself at the parameter {start.parameter:.9g}"
+            return nodes, Stop("closed", start.parameter, start.state, sentence)
         stop = watch(here, ahead) if watch is not None else None
+        if stop is None and reached is not None:
+            stop = _bound_stop(ahead, reached)
+        nodes.append(ahead if stop is None or stop.node is None else stop.node)
         if stop is not None:
-            nodes.append(ahead if stop.node is None else stop.node)
             return nodes, stop
-        nodes.append(ahead)
         if float(here.tangent @ ahead.tangent) > 0.5 * (1.0 + _LEAST_COSINE):
             length = min(length * _GROWTH, steps.largest)
         here = ahead
-    told = f"{steps.most} steps were taken, and the curve goes on at the parameter {here.parameter:.9g}"
-    return nodes, Stop("length", here.parameter, here.state, told)
+    sentence = f"{steps.most} steps were taken, and the curve goes on at the parameter {here.parameter:.9g}"
+    return nodes, Stop("length", here.parameter, here.state, sentence)
 
 
 def _joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
     """Return whether a corrected point lies on the same curve, as far as its distance and tangent tell."""
-    z = follower.scaled(ahead.state, ahead.parameter)
-    predicted = follower.scaled(here.state, here.parameter) + length * here.tangent
-    near = float(np.linalg.norm(z - predicted)) <= _FARTHEST * length
+    predicted = follower.point(here) + length * here.tangent
+    near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
     return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE
 
 
 def _lost(node: Node, trouble: str) -> Stop:
+    at = f"the parameter {node.parameter:.9g}"
+    reason, sentence = "lost", f"the curve was lost at {at}: Newton's method does not converge beyond"
     if trouble:
-        told = f"the map has no value beyond the parameter {node.parameter:.9g}: {trouble}"
-        return Stop("no value", node.parameter, node.state, told)
-    told = (
-        f"the curve was lost at the parameter {node.parameter:.9g}: Newton's method does not converge beyond"
-    )
-    return Stop("lost", node.parameter, node.state, told)
+        reason, sentence = "no value", f"the map has no value beyond {at}: {trouble}"
+    return Stop(reason, node.parameter, node.state, sentence)
 
 
 def _beyond(node: Node, bounds: tuple[float, float]) -> float | None:
@@ -290,32 +263,26 @@ def _bound_stop(node: Node, bound: float) -> Stop:
 def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float) -> Node | None:
     """Return the point between two nodes at a parameter, its tangent in the direction of travel."""
     share = (parameter - here.parameter) / (ahead.parameter - here.parameter)
-    one, other = (follower.scaled(node.state, node.parameter) for node in (here, ahead))
-    z = one + share * (other - one)
+    begin = follower.point(here)
+    z = begin + share * (follower.point(ahead) - begin)
     z[-1] = parameter / follower.scales[-1]
-    row = np.zeros(len(z))
-    row[-1] = 1.0
-    found = follower.correct(z, row)
-    if found is None:
+    node = follower.at_parameter(z)
+    if node is None:
         return None
-    tangent = found.tangent if found.tangent @ ahead.tangent > 0.0 else -found.tangent
-    where = follower.scaled(found.state, parameter)
-    where[-1] = z[-1]
-    exact = Node(found.state, parameter, tangent, here.arc, found.value, found.residual)
-    return _turned(exact, tangent, here.arc + float(np.linalg.norm(where - one)))
+    tangent = node.tangent if node.tangent @ ahead.tangent > 0.0 else -node.tangent
+    arc = here.arc + float(np.linalg.norm(follower.scaled(node.state, parameter) - begin))
+    return replace(node, parameter=parameter, tangent=tangent, arc=arc)
 
 
 def _passes(follower: Corrector, here: Node, ahead: Node, home: FloatArray, start: Node) -> bool:
     """Return whether the curve goes through its start between two nodes."""
-    one, other = (follower.scaled(node.state, node.parameter) for node in (here, ahead))
-    along = other - one
-    share = float((home - one) @ along) / float(along @ along)
+    begin = follower.point(here)
+    along = follower.point(ahead) - begin
+    share = float((home - begin) @ along) / float(along @ along)
     if not 0.0 < share <= 1.0 or float(start.tangent @ ahead.tangent) < 0.5:
         return False
-    if float(np.linalg.norm(one + share * along - home)) > _FARTHEST * float(np.linalg.norm(along)):
+    if float(np.linalg.norm(begin + share * along - home)) > _FARTHEST * float(np.linalg.norm(along)):
         return False
-    level = float(start.tangent @ (home - one - share * along))
-    found = follower.correct(one + share * along + level * start.tangent, start.tangent)
-    if found is None:
-        return False
-    return float(np.linalg.norm(follower.scaled(found.state, found.parameter) - home)) < _SAME
+    level = float(start.tangent @ (home - begin - share * along))
+    node = follower.correct(begin + share * along + level * start.tangent, start.tangent)
+    return node is not None and float(np.linalg.norm(follower.point(node) - home)) < _SAME

@@ -34,19 +34,6 @@ MOST: Final = 1000
 _DIGITS: Final = ".9g"
 
 
-def _of_events(name: str, unit: str, meaning: str, **more: Any) -> Column:
-    return Column(unit, meaning, ("event",), name=f"event_{name}", **more)
-
-
-EVENT_KIND: Final = _of_events("kind", "1", "what happens on the way", dtype=np.int32, codes=KINDS)
-EVENT_VALUE: Final = _of_events("value", "SI", "value of the constant")
-EVENT_AFTER: Final = _of_events("after", "1", "number of the orbit that it follows", dtype=np.int32)
-EVENT_LOCATED: Final = _of_events("located", "1", "whether it was located", dtype=np.int32)
-EVENT_TEXT: Final = _of_events("text", "", "what happens, in a few words")
-EVENT_BEFORE: Final = _of_events("contacts_before", "", "sequence of contacts before it")
-EVENT_BEYOND: Final = _of_events("contacts_after", "", "sequence of contacts after it")
-
-
 class Branch(Result):
     """A curve of periodic orbits along one constant.
 
@@ -133,11 +120,11 @@ class Branch(Result):
 
         Where the branch is born in a period doubling, as of the orbit beside it: a multiplier is 1 there.
         """
-        found = np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)
+        stable = np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)
         for end, beside, stop in ((0, 1, self.stops[0]), (-1, -2, self.stops[1])):
-            if stop.reason == BIRTH and len(found) > 1:
-                found[end] = found[beside]
-        return found
+            if stop.reason == BIRTH and len(stable) > 1:
+                stable[end] = stable[beside]
+        return stable
 
     @property
     @derived("1", "whether the branch is a closed loop", kind="column", dtype=np.int32)
@@ -172,22 +159,22 @@ class Branch(Result):
         own = super().entries()
         own["value"] = replace(own["value"][0], unit=self.unit, meaning=self.parameter), self.values
         for name in ("real", "imag"):
-            note = Column("1", f"{name} part of the multipliers", ("orbit", "multiplier"))
-            own[f"multiplier_{name}"] = (
-                replace(note, name=f"multiplier_{name}"),
-                getattr(self.multipliers, name),
-            )
+            pair = ("orbit", "multiplier")
+            note = Column("1", f"{name} part of the multipliers", pair, name=f"multiplier_{name}")
+            own[note.name] = note, getattr(self.multipliers, name)
         # At least one: a dimension of length 0 has another meaning in the classic NetCDF format.
         rows = self.events or (None,)
-        for note, missing, value in (
-            (EVENT_KIND, -1, lambda event: KINDS.index(event.kind)),
-            (replace(EVENT_VALUE, unit=self.unit, meaning=self.parameter), np.nan, lambda event: event.value),
-            (EVENT_AFTER, -1, lambda event: event.after),
-            (EVENT_LOCATED, -1, lambda event: event.sharp),
-            (EVENT_TEXT, "", lambda event: event.message),
-            (EVENT_BEFORE, "", lambda event: event.contacts[0]),
-            (EVENT_BEYOND, "", lambda event: event.contacts[1]),
+        for name, unit, meaning, missing, value in (
+            ("kind", "1", "what happens on the way", -1, lambda event: KINDS.index(event.kind)),
+            ("value", self.unit, self.parameter, np.nan, lambda event: event.value),
+            ("after", "1", "number of the orbit that it follows", -1, lambda event: event.after),
+            ("located", "1", "whether it was located", -1, lambda event: event.sharp),
+            ("text", "", "what happens, in a few words", "", lambda event: event.message),
+            ("contacts_before", "", "sequence of contacts before it", "", lambda event: event.contacts[0]),
+            ("contacts_after", "", "sequence of contacts after it", "", lambda event: event.contacts[1]),
         ):
+            codes, dtype = KINDS if name == "kind" else (), np.int32 if missing == -1 else None
+            note = Column(unit, meaning, ("event",), name=f"event_{name}", dtype=dtype, codes=codes)
             own[note.name] = note, np.array([missing if row is None else value(row) for row in rows])
         return own
 

@@ -19,20 +19,23 @@ that changes twice within one step is not seen.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.continuation.arclength import Corrector, MapValue, Stop, between, follow
+from printhammer.chaos.continuation.arclength import Stop, follow
+from printhammer.chaos.continuation.fixed_points import Corrector, MapValue, between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
     import numpy.typing as npt
 
-    from printhammer.chaos.continuation.arclength import Curve, MapFamily, Node, Steps, Watch
+    from printhammer.chaos.continuation.arclength import Curve, Steps, Watch
+    from printhammer.chaos.continuation.fixed_points import MapFamily, Node
     from printhammer.support.arrays import FloatArray
 
 Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change"]
@@ -91,9 +94,9 @@ def doubling_test(jacobian: FloatArray) -> float:
 
 def torus_test(jacobian: FloatArray) -> float:
     """Return the product over pairs of multipliers of mu_i mu_j - 1; 1 for a single one."""
-    found = np.linalg.eigvals(jacobian).astype(np.complex128)
-    i, j = np.triu_indices(len(found), 1)
-    return float(np.prod(found[i] * found[j] - 1.0).real)
+    multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
+    i, j = np.triu_indices(len(multipliers), 1)
+    return float(np.prod(multipliers[i] * multipliers[j] - 1.0).real)
 
 
 def fold_test(jacobian: FloatArray) -> float:
@@ -138,31 +141,30 @@ def points_of(
         "Neimark-Sacker": lambda node: torus_test(node.value.jacobian),
         "branching": branching_test,
     }
-    found: list[BranchPoint] = []
-    last = len(curve.nodes) - 2
-    for after, (here, ahead) in enumerate(zip(curve.nodes[:-1], curve.nodes[1:], strict=True)):
+    every: list[BranchPoint] = []
+    # At the period doubling from which an orbit comes its curve turns back; that is no fold.
+    places = (0, len(curve.nodes) - 2)
+    births = [place for place, stop in zip(places, curve.stops, strict=True) if stop.reason == BIRTH]
+    for after, (here, ahead) in enumerate(itertools.pairwise(curve.nodes)):
         kinds = [kind for kind, test in tests.items() if _changes_sign(test(here), test(ahead))]
-        # At the period doubling from which an orbit comes its curve turns back; that is no fold.
-        ends = (
-            after == 0 and curve.stops[0].reason == BIRTH,
-            after == last and curve.stops[1].reason == BIRTH,
-        )
-        if any(ends):
+        if after in births:
             kinds = [kind for kind in kinds if kind not in ("fold", "branching")]
-        here_found = []
+        points = []
         for kind in kinds:
             locate = _branching if kind == "branching" else _crossing
             share, node = locate(follower, here, ahead, tests[kind])
             if kind == "Neimark-Sacker" and not _has_pair(node if node is not None else here):
                 continue
-            here_found.append((share, kind, _point(kind, here, ahead, after, share, node)))
+            chord = _on_chord(here, ahead, share, here.arc + share * (ahead.arc - here.arc))
+            labels, sharp = (here.value.label, ahead.value.label), node is not None
+            points.append((share, kind, BranchPoint(kind, node or chord, after, labels, sharp)))
         if {"fold", "branching"} <= set(kinds):
-            places = {kind: share for share, kind, _ in here_found}
-            if abs(places["fold"] - places["branching"]) < _NEAR:
-                here_found = [entry for entry in here_found if entry[1] != "fold"]
-        here_found += _changes(follower, here, ahead, after, margin)
-        found += [point for *_, point in sorted(here_found, key=lambda entry: entry[0])]
-    return found
+            shares = {kind: share for share, kind, _ in points}
+            if abs(shares["fold"] - shares["branching"]) < _NEAR:
+                points = [entry for entry in points if entry[1] != "fold"]
+        points += _changes(follower, here, ahead, after, margin)
+        every += [point for *_, point in sorted(points, key=lambda entry: entry[0])]
+    return every
 
 
 def _changes_sign(before: float, after: float) -> bool:
@@ -170,24 +172,18 @@ def _changes_sign(before: float, after: float) -> bool:
     return before * after < 0.0 and max(abs(before), abs(after)) > _ROUNDING
 
 
-def _point(kind: Kind, here: Node, ahead: Node, after: int, share: float, node: Node | None) -> BranchPoint:
-    labels = (here.value.label, ahead.value.label)
-    if node is not None:
-        return BranchPoint(kind, node, after, labels)
-    middle = replace(
-        here,
-        state=here.state + share * (ahead.state - here.state),
-        parameter=here.parameter + share * (ahead.parameter - here.parameter),
-        arc=here.arc + share * (ahead.arc - here.arc),
+def _on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
+    """Return the place at a share of the straight way between two nodes."""
+    state = begin.state + share * (end.state - begin.state)
+    return replace(
+        begin, state=state, parameter=begin.parameter + share * (end.parameter - begin.parameter), arc=arc
     )
-    return BranchPoint(kind, middle, after, labels, sharp=False)
 
 
 def _has_pair(node: Node) -> bool:
     """Return whether a pair of complex multipliers lies close to the unit circle."""
-    found = node.multipliers
-    pair = np.abs(found.imag) > _REAL
-    return bool((pair & (np.abs(np.abs(found) - 1.0) < 1e-3)).any())
+    pair = np.abs(node.multipliers.imag) > _REAL
+    return bool((pair & (np.abs(np.abs(node.multipliers) - 1.0) < 1e-3)).any())
 
 
 def _crossing(
@@ -246,39 +242,29 @@ def _branching(
         low, high, one, other = max(share - off, low), min(share + off, high), before, beyond
     if one is here:
         return share, None
-    part = (share - low) / (high - low)
-    state = one.state + part * (other.state - one.state)
-    parameter = one.parameter + part * (other.parameter - one.parameter)
-    return share, replace(one, state=state, parameter=parameter)
+    return share, _on_chord(one, other, (share - low) / (high - low), one.arc)
 
 
 def _changes(
     follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
     """Return the places between two nodes at which the label changes."""
-    found: list[tuple[float, Kind, BranchPoint]] = []
+    changes: list[tuple[float, Kind, BranchPoint]] = []
     begin, first = 0.0, here
-    while first.value.label != ahead.value.label and len(found) < _ROUNDS:
+    while first.value.label != ahead.value.label and len(changes) < _ROUNDS:
         share, sides, sharp = _change(follower, here, ahead, (begin, first), margin)
-        middle = replace(
-            sides[0],
-            state=0.5 * (sides[0].state + sides[1].state),
-            parameter=0.5 * (sides[0].parameter + sides[1].parameter),
-        )
-        low, high = sides[0].arc, sides[1].arc
-        if sharp and high > low:
+        before, beyond = sides
+        if sharp and beyond.arc > before.arc:
             place = here.arc + share * (ahead.arc - here.arc)
-            part = min(max((place - low) / (high - low), 0.0), 1.0)
-            middle = replace(
-                middle,
-                state=sides[0].state + part * (sides[1].state - sides[0].state),
-                parameter=sides[0].parameter + part * (sides[1].parameter - sides[0].parameter),
-                arc=place,
-            )
-        labels = (first.value.label, sides[1].value.label)
-        found.append((share, "change", BranchPoint("change", middle, after, labels, sharp, sides)))
-        begin, first = (sides[1].arc - here.arc) / (ahead.arc - here.arc), sides[1]
-    return found
+            part = min(max((place - before.arc) / (beyond.arc - before.arc), 0.0), 1.0)
+            middle = _on_chord(before, beyond, part, place)
+        else:
+            state = 0.5 * (before.state + beyond.state)
+            middle = replace(before, state=state, parameter=0.5 * (before.parameter + beyond.parameter))
+        labels = (first.value.label, beyond.value.label)
+        changes.append((share, "change", BranchPoint("change", middle, after, labels, sharp, sides)))
+        begin, first = (beyond.arc - here.arc) / (ahead.arc - here.arc), beyond
+    return changes
 
 
 def _change(
@@ -321,27 +307,6 @@ def _change(
     return share, (inside, beyond), True
 
 
-def iterated(family: MapFamily, times: int) -> MapFamily:
-    """Return a map applied so many times, with its derivatives by the chain rule.
-
-    Its labels are the sequences of the labels of the single ones.
-    """
-
-    def repeated(state: FloatArray, parameter: float) -> MapValue:
-        count = len(state)
-        image, jacobian, slope = state, np.eye(count), np.zeros(count)
-        labels: list[Hashable] = []
-        for _ in range(times):
-            value = family(image, parameter)
-            if value.trouble:
-                return MapValue.none(count, value.trouble)
-            image, labels = value.image, [*labels, value.label]
-            jacobian, slope = value.jacobian @ jacobian, value.jacobian @ slope + value.slope
-        return MapValue(image, jacobian, slope, tuple(labels))
-
-    return repeated
-
-
 def follow_doubled(
     doubled: MapFamily,
     point: BranchPoint,
@@ -354,29 +319,10 @@ def follow_doubled(
 ) -> Curve:
     """Follow the orbits of twice the period that are born at a period doubling.
 
-    The first one is sought at a small scaled distance from the doubling point, in the direction of the
-    eigenvector whose multiplier is -1; its parameter is found with it, on whichever side it lies.
-
-    Parameters
-    ----------
-    doubled : callable
-        The map applied twice, such as `iterated(family, 2)`.
-    point : BranchPoint
-        The period doubling of the map itself.
-    scales, bounds, steps, watch
-        As for `printhammer.chaos.continuation.arclength.follow`.
-    amplitude : float, optional
-        The small distance, in scaled variables.
-
-    Returns
-    -------
-    Curve
-        From near the doubling point on.
-
-    Raises
-    ------
-    InputError
-        There is no such orbit near the point.
+    The first one is sought at a scaled distance `amplitude` from the doubling `point`, in the direction of
+    the eigenvector whose multiplier is -1; its parameter is found with it, on whichever side it lies.
+    `doubled` is the map applied twice; the other arguments are those of `follow`. InputError where there is
+    no such orbit near the point.
     """
     widths = np.asarray(scales, dtype=np.float64)
     jacobian = point.node.value.jacobian
@@ -401,29 +347,16 @@ def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
     """Return the period doubling at which an orbit of even period ends, where its curve passes one.
 
     There the states half a period apart become one, and the curve goes on as its own mirror image, the same
-    orbits half a period later.
-
-    Parameters
-    ----------
-    half : Corrector
-        Of the map over half the period.
-    here, ahead : Node
-        Successive nodes of the curve over the whole period.
-
-    Returns
-    -------
-    Stop or None
-        With the doubling on the curve over half the period as the last node; None where there is none.
+    orbits half a period later. `half` corrects onto the curve over half the period, `here` and `ahead` are
+    successive nodes of that over the whole. The stop has the doubling on the former as its node.
     """
     if here.tangent[-1] * ahead.tangent[-1] >= 0.0:
         return None
     share = here.tangent[-1] / (here.tangent[-1] - ahead.tangent[-1])
-    start, end = (half.scaled(node.state, node.parameter) for node in (here, ahead))
+    start, end = half.point(here), half.point(ahead)
     z = (1.0 - share) * start + share * end
-    row = np.zeros(len(z))
-    row[-1] = 1.0
-    single = half.correct(z, row)
-    if single is None or float(np.linalg.norm(half.scaled(single.state, single.parameter) - z)) > _HALF_NEAR:
+    single = half.at_parameter(z)
+    if single is None or float(np.linalg.norm(half.point(single) - z)) > _HALF_NEAR:
         return None
     if np.abs(single.multipliers + 1.0).min() > _HALF_DOUBLES:
         return None
@@ -433,16 +366,16 @@ def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
     value, twice = node.value, node.value.jacobian @ node.value.jacobian
     slope = value.jacobian @ value.slope + value.slope
     whole = MapValue(value.image, twice, slope, here.value.label, extra=value.extra)
-    arc = here.arc + float(np.linalg.norm(half.scaled(node.state, node.parameter) - start))
+    arc = here.arc + float(np.linalg.norm(half.point(node) - start))
     last = replace(node, value=whole, tangent=here.tangent, arc=arc)
-    told = f"the orbit ends at the parameter {node.parameter:.9g}, where one of half its period doubles"
-    return Stop(BIRTH, node.parameter, node.state, told, last)
+    sentence = f"the orbit ends at the parameter {node.parameter:.9g}, where one of half its period doubles"
+    return Stop(BIRTH, node.parameter, node.state, sentence, last)
 
 
 def doubling_near(follower: Corrector, node: Node) -> Node | None:
     """Return the period doubling near a fixed point on its curve, by the secant method; None if not found."""
     step = 1e-3
-    z = follower.scaled(node.state, node.parameter)
+    z = follower.point(node)
     before, value = node, doubling_test(node.value.jacobian)
     offset, at_before = 0.0, value
     place = step

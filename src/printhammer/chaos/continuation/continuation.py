@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, SupportsIndex, Unpack
 import numpy as np
 
 from printhammer.chaos.continuation.arclength import Steps
-from printhammer.chaos.continuation.branch import MOST, Branch
+from printhammer.chaos.continuation.branch import MOST
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbits
@@ -26,12 +26,11 @@ from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
+    from printhammer.chaos.continuation.branch import Branch
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
-
-__all__ = ["Branch", "continuation"]
 
 _SETTLE: Final = 500
 """Firings after which a train from rest is taken to have settled."""
@@ -99,7 +98,7 @@ def continuation(
     check_tolerance(tolerance)
     if isinstance(start, Orbit):
         fired = [value for name, value in firing.items() if name not in ("phase", "overlap")]
-        if any(given is not None for given in (*fired, state, firings)):
+        if any(value is not None for value in (*fired, state, firings)):
             raise InputError("an orbit is given, expected no period, rate, waveform, drive, firings or state")
         if not start.ok:
             raise InputError(f"the orbit to start from is none: {start.status}")
@@ -115,28 +114,23 @@ def continuation(
                 f"{parameter} = {own:.9g} {regime.quantity(parameter).si} at the start, expected one within"
                 f" the bounds {ends[0]:.9g} to {ends[1]:.9g}"
             )
-        given = None if firings is None else read_count(firings, "firings")
+        wanted = None if firings is None else read_count(firings, "firings")
         if state is None:
             fixed = isinstance(start, Regime) or firing.get("phase") is not None
-            regime, point, count = _orbit_to_start_from(regime, given, fixed, threads)
+            regime, point, count = _orbit_to_start_from(regime, wanted, fixed, threads)
         else:
-            point, count = np.array(state, dtype=np.float64), given or 1
-    work = Tracer(regime, parameter, read_bounds(regime, parameter, bounds), tolerance, threads)
+            point, count = np.array(state, dtype=np.float64), wanted or 1
+    tracer = Tracer(regime, parameter, read_bounds(regime, parameter, bounds), tolerance, threads)
     chosen = steps or Steps(most=read_count(most, "most"), precision=PRECISION)
-    return work.branch(point, count, chosen, progress)
+    return tracer.branch(point, count, chosen, progress)
 
 
 def _orbit_to_start_from(
     regime: Regime, firings: int | None, phase_given: bool, threads: int | None
 ) -> tuple[Regime, FloatArray, int]:
     """Return the regime at the phase of an orbit of it, a state of the orbit and its number of firings."""
-    (settled,) = strobes(
-        regime,
-        points=1,
-        transient=_SETTLE,
-        firings=(_SETTLE // 2, _SETTLE),
-        threads=threads,
-    )
+    judged = (_SETTLE // 2, _SETTLE)
+    (settled,) = strobes(regime, points=1, transient=_SETTLE, firings=judged, threads=threads)
     period = None if settled.verdict is None or not settled.ok else settled.verdict.period
     if period is not None and firings in (None, period):
         return regime, np.array([settled.x[0], settled.v[0]]), period

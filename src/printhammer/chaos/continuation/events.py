@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 EventKind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "grazing"]
-KINDS: Final = ("fold", "period doubling", "Neimark-Sacker", "branching", "grazing")
+KINDS: Final[tuple[str, ...]] = get_args(EventKind)
 
 Change = Literal["", "appears", "vanishes", "splits", "merges", "several"]
 
@@ -134,7 +134,7 @@ def stable_ranges(
     """Return the ranges of the constant over which the orbits of a branch are stable, ascending."""
     limits = [event for event in events if event.kind != "grazing"]
     values = along.tolist()
-    found: list[tuple[float, float]] = []
+    ranges: list[tuple[float, float]] = []
     begin: float | None = None
     for i, value in enumerate(values):
         if i and bool(stable[i]) != bool(stable[i - 1]):
@@ -143,10 +143,10 @@ def stable_ranges(
             if stable[i]:
                 begin = between[-1] if between else edge
             elif begin is not None:
-                found.append((begin, edge))
+                ranges.append((begin, edge))
                 begin = None
         elif not i and stable[0]:
             begin = value
     if begin is not None:
-        found.append((begin, values[-1]))
-    return sorted((min(pair), max(pair)) for pair in found)
+        ranges.append((begin, values[-1]))
+    return sorted((min(pair), max(pair)) for pair in ranges)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.continuation.arclength import MapValue
+from printhammer.chaos.continuation.fixed_points import MapValue
 from printhammer.chaos.strobe.map import IN_PACK, image_of, margin_of, usable
 from printhammer.errors import InputError
 from printhammer.run.contacts import contacts_of
@@ -80,14 +80,14 @@ class Passage:
     @property
     def dots(self) -> list[tuple[float, float] | None]:
         """Flight time, s, and impact speed, m/s, of the dot of each firing; None for a lost one."""
-        found: list[tuple[float, float] | None] = [None] * self.firings
+        dots: list[tuple[float, float] | None] = [None] * self.firings
         for touch in self.of("pack"):
             fired = math.floor(touch.t_in / self.period)
             flight = touch.t_in - fired * self.period
-            known = found[fired % self.firings]
+            known = dots[fired % self.firings]
             if known is None or flight < known[0]:
-                found[fired % self.firings] = (flight, touch.v_in)
-        return found
+                dots[fired % self.firings] = (flight, touch.v_in)
+        return dots
 
 
 @dataclass(frozen=True)
@@ -106,25 +106,10 @@ class Course:
 
 
 class RegimeFamily:
-    """The strobe map of a regime, iterated, with one constant as parameter.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer, periodic drive and phase of the section.
-    name : str
-        Of the constant, see `printhammer.run.regime.Regime.with_`.
-    firings : int
-        Number of periods.
-    tolerance : float
-        Error allowed in one step of a run.
-    """
+    """The strobe map of a regime, iterated `firings` times, with the constant `name` as parameter."""
 
     def __init__(self, regime: Regime, name: str, firings: int, tolerance: float) -> None:
-        self.regime = regime
-        self.name = name
-        self.firings = firings
-        self.tolerance = tolerance
+        self.regime, self.name, self.firings, self.tolerance = regime, name, firings, tolerance
 
     def __call__(self, state: FloatArray, parameter: float) -> MapValue:
         """Return the map at one state, m and m/s, and one value of the constant, SI."""
@@ -139,17 +124,19 @@ class RegimeFamily:
         record = problem.run(end)
         if record.status_name != "ok":
             return MapValue.none(2, record.status_name)
-        passage = self._passage(problem, record, end)
+        period = (end - problem.start) / self.firings
+        touches = _touches(hammer, record, problem.start - self.regime.phase * period, end - problem.start)
+        passage = Passage(touches, period, self.firings)
         if any(touch.v_in < _GENTLE * problem.scales[1] for touch in passage.of("pack")):
             image = np.array(record.nodes[-1, 1:3])
             jacobian = self._differences(problem, end, state)
             if not usable(hammer, *image.tolist()):
                 return MapValue.none(2, _IN_PACK)
         else:
-            found = image_of(regime, state, self.firings, self.tolerance, contacts=False)
-            if not found.ok:
-                return MapValue.none(2, _IN_PACK if found.status == IN_PACK else found.status)
-            image, jacobian = found.state, found.jacobian
+            reached = image_of(regime, state, self.firings, self.tolerance, contacts=False)
+            if not reached.ok:
+                return MapValue.none(2, _IN_PACK if reached.status == IN_PACK else reached.status)
+            image, jacobian = reached.state, reached.jacobian
         slope = self._slope(state, parameter, image)
         if slope is None or jacobian is None or not np.isfinite(jacobian).all():
             return MapValue.none(2, "the runs beside it did not come through")
@@ -177,10 +164,6 @@ class RegimeFamily:
                 return None
             columns.append((ends[1] - ends[0]) / (2.0 * move.sum()))
         return np.column_stack(columns)
-
-    def with_firings(self, firings: int) -> RegimeFamily:
-        """Return the same map with another number of periods."""
-        return RegimeFamily(self.regime, self.name, firings, self.tolerance)
 
     def _slope(self, state: FloatArray, parameter: float, image: FloatArray) -> FloatArray | None:
         step = _SPACING * (abs(parameter) or 1.0)
@@ -211,12 +194,6 @@ class RegimeFamily:
         problem = Problem(regime.hammer, train, start, float(moments[0]), self.tolerance)
         return problem, float(moments[-1])
 
-    def _passage(self, problem: Problem, record: Record, end: float) -> Passage:
-        period = (end - problem.start) / self.firings
-        zero = problem.start - self.regime.phase * period
-        touches = _touches(problem.hammer, record, zero, end - problem.start)
-        return Passage(touches, period, self.firings)
-
     def course(self, state: FloatArray, parameter: float) -> Course:
         """Return what an orbit does, given its state at the section."""
         regime = self.regime.with_(self.name, parameter)
@@ -243,7 +220,7 @@ def rigid_backstop(regime: Regime) -> bool:
 def _touches(hammer: Hammer, record: Record, zero: float, length: float) -> tuple[Touch, ...]:
     """Return the contacts of an orbit that begin in a record; one open at its end ends in the next period."""
     position, front = hammer.position, hammer.front
-    found = []
+    touches = []
     open_at_start = {int(row[0]): float(row[3]) for row in record.contacts if row[6]}
     for row in record.contacts:
         if row[6]:
@@ -254,5 +231,5 @@ def _touches(hammer: Hammer, record: Record, zero: float, length: float) -> tupl
         x = float(record.nodes[int(row[5]), 1])
         pack = front is not None and (position is None or abs(x - front) < abs(x - position))
         end = math.inf if math.isnan(leave) else leave - zero
-        found.append(Touch("pack" if pack else "backstop", float(row[1]) - zero, end, float(row[2])))
-    return tuple(found)
+        touches.append(Touch("pack" if pack else "backstop", float(row[1]) - zero, end, float(row[2])))
+    return tuple(touches)

@@ -76,8 +76,8 @@ class Node:
     @property
     def multipliers(self) -> npt.NDArray[np.complex128]:
         """Eigenvalues of dG/du, largest absolute value first."""
-        found = np.linalg.eigvals(self.value.jacobian).astype(np.complex128)
-        return found[np.argsort(-np.abs(found), kind="stable")]
+        values = np.linalg.eigvals(self.value.jacobian).astype(np.complex128)
+        return values[np.argsort(-np.abs(values), kind="stable")]
 
     @property
     def stable(self) -> bool:
@@ -88,14 +88,8 @@ class Node:
 class Corrector:
     """Corrects points onto the curves of one map family.
 
-    Parameters
-    ----------
-    family : callable
-        The map.
-    scales : array, shape (n + 1,)
-        By which the components of the state, and last the parameter, are divided.
-    precision : float
-        Scaled correction below which a point is on a curve.
+    The components of the state, and last the parameter, are divided by the scales, shape (n + 1,); a point is
+    on a curve where its scaled correction is below the precision.
     """
 
     def __init__(self, family: MapFamily, scales: npt.ArrayLike, precision: float) -> None:
@@ -110,6 +104,10 @@ class Corrector:
     def scaled(self, state: npt.ArrayLike, parameter: float) -> FloatArray:
         """Return a point in scaled variables."""
         return np.append(np.asarray(state, dtype=np.float64), parameter) / self.scales
+
+    def point(self, node: Node) -> FloatArray:
+        """Return a node in scaled variables."""
+        return self.scaled(node.state, node.parameter)
 
     def derivative(self, value: MapValue) -> FloatArray:
         """Return the scaled derivative of G(u, p) - u, shape (n, n + 1)."""
@@ -148,13 +146,15 @@ class Corrector:
             z, last = z + change, size
         return None
 
+    def at_parameter(self, z: FloatArray) -> Node | None:
+        """Return the fixed point near z at its parameter; None if not found."""
+        return self.correct(z, np.eye(self.count + 1)[-1])
+
     def onto(self, z: FloatArray) -> Node | None:
         """Return the fixed point near z that Newton's method with least corrections finds; None if none."""
-        row = np.zeros(self.count + 1)
-        row[-1] = 1.0
-        found = self.correct(z, row)
-        if found is not None:
-            return found
+        node = self.at_parameter(z)
+        if node is not None:
+            return node
         # At a fold the parameter cannot be held; the smallest correction can be taken instead.
         for _ in range(_MOST_CORRECTIONS):
             value = self.family(z[:-1] * self.scales[:-1], float(z[-1] * self.scales[-1]))
@@ -164,18 +164,16 @@ class Corrector:
             matrix = self.derivative(value)
             _, singular, rows = np.linalg.svd(matrix)
             if singular[-1] > 0.0:
-                found = self.correct(z, rows[-1])
-                if found is not None:
-                    return found
+                node = self.correct(z, rows[-1])
+                if node is not None:
+                    return node
             residual = (value.image - z[:-1] * self.scales[:-1]) / self.scales[:-1]
             z = z - np.linalg.pinv(matrix) @ residual
         return None
 
     def _tangent(self, matrix: FloatArray) -> FloatArray | None:
-        unit = np.zeros(self.count + 1)
-        unit[-1] = 1.0
         try:
-            tangent = np.linalg.solve(matrix, unit)
+            tangent = np.linalg.solve(matrix, np.eye(self.count + 1)[-1])
         except np.linalg.LinAlgError:
             return None
         length = float(np.linalg.norm(tangent))
@@ -187,15 +185,15 @@ def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node 
 
     The way is measured along the tangent of the first; the guess is the cubic through both.
     """
-    one, other = (follower.scaled(node.state, node.parameter) for node in (here, ahead))
-    chord = float(np.linalg.norm(other - one))
+    begin, end = follower.point(here), follower.point(ahead)
+    chord = float(np.linalg.norm(end - begin))
     h = share
     z = (
-        (1.0 + 2.0 * h) * (1.0 - h) ** 2 * one
+        (1.0 + 2.0 * h) * (1.0 - h) ** 2 * begin
         + h * (1.0 - h) ** 2 * chord * here.tangent
-        + h * h * (3.0 - 2.0 * h) * other
+        + h * h * (3.0 - 2.0 * h) * end
         - h * h * (1.0 - h) * chord * ahead.tangent
     )
-    level = float(here.tangent @ one) + share * float(here.tangent @ (other - one))
+    level = float(here.tangent @ begin) + share * float(here.tangent @ (end - begin))
     z = z + (level - float(here.tangent @ z)) * here.tangent
     return follower.correct(z, here.tangent, arc=here.arc + share * (ahead.arc - here.arc))

@@ -7,6 +7,7 @@ between two folds and is joined to nothing, is a closed loop.
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
@@ -77,12 +78,8 @@ class Branches(Result):
     def message(self) -> str:
         """What was found, in one line."""
         if not self.found:
-            return (
-                f"no branch was found; {'; '.join(self.refused)}" if self.refused else "no branch was found"
-            )
-        counts: dict[int, int] = {}
-        for branch in self.found:
-            counts[branch.firings] = counts.get(branch.firings, 0) + 1
+            return "; ".join(("no branch was found", *self.refused))
+        counts = Counter(branch.firings for branch in self.found)
         kinds = ", ".join(f"{number} of period {firings}" for firings, number in sorted(counts.items()))
         islands = sum(branch.closed for branch in self.found)
         closed = f", {islands} of them closed loops" if islands else ""
@@ -156,12 +153,8 @@ def regimes(
         How often the orbits born at period doublings are followed as well.
     waveform, overlap
         Of a hammer: as for `printhammer.Regime.of`.
-    most : int, optional
-        Number of steps of a branch in either direction.
-    tolerance : float, optional
-        Error allowed in one step of the runs.
-    threads : int, optional
-        By default as many as there are cores; the branches do not depend on it.
+    most, tolerance, threads
+        As for `printhammer.continuation`, for every branch.
     progress : callable, optional
         Called now and then with the amount of work that is done and of all that is known yet.
 
@@ -288,11 +281,8 @@ class _Collected:
                     self.refused.append(f"level {level + 1}, period doubling at {event.value:.9g}: {error}")
                     continue
                 middle = born.curve.nodes[len(born) // 2]
-                if not any(
-                    _on(other, middle.parameter, middle.state)
-                    for other in self.found
-                    if other.firings == born.firings
-                ):
+                alike = [other for other in self.found if other.firings == born.firings]
+                if not any(_on(other, middle.parameter, middle.state) for other in alike):
                     self.found.append(born)
 
 

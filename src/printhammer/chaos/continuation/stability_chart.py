@@ -17,13 +17,14 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
-from printhammer.chaos.continuation.arclength import MapValue, Steps, follow
+from printhammer.chaos.continuation.arclength import Steps, Stop, follow
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, torus_test
 from printhammer.chaos.continuation.continuation import continuation
+from printhammer.chaos.continuation.fixed_points import MapValue
 from printhammer.chaos.continuation.tracer import read_bounds
 from printhammer.chaos.strobe.map import image_of
-from printhammer.chaos.strobe.train import Train
+from printhammer.chaos.strobe.train import Train, run_trains
 from printhammer.chaos.strobe.verdict import period_of
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -35,8 +36,9 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.chaos.continuation.arclength import Curve, Stop
+    from printhammer.chaos.continuation.arclength import Curve
     from printhammer.chaos.continuation.events import BranchEvent
+    from printhammer.chaos.continuation.fixed_points import Node
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing, Regime
     from printhammer.support.arrays import FloatArray
@@ -122,11 +124,11 @@ class StabilityChart(Result):
     def message(self) -> str:
         """What was found, in one line."""
         kinds = [curve.kind for curve in self.curves]
-        told = ", ".join(f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)) or "none"
+        counts = ", ".join(f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)) or "none"
         share = float(np.mean(self.settled == self.firings)) if self.settled.size else 0.0
         missed = f"; {len(self.refused)} could not be followed" if self.refused else ""
         return (
-            f"curves on which the period-{self.firings} orbit loses its stability: {told}{missed};"
+            f"curves on which the period-{self.firings} orbit loses its stability: {counts}{missed};"
             f" from rest {100.0 * share:.0f} % of the grid settles to period {self.firings}"
         )
 
@@ -156,10 +158,8 @@ class StabilityChart(Result):
             limits[i, : len(curve.limits)] = curve.limits
         pair = ("curve", "point")
         own = super().entries()
-        own["kind"] = (
-            Column("1", "how stability is lost", ("curve",), name="kind", codes=tuple(_TESTS)),
-            codes,
-        )
+        kind = Column("1", "how stability is lost", ("curve",), name="kind", codes=tuple(_TESTS))
+        own["kind"] = kind, codes
         own["limits"] = Column("1", "whether stability is lost", pair, name="limits"), limits
         for k, (name, axis) in enumerate((("first", "main"), ("second", "value"))):
             own[name] = Column(self.units[k], self.names[k], pair, name=name), table[k]
@@ -231,9 +231,11 @@ def stability_chart(
         raise InputError(f"bounds = {bounds!r}, expected a range around the hammer's own {second}, {value:g}")
     if min(grid) < 0:
         raise InputError(f"grid = {grid!r}, expected two numbers of values, not negative")
-    work = _Chart(branch, second, ends, Steps(most=read_count(most, "most"), precision=_PRECISION))
-    limits = [event for event in branch.events if event.kind in _TESTS and _is_limit(event)]
-    curves, refused = work.curves(limits, thread_count(threads), progress)
+    chart = _Chart(branch, second, ends, Steps(most=read_count(most, "most"), precision=_PRECISION))
+    # The other multiplier lies inside the unit circle there.
+    lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + _SAME]
+    limits = [event for event in lost if event.kind in _TESTS]
+    curves, refused = chart.curves(limits, thread_count(threads), progress)
     axes, settled = _grid(branch, second, ends, grid, threads)
     return StabilityChart(
         regime=regime,
@@ -248,11 +250,6 @@ def stability_chart(
     )
 
 
-def _is_limit(event: BranchEvent) -> bool:
-    """Return whether the other multiplier lies inside the unit circle at an event."""
-    return bool(np.abs(event.multipliers).max() < 1.0 + _SAME)
-
-
 class _Chart:
     """The curves of one chart."""
 
@@ -265,31 +262,29 @@ class _Chart:
         self, limits: list[BranchEvent], threads: int, progress: Progress | None
     ) -> tuple[list[LossCurve], list[str]]:
         """Return a curve through each limit, but those that lie on one already."""
-        found: list[LossCurve] = []
+        curves: list[LossCurve] = []
         refused: list[str] = []
         left = list(limits)
         while left:
-            left = [event for event in left if not any(self.on(curve, event) for curve in found)]
+            left = [event for event in left if not any(self.on(curve, event) for curve in curves)]
             # As many at once whatever the number of threads, so that the outcome is the same.
             now, left = left[:2], left[2:]
             for event, curve in zip(now, mapped(self.curve, now, threads, length=1), strict=True):
                 if isinstance(curve, str):
                     refused.append(curve)
-                elif not any(self.on(other, event) for other in found):
-                    found.append(curve)
+                elif not any(self.on(other, event) for other in curves):
+                    curves.append(curve)
             if progress is not None:
                 progress(len(limits) - len(left), len(limits))
-        return found, refused
+        return curves, refused
 
     def curve(self, event: BranchEvent) -> LossCurve | str:
         """Return the curve through an event of the branch, or why there is none."""
-        regime = self.branch.regime
-        start = np.append(event.state, event.value)
         try:
             curve = follow(
                 self.family(event.kind),
-                start,
-                regime.value(self.second),
+                np.append(event.state, event.value),
+                self.branch.regime.value(self.second),
                 scales=self.scales,
                 bounds=self.bounds,
                 steps=self.steps,
@@ -299,16 +294,14 @@ class _Chart:
             return f"{event.kind} at {self.branch.parameter} = {event.value:.9g} {self.branch.unit}: {error}"
         return self.described(event.kind, curve)
 
-    def watch(self, here: Any, ahead: Any) -> Any:
+    def watch(self, here: Node, ahead: Node) -> Stop | None:
         """End a curve where the first constant leaves its bounds."""
-        from printhammer.chaos.continuation.arclength import Stop
-
         low, high = self.branch.bounds
         if low <= ahead.state[2] <= high:
             return None
         bound = low if ahead.state[2] < low else high
-        told = f"{self.branch.parameter} = {bound:.9g} {self.branch.unit} is the bound"
-        return Stop("bound", here.parameter, here.state, told, ahead)
+        sentence = f"{self.branch.parameter} = {bound:.9g} {self.branch.unit} is the bound"
+        return Stop("bound", here.parameter, here.state, sentence, ahead)
 
     def described(self, kind: str, curve: Curve) -> LossCurve:
         """Return a curve in the words of a chart."""
@@ -346,28 +339,22 @@ class _Chart:
         branch, test = self.branch, _TESTS[kind]
         scale = float(self.scales[2])
 
-        def images(points: list[tuple[FloatArray, float]]) -> list[tuple[FloatArray, FloatArray]] | str:
-            found = []
-            for whole, other in points:
-                try:
-                    regime = branch.regime.with_(self.second, other).with_(branch.parameter, float(whole[2]))
-                except InputError as error:
-                    return str(error)
-                image = image_of(regime, whole[:2], branch.firings, branch.tolerance, contacts=False)
-                if not image.ok or not np.isfinite(image.jacobian).all():
-                    return image.status if not image.ok else "no derivative"
-                found.append((image.state, image.jacobian))
-            return found
-
         def family(whole: FloatArray, other: float) -> MapValue:
             moves = _SPACING * self.scales
             points = [(whole, other)]
             points += [(whole + moves[k] * np.eye(3)[k], other) for k in range(3)]
             points.append((whole, other + moves[3]))
-            found = images(points)
-            if isinstance(found, str):
-                return MapValue.none(3, found)
-            (image, jacobian), *beside = found
+            values = []
+            for point, second in points:
+                try:
+                    regime = branch.regime.with_(self.second, second).with_(branch.parameter, float(point[2]))
+                except InputError as error:
+                    return MapValue.none(3, str(error))
+                end = image_of(regime, point[:2], branch.firings, branch.tolerance, contacts=False)
+                if not end.ok or not np.isfinite(end.jacobian).all():
+                    return MapValue.none(3, "no derivative" if end.ok else end.status)
+                values.append((end.state, end.jacobian))
+            (image, jacobian), *beside = values
             value = scale * test(jacobian)
             slopes = [(scale * test(near) - value) / moves[k] for k, (_, near) in enumerate(beside)]
             across = [(state - image) / moves[k] for k, (state, _) in enumerate(beside)]
@@ -376,12 +363,8 @@ class _Chart:
             matrix[:2, 2] = across[2]
             matrix[2] = slopes[:3]
             matrix[2, 2] += 1.0
-            return MapValue(
-                np.append(image, whole[2] + value),
-                matrix,
-                np.append(across[3], slopes[3]),
-                extra=jacobian,
-            )
+            slope = np.append(across[3], slopes[3])
+            return MapValue(np.append(image, whole[2] + value), matrix, slope, extra=jacobian)
 
         return family
 
@@ -390,27 +373,16 @@ def _grid(
     branch: Branch, second: str, bounds: tuple[float, float], grid: tuple[int, int], threads: int | None
 ) -> tuple[tuple[FloatArray, FloatArray], npt.NDArray[np.int64]]:
     """Return the values of both constants, and after how many firings trains from rest repeat there."""
-    regime = branch.regime
     axes = (np.linspace(*branch.bounds, grid[0]), np.linspace(*bounds, grid[1]))
     settled = np.zeros((grid[1], grid[0]), dtype=np.int64)
+    judged = np.arange(_FIRINGS - _JUDGED + 1, _FIRINGS + 1)
     for row, value in enumerate(axes[1]):
-        moved = regime.with_(second, float(value))
-        here = [moved.with_(branch.parameter, float(first)) for first in axes[0]]
-        trains = [Train.of(one.at_firings, _FIRINGS) for one in here]
-        settled[row] = _periods(trains, threads)
+        moved = branch.regime.with_(second, float(value))
+        regimes = [moved.with_(branch.parameter, float(first)) for first in axes[0]]
+        trains = [Train.of(regime.at_firings, _FIRINGS) for regime in regimes]
+        every, _ = run_trains(trains, judged, _GRID_TOLERANCE, None, threads=threads)
+        settled[row] = [
+            (period_of(states.distances(train)) or 0) if states.status == "ok" else -1
+            for train, states in zip(trains, every, strict=True)
+        ]
     return axes, settled
-
-
-def _periods(trains: list[Train], threads: int | None) -> npt.NDArray[np.int64]:
-    """Return after how many firings trains repeat; 0 where they do not, -1 where they stopped."""
-    from printhammer.chaos.strobe.train import run_trains
-
-    if not trains:
-        return np.zeros(0, np.int64)
-    chosen = np.arange(_FIRINGS - _JUDGED + 1, _FIRINGS + 1)
-    states, _ = run_trains(trains, chosen, _GRID_TOLERANCE, None, threads=threads)
-    found = []
-    for train, seen in zip(trains, states, strict=True):
-        period = period_of(seen.distances(train)) if seen.status == "ok" else -1
-        found.append(0 if period is None else period)
-    return np.array(found, dtype=np.int64)

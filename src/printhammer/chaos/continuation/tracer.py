@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.continuation.arclength import Corrector, Curve, Node, Steps, Stop, follow
+from printhammer.chaos.continuation.arclength import Curve, Steps, Stop, follow
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.branch_points import (
     BIRTH,
@@ -20,6 +20,7 @@ from printhammer.chaos.continuation.branch_points import (
 )
 from printhammer.chaos.continuation.events import event_of
 from printhammer.chaos.continuation.family import RegimeFamily, rigid_backstop
+from printhammer.chaos.continuation.fixed_points import Corrector, Node
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.support.threads import mapped
@@ -47,13 +48,7 @@ _DIGITS: Final = ".9g"
 def read_bounds(
     regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
 ) -> tuple[float, float]:
-    """Return the ends of a range of a constant, SI.
-
-    Raises
-    ------
-    InputError
-        There is no such constant, or the ends are not two ascending numbers.
-    """
+    """Return the ends of a range of a constant, SI; InputError where they are not two ascending numbers."""
     unit = regime.quantity(parameter).si
     try:
         low, high = bounds
@@ -65,20 +60,19 @@ def read_bounds(
     return ends
 
 
+@dataclass
 class Tracer:
     """What all branches along one constant of one regime have in common."""
 
-    def __init__(
-        self,
-        regime: Regime,
-        parameter: str,
-        bounds: tuple[float, float],
-        tolerance: float,
-        threads: int | None,
-    ) -> None:
-        self.regime, self.parameter, self.bounds = regime, parameter, bounds
-        self.tolerance, self.threads = tolerance, threads
-        self.scales = np.append(regime.window.half_widths, (bounds[1] - bounds[0]) / _PARTS)
+    regime: Regime
+    parameter: str
+    bounds: tuple[float, float]
+    tolerance: float
+    threads: int | None
+
+    def __post_init__(self) -> None:
+        part = (self.bounds[1] - self.bounds[0]) / _PARTS
+        self.scales = np.append(self.regime.window.half_widths, part)
 
     def family(self, firings: int) -> RegimeFamily:
         """Return the strobe map over so many firings."""
@@ -96,7 +90,7 @@ class Tracer:
             steps=steps,
             watch=self.watch(firings, steps, progress),
         )
-        return self.described(family, self.grazed(family, curve), steps)
+        return self.described(family, self.grazed(family, curve), steps, self.threads)
 
     def grazed(self, family: RegimeFamily, curve: Curve) -> Curve:
         """Return a curve that is lost where it grazes a rigid backstop with that as the reason.
@@ -108,9 +102,8 @@ class Tracer:
         stops = []
         for stop, nodes in zip(curve.stops, (curve.nodes, curve.nodes[::-1]), strict=True):
             place = self.zero_margin(family, nodes) if stop.reason in ("lost", "no value") else None
-            told = "it grazes the rigid backstop, where the strobe map has no derivative"
-            grazed = stop if place is None else Stop("grazing", place, nodes[0].state, told)
-            stops.append(grazed)
+            sentence = "it grazes the rigid backstop, where the strobe map has no derivative"
+            stops.append(stop if place is None else Stop("grazing", place, nodes[0].state, sentence))
         return Curve(curve.nodes, (stops[0], stops[1]))
 
     def zero_margin(self, family: RegimeFamily, nodes: list[Node]) -> float | None:
@@ -129,9 +122,6 @@ class Tracer:
 
     def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
         """Return the branch born at a period doubling of an orbit of so many firings."""
-        if threads != self.threads:
-            other = Tracer(self.regime, self.parameter, self.bounds, self.tolerance, threads)
-            return other.doubled(firings, event, most, threads)
         family = self.family(2 * firings)
         steps = Steps(most=most, precision=PRECISION)
         curve = follow_doubled(
@@ -143,23 +133,21 @@ class Tracer:
             watch=self.watch(2 * firings, steps, None),
         )
         value, state = event.value, event.point.node.state
-        told = f"the orbit is born at {self.at_value(value)}, where one of half its period doubles"
-        born = Stop(BIRTH, value, state, told)
+        sentence = f"the orbit is born at {self.at_value(value)}, where one of half its period doubles"
+        born = Stop(BIRTH, value, state, sentence)
         nodes = curve.nodes
         at_birth = family(state, value)
         if not at_birth.trouble:
             way = np.append(nodes[0].state - state, nodes[0].parameter - value) / self.scales
             arc = nodes[0].arc - float(np.linalg.norm(way))
             nodes = [Node(state, value, nodes[0].tangent, arc, at_birth, 0.0), *nodes]
-        return self.described(family, Curve(nodes, (born, curve.stops[1])), steps)
+        return self.described(family, Curve(nodes, (born, curve.stops[1])), steps, threads)
 
     def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
         """Return the orbit near a state at one value of the constant; None if there is none."""
         follower = Corrector(self.family(firings), self.scales, PRECISION)
-        row = np.zeros(3)
-        row[-1] = 1.0
-        found = follower.correct(follower.scaled(state, value), row)
-        return None if found is None else np.asarray(found.state)
+        node = follower.at_parameter(follower.scaled(state, value))
+        return None if node is None else np.asarray(node.state)
 
     def at_value(self, value: float) -> str:
         """Return a value of the constant with name and unit."""
@@ -180,8 +168,8 @@ class Tracer:
             if progress is not None:
                 progress(min(taken, 2 * steps.most), 2 * steps.most)
             if rigid and here.value.label != ahead.value.label:
-                told = "its sequence of contacts changes in a grazing, where the strobe map has no derivative"
-                return Stop("grazing", here.parameter, here.state, told, here)
+                why = "its sequence of contacts changes in a grazing, where the strobe map has no derivative"
+                return Stop("grazing", here.parameter, here.state, why, here)
             born = None if half is None else birth_of(half, here, ahead)
             if born is None:
                 shorter = [part for part in parts if self.repeats(part, ahead)]
@@ -208,22 +196,20 @@ class Tracer:
         """
         longest = max(shorter, key=lambda part: part.firings)
         half = Corrector(longest, self.scales, PRECISION)
-        row = np.zeros(3)
-        row[-1] = 1.0
-        single = half.correct(half.scaled(ahead.state, ahead.parameter), row)
+        single = half.at_parameter(half.point(ahead))
         node = None if single is None else doubling_near(half, single)
         if node is not None:
-            place, before = half.scaled(node.state, node.parameter), half.scaled(here.state, here.parameter)
-            step = float(np.linalg.norm(half.scaled(ahead.state, ahead.parameter) - before))
-            if float(np.linalg.norm(place - before)) < 3.0 * step:
+            before = half.point(here)
+            step = float(np.linalg.norm(half.point(ahead) - before))
+            if float(np.linalg.norm(half.point(node) - before)) < 3.0 * step:
                 return Stop(BIRTH, node.parameter, node.state, "born", here)
-        told = f"it merges with an orbit of {longest.firings} firings"
-        return Stop("merged", here.parameter, here.state, told, here)
+        sentence = f"it merges with an orbit of {longest.firings} firings"
+        return Stop("merged", here.parameter, here.state, sentence, here)
 
-    def described(self, family: RegimeFamily, curve: Curve, steps: Steps) -> Branch:
+    def described(self, family: RegimeFamily, curve: Curve, steps: Steps, threads: int | None) -> Branch:
         """Return a branch with all about its orbits."""
         nodes = curve.nodes
-        courses = mapped(lambda node: family.course(node.state, node.parameter), nodes, self.threads)
+        courses = mapped(lambda node: family.course(node.state, node.parameter), nodes, threads)
         count = len(nodes)
         passages: list[Passage] = [node.value.extra for node in nodes]
         dots = [passage.dots for passage in passages]
@@ -236,7 +222,7 @@ class Tracer:
             return np.array([getattr(course, name) for course in courses], dtype=np.float64)
 
         states = of_courses("states").reshape(count, family.firings, 2)
-        found = points_of(
+        points = points_of(
             family,
             curve,
             self.scales,
@@ -244,7 +230,7 @@ class Tracer:
             lambda node: family.margin(node.state, node.parameter),
         )
         lost = np.array([sum(dot is None for dot in row) for row in dots], dtype=np.int64)
-        stops = curve.stops
+        first, last = curve.stops
         return Branch(
             regime=self.regime,
             parameter=self.parameter,
@@ -269,8 +255,8 @@ class Tracer:
             backstop_loss=of_courses("backstop_loss"),
             residual=np.array([node.residual for node in nodes]),
             contacts=tuple(row.sequence for row in passages),
-            events=tuple(event_of(point) for point in found),
-            stops=(self.in_words(stops[0]), self.in_words(stops[1])),
+            events=tuple(event_of(point) for point in points),
+            stops=(self.in_words(first), self.in_words(last)),
             curve=curve,
             follow_doubled=partial(self.doubled, family.firings),
         )
@@ -290,5 +276,4 @@ class Tracer:
             BIRTH: f"at {at} it is born from an orbit of half its period, which doubles",
             "not asked": f"it was not followed beyond {at}",
         }
-        sentence = sentences.get(stop.reason, stop.sentence)
-        return Stop(stop.reason, stop.parameter, stop.state, sentence, stop.node)
+        return replace(stop, sentence=sentences.get(stop.reason, stop.sentence))

@@ -70,19 +70,14 @@ class LyapunovChart(Result, rows="period"):
         return provenance(hammer=self.hammer, waveform=waveform, overlap=overlap, tolerance=self.tolerance)
 
     @classmethod
-    def of(cls, found: Sequence[Lyapunov]) -> LyapunovChart:
-        """Make a chart of results for single trains.
-
-        Raises
-        ------
-        InputError
-            There are none.
-        """
-        if not found:
+    def of(cls, trains: Sequence[Lyapunov]) -> LyapunovChart:
+        """Make a chart of results for single trains; InputError where there are none."""
+        if not trains:
             raise InputError("periods: expected at least one train")
-        points = found[0].points
+        points = trains[0].points
         firings = int(points.firing[0]), int(points.firing[-1])
-        return _chart(points.hammer, points.drive, firings, points.tolerance, [_row(one) for one in found])
+        rows = [_row(train) for train in trains]
+        return _chart(points.hammer, points.drive, firings, points.tolerance, rows)
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
         """Return all columns over `period`, and both exponents side by side."""
@@ -117,10 +112,8 @@ def lyapunovs(
         Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
     firings, transient, tolerance
         As for `lyapunov`, for all trains.
-    threads : int, optional
-        By default as many as there are cores; the results do not depend on it.
-    progress : callable, optional
-        Called now and then with the number of trains that are done and of all.
+    threads, progress
+        As for `printhammer.chaos.strobes`.
 
     Returns
     -------
@@ -141,32 +134,23 @@ def lyapunovs(
     return _chart(trains[0].hammer, trains[0].drive, (first, first + counts[0]), tolerance, rows)
 
 
-def _row(found: Lyapunov) -> dict[str, Any]:
+def _row(train: Lyapunov) -> dict[str, Any]:
     """Return what a chart keeps of a train."""
-    return {
-        "period": found.period,
-        "exponents": found.exponents,
-        "standard_errors": found.standard_errors,
-        "total": found.total,
-        "total_error": found.total_error,
-        "dimension": found.dimension,
-        "dimension_error": found.dimension_error,
-        "k": math.nan if found.zero_one is None else found.zero_one.k,
-        "verdict": found.verdict.name,
-        "zero_one": "undecided" if found.zero_one is None else found.zero_one.verdict,
-        "growth": found.growth,
-        "status": found.status,
-        "smooth": found.smooth,
+    named = ("period", "exponents", "standard_errors", "total", "total_error", "dimension", "dimension_error")
+    test = train.zero_one
+    return {name: getattr(train, name) for name in (*named, "growth", "status", "smooth")} | {
+        "k": math.nan if test is None else test.k,
+        "verdict": train.verdict.name,
+        "zero_one": "undecided" if test is None else test.verdict,
     }
 
 
 def _chart(
     hammer: Hammer, drive: Drive, firings: tuple[int, int], tolerance: float, rows: list[dict[str, Any]]
 ) -> LyapunovChart:
-    named = ("verdict", "zero_one", "growth", "status")
-    columns: dict[str, Any] = {
-        name: tuple(row[name] for row in rows) if name in named else np.array([row[name] for row in rows])
-        for name in rows[0]
-    }
+    columns: dict[str, Any] = {}
+    for name in rows[0]:
+        cells = tuple(row[name] for row in rows)
+        columns[name] = cells if isinstance(cells[0], str) else np.array(cells)
     first, last = firings
     return LyapunovChart(hammer=hammer, drive=drive, first=first, last=last, tolerance=tolerance, **columns)

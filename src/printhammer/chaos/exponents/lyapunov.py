@@ -16,9 +16,9 @@ import numpy as np
 
 from printhammer.chaos.exponents.zero_one import FEWEST, ZeroOne, zero_one
 from printhammer.chaos.strobe.points import strobe_of
-from printhammer.chaos.strobe.train import States, Train
+from printhammer.chaos.strobe.train import States, Train, exponents_of
 from printhammer.chaos.strobe.verdict import SIGNIFICANT, verdict
-from printhammer.derivatives.states import standard_error, strobe_exponent
+from printhammer.derivatives.states import standard_error
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, derived, part, scalar
@@ -50,6 +50,8 @@ EXPONENT: Final = (
 )
 """Coordinate of both exponents."""
 
+_GROWTH: Final = ("firing", "exponent")
+_RUNNING: Final = ("count", "exponent")
 _COUNTS: Final = 100
 _CYCLES: Final = 8
 """Number of cycles below which their scatter says nothing."""
@@ -197,24 +199,18 @@ class Lyapunov(Result, rows="firing exponent"):
         The first firing has no growth, NaN.
         """
         counts, means, errors = self.running()
-        pair, per = ("count", "exponent"), PER_FIRING
-        numbers = Column("1", "number of firings averaged over", ("count",), "coordinate", dtype=np.int32)
-        growth = Column("1", "logarithm of the growth since the firing before", ("firing", "exponent"))
         own = self.points.entries()
-        return {
-            "factor": (
-                replace(growth, name="factor"),
-                np.concatenate([np.full((1, 2), np.nan), self.factors]),
-            ),
+        factors = np.concatenate([np.full((1, 2), np.nan), self.factors])
+        number = Column("1", "number of firings averaged over", ("count",), "coordinate", dtype=np.int32)
+        entries: dict[str, tuple[Column, Any]] = {
+            "factor": (Column("1", "logarithm of the growth since the firing before", _GROWTH), factors),
             **{name: own[name] for name in ("x", "v", "firing")},
-            "running": (Column(per, "running estimate", pair, name="running"), means),
-            "running_error": (
-                Column(per, "standard error of the running estimate", pair, name="running_error"),
-                errors,
-            ),
-            "count": (replace(numbers, name="count"), counts),
+            "running": (Column(PER_FIRING, "running estimate", _RUNNING), means),
+            "running_error": (Column(PER_FIRING, "standard error of the running estimate", _RUNNING), errors),
+            "count": (number, counts),
             "exponent": EXPONENT,
         }
+        return {name: (replace(note, name=name), values) for name, (note, values) in entries.items()}
 
 
 def lyapunov(
@@ -319,27 +315,19 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
     """Return the exponents of a train over a number of firings, after another number that is left out."""
     first = counts[1] + 1
     last = first + counts[0]
-    found = strobe_exponent(
-        train.hammer,
-        train.drive,
-        train.period,
-        first=first,
-        last=last,
-        state=train.state,
-        tolerance=tolerance,
-    )
-    points = _points(train, first, last, found, tolerance)
-    factors = np.column_stack([found.factors, found.second_factors])
+    (exponent,) = exponents_of([train], (first, last), tolerance, threads=1)
+    points = _points(train, first, last, exponent, tolerance)
+    factors = np.column_stack([exponent.factors, exponent.second_factors])
     judged = points.verdict
     whole = whole_cycles(factors, cycle_of(None if judged is None else judged.period, len(factors)))
     total = whole.sum(axis=1)
     values, errors, total_error = np.full(2, np.nan), np.full(2, np.nan), math.nan
     dimension = math.nan, math.nan
-    if found.ok:
+    if exponent.ok:
         values = whole.mean(axis=0)
         errors = np.array([standard_error(whole[:, k]) for k in (0, 1)])
         total_error = standard_error(total)
-    if found.ok and found.smooth:
+    if exponent.ok and exponent.smooth:
         dimension = kaplan_yorke(whole)
     return Lyapunov(
         points=points,
@@ -350,23 +338,17 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
         dimension=dimension[0],
         dimension_error=dimension[1],
         factors=factors,
-        smooth=found.smooth,
+        smooth=exponent.smooth,
         zero_one=zero_one(points) if len(points.x) >= FEWEST else None,
     )
 
 
-def _points(train: Train, first: int, last: int, found: Exponent, tolerance: float) -> Strobe:
+def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: float) -> Strobe:
     """Return the states that the tangent flow passed, judged."""
     firing = np.arange(first, last + 1)
-    known = np.isfinite(found.states[:, 2])
-    states = States(
-        t=train.times(firing),
-        x=found.states[:, 0],
-        v=found.states[:, 1],
-        branch=np.where(known, np.nan_to_num(found.states[:, 2]), -1).astype(np.int64),
-        memory=found.states[:, 3],
-        status=found.status,
-    )
-    stopped = "" if found.ok else found.status
-    judged = verdict(states.distances(train), (first, last), tolerance, found, stopped)
+    x, v, mode, memory = exponent.states.T
+    branch = np.where(np.isfinite(mode), np.nan_to_num(mode), -1).astype(np.int64)
+    states = States(train.times(firing), x, v, branch, memory, exponent.status)
+    stopped = "" if exponent.ok else exponent.status
+    judged = verdict(states.distances(train), (first, last), tolerance, exponent, stopped)
     return strobe_of(train, firing, states, tolerance, judged)

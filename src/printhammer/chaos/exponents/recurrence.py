@@ -146,20 +146,7 @@ def recurrence(
 
 
 def counted(matrix: npt.NDArray[np.bool_], threshold: float, theiler: int, shortest: int) -> Recurrence:
-    """Count the lines of a recurrence matrix.
-
-    Parameters
-    ----------
-    matrix : bool array, shape (n, n)
-        Symmetric, true on the main diagonal.
-    threshold, theiler, shortest
-        As for `Recurrence`.
-
-    Returns
-    -------
-    Recurrence
-        The matrix and its quantities.
-    """
+    """Count the lines of a recurrence matrix: symmetric, true on the main diagonal."""
     count = len(matrix)
     # The matrix is symmetric: one half of it has all diagonal lines.
     diagonals = np.sort(
@@ -195,11 +182,11 @@ def run_lengths(points: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
 def _distances(scaled: FloatArray) -> FloatArray:
     """Return the largest differences of a component of all pairs."""
     count = len(scaled)
-    found = np.empty((count, count))
+    distances = np.empty((count, count))
     for first in range(0, count, _ROWS):
         some = scaled[first : first + _ROWS, np.newaxis] - scaled[np.newaxis]
-        found[first : first + _ROWS] = np.abs(some).max(axis=2)
-    return found
+        distances[first : first + _ROWS] = np.abs(some).max(axis=2)
+    return distances
 
 
 def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:

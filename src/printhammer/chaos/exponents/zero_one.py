@@ -196,35 +196,22 @@ def zero_one(
         raise InputError(f"seed = {seed!r}, expected a whole number, not negative")
     chosen = np.random.default_rng(seed).uniform(*RANGE, many)
     length = numbers.size
-    if stopped:
-        unknown = np.full(length, np.nan)
-        return ZeroOne(
-            k=math.nan,
-            verdict="undecided",
-            reason=stopped,
-            length=length,
-            cycle=1,
-            resolution=least,
-            seed=seed,
-            angles=chosen,
-            correlations=np.full(many, np.nan),
-            shown=0,
-            displacement=unknown[: length // _CUT],
-            p=unknown,
-            q=unknown,
+    k, cycle, shown, correlations = math.nan, 1, 0, np.full(many, np.nan)
+    verdict, reason = "undecided", stopped
+    path = np.full((1, length), complex(math.nan, math.nan))
+    displacement = np.full(length // _CUT, np.nan)
+    if not stopped:
+        cycle, rest = without_cycle(numbers, least)
+        pieces = np.array_split(chosen, min(many, 1 + many * length // _TOGETHER))
+        correlations = np.concatenate(
+            [_correlations(_displacements(_paths(rest, some), least)) for some in pieces]
         )
-    cycle, rest = without_cycle(numbers, least)
-    found = np.concatenate(
-        [
-            _correlations(_displacements(_paths(rest, some), least))
-            for some in np.array_split(chosen, min(many, 1 + many * length // _TOGETHER))
-        ]
-    )
-    # The lower of the two in the middle, so that there is an angle which has it.
-    shown = int(np.argsort(found, kind="stable")[(many - 1) // 2])
-    path = _paths(rest, chosen[shown : shown + 1])
-    k = float(np.median(found))
-    verdict, reason = _judged(k, cycle, rest, least)
+        # The lower of the two in the middle, so that there is an angle which has it.
+        shown = int(np.argsort(correlations, kind="stable")[(many - 1) // 2])
+        path = _paths(rest, chosen[shown : shown + 1])
+        displacement = _displacements(path, least)[0]
+        k = float(np.median(correlations))
+        verdict, reason = _judged(k, cycle, rest, least)
     return ZeroOne(
         k=k,
         verdict=verdict,
@@ -234,9 +221,9 @@ def zero_one(
         resolution=least,
         seed=seed,
         angles=chosen,
-        correlations=found,
+        correlations=correlations,
         shown=shown,
-        displacement=_displacements(path, least)[0],
+        displacement=displacement,
         p=path[0].real.copy(),
         q=path[0].imag.copy(),
     )
@@ -275,20 +262,9 @@ def _displacements(paths: npt.NDArray[np.complex128], resolution: float) -> Floa
 def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArray]:
     """Return after how many numbers a series most nearly repeats itself, and what is left without that part.
 
-    Parameters
-    ----------
-    numbers : array, shape (n,)
-        The series.
-    resolution : float
-        Amplitude up to which changes count as none.
-
-    Returns
-    -------
-    cycle : int
-        The number q, 1 for the mean alone, whose q means are worth their number by the criterion of G.
-        Schwarz (Ann. Statist. 6 (1978) 461): n ln(variance left) + q ln(n) is least.
-    rest : array, shape (n,)
-        The series without the means of every q-th number.
+    That is the number q, 1 for the mean alone, whose q means are worth their number by the criterion of G.
+    Schwarz (Ann. Statist. 6 (1978) 461): n ln(variance left) + q ln(n) is least. Left is the series without
+    the means of every q-th number. Changes up to the resolution count as none.
     """
     worth = []
     for q in range(1, min(LONGEST_CYCLE, numbers.size // _PASSES) + 1):
@@ -307,19 +283,9 @@ def _less_means(numbers: FloatArray, q: int) -> FloatArray:
 
 
 def mean_square_displacements(paths: npt.NDArray[np.complex128], cut: int) -> FloatArray:
-    """Return mean |z(j + n) - z(j)|^2 over j, for n from 1 to `cut`, of each row z.
+    """Return mean |z(j + n) - z(j)|^2 over j, for n from 1 to `cut`, of each of m rows z, shape (m, cut).
 
-    Parameters
-    ----------
-    paths : complex array, shape (m, N)
-        The paths.
-    cut : int
-        Largest number of steps; j runs over the first N - cut places, so that all means are of equally many.
-
-    Returns
-    -------
-    array, shape (m, cut)
-        In the unit of the paths squared.
+    j runs over the first N - cut of N places, so that all means are of equally many.
     """
     many, count = paths.shape
     first = count - cut
@@ -339,10 +305,7 @@ def _correlations(displacements: FloatArray) -> FloatArray:
     away = np.arange(count) - 0.5 * (count - 1)
     rows = displacements - displacements.mean(axis=1, keepdims=True)
     sizes = np.sqrt((away**2).sum() * (rows**2).sum(axis=1))
-    found: FloatArray = np.divide(
-        (rows * away).sum(axis=1), sizes, out=np.zeros(len(rows)), where=sizes > 0.0
-    )
-    return found
+    return np.asarray(np.divide((rows * away).sum(axis=1), sizes, out=np.zeros(len(rows)), where=sizes > 0.0))
 
 
 def _numbers(series: npt.ArrayLike) -> FloatArray:

@@ -179,10 +179,8 @@ def sections(
         Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
     surface, touches, transient, firings, tolerance
         As for `section`, for all trains.
-    threads : int, optional
-        By default as many as there are cores; the touches do not depend on it.
-    progress : callable, optional
-        Called now and then with the number of trains that are done and of all.
+    threads, progress
+        As for `printhammer.chaos.strobes`.
 
     Returns
     -------
@@ -225,11 +223,11 @@ def _section(train: Train, surface: Surface, counts: tuple[int, int, int], toler
     problem = Problem(train.hammer, train.drive, state, 0.0, tolerance)
     firing = np.arange(1, skipped + limit + 2)
     times = train.times(firing)
-    found = touches_of(problem, surface, float(times[skipped]), float(times[-1]), wanted)
-    t, v, t_out, v_out = found.rows.T.copy()
+    touches = touches_of(problem, surface, float(times[skipped]), float(times[-1]), wanted)
+    t, v, t_out, v_out = touches.rows.T.copy()
     latest = np.searchsorted(times, t, side="right") - 1
-    # Touches are looked for up to the last one found, or as far as the run got.
-    until = t[-1] if len(t) == wanted else found.reached
+    # Touches are looked for up to the last one there is, or as far as the run got.
+    until = t[-1] if len(t) == wanted else touches.reached
     return Section(
         hammer=train.hammer,
         drive=train.drive,
@@ -244,6 +242,6 @@ def _section(train: Train, surface: Surface, counts: tuple[int, int, int], toler
         t_out=t_out,
         v_out=v_out,
         wanted=wanted,
-        status=found.status,
+        status=touches.status,
         tolerance=tolerance,
     )

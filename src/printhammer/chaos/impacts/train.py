@@ -102,13 +102,9 @@ class ImpactTrain(Result):
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
         """Return times over `impact`, histogram over `bin` and autocorrelation over `lag`."""
+        number = np.arange(1, len(self.times) + 1, dtype=np.int32)
         places = {
-            "impact": (
-                "1",
-                "number of the impact",
-                "impact",
-                np.arange(1, len(self.times) + 1, dtype=np.int32),
-            ),
+            "impact": ("1", "number of the impact", "impact", number),
             "lower_edge": ("s", "lower edge of the bin", "bin", self.edges[:-1]),
             "upper_edge": ("s", "upper edge of the bin", "bin", self.edges[1:]),
             "lag": ("1", "lag", "lag", np.arange(len(self.autocorrelation), dtype=np.int32)),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.chaos.orbits.newton import Guess
 from printhammer.chaos.strobe.map import WITH_MEMORY, front_with_memory
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.chaos.orbits.newton import Closing
-    from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
@@ -55,36 +54,12 @@ class Records:
     """Whether that is the whole state, shape (M, n)."""
 
 
-@dataclass(frozen=True)
-class Guess:
-    """A stretch of a motion that nearly closes."""
-
-    states: FloatArray
-    """States at the starts of the segments, shape (m, 2)."""
-    firings: npt.NDArray[np.int64]
-    """Number of firings in each, shape (m,)."""
-
-
 def record(
     regime: Regime, starts: FloatArray, firings: int, long: int, threads: int | None = None
 ) -> list[Records]:
-    """Follow a hammer from rest for a long time and from other states for a short one.
+    """Follow a hammer from states at a firing, shape (M, 2), and return a record for each of `PHASES`.
 
-    Parameters
-    ----------
-    regime : Regime
-        Hammer and periodic drive.
-    starts : array, shape (M, 2)
-        Displacements, m, and velocities, m/s, at a firing; the first one is followed for the long time.
-    firings, long : int
-        Number of firings of the short and the long time.
-    threads : int, optional
-        By default as many as there are cores.
-
-    Returns
-    -------
-    list of Records
-        One for each of `PHASES`.
+    From the first one for `long` firings, from the others for `firings`.
     """
     longest = max(firings, long) if len(starts) else 0
     drive, _ = regime.train(longest + 1)
@@ -102,40 +77,26 @@ def record(
     ).run(strobes=[times[times <= end] for end in ends], threads=threads)
     table = result.strobes
     assert table is not None
-    found = []
+    records = []
     for own in moments.values():
         columns = np.searchsorted(times, own)
         x, v, branch = (part[:, columns] for part in (table.x, table.v, table.branch))
         out = (x > front_with_memory(regime.hammer)) & (v <= 0.0)
         usable = np.isfinite(x) & ~np.isin(branch, WITH_MEMORY) & ~out
-        found.append(Records(np.stack([x, v], axis=2), usable))
-    return found
+        records.append(Records(np.stack([x, v], axis=2), usable))
+    return records
 
 
-def spread(regime: Regime, count: int, seen: FloatArray) -> FloatArray:
+def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
     """Return states spread evenly: half of them over the window, half over all that a motion visits.
 
     Where the way is not bounded by both backstop and pack, the latter is no smaller than six times the scales
     of the motion, which then are the half-widths of the window: a ball that bounces once a period rises five
-    of them high.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer and periodic drive.
-    count : int
-        Number of states.
-    seen : array, shape (n, 2)
-        States of a motion at the sections.
-
-    Returns
-    -------
-    array, shape (count, 2)
-        Displacement, m, and velocity, m/s.
+    of them high. States are displacement, m, and velocity, m/s, a row each.
     """
     window = regime.window
     low, high = np.array([window.x[0], window.v[0]]), np.array([window.x[1], window.v[1]])
-    known = seen[np.isfinite(seen).all(axis=1)]
+    known = visited[np.isfinite(visited).all(axis=1)]
     wide_low, wide_high = low.copy(), high.copy()
     if len(known):
         middle, half = 0.5 * (known.max(axis=0) + known.min(axis=0)), 0.5 * np.ptp(known, axis=0)
@@ -153,17 +114,13 @@ def spread(regime: Regime, count: int, seen: FloatArray) -> FloatArray:
     share = (0.5 + number * np.array([1.0 / _PLASTIC, 1.0 / _PLASTIC**2])) % 1.0
     odd = (number % 2).astype(bool)
     states: FloatArray = np.where(odd, wide_low + share * (wide_high - wide_low), low + share * (high - low))
-    least, most = _domain(regime.hammer)
+    # A motion may begin where the law of the magnet holds, and not behind a rigid backstop.
+    magnet, backstop = regime.hammer.magnet, regime.hammer.backstop
+    least, most = magnet.domain if magnet is not None else (-np.inf, np.inf)
+    if backstop is not None and backstop.law == "rigid":
+        least = max(least, backstop.position)
     states[:, 0] = np.clip(states[:, 0], least, most)
     return states
-
-
-def _domain(hammer: Hammer) -> tuple[float, float]:
-    """Return between which displacements a motion may begin, m."""
-    low, high = hammer.magnet.domain if hammer.magnet is not None else (-np.inf, np.inf)
-    if hammer.backstop is not None and hammer.backstop.law == "rigid":
-        low = max(low, hammer.backstop.position)
-    return low, high
 
 
 def first_state(regime: Regime) -> tuple[float, float]:
@@ -176,23 +133,10 @@ def first_state(regime: Regime) -> tuple[float, float]:
 
 
 def close_returns(records: Records, period: int, most: int, scales: FloatArray) -> list[Guess]:
-    """Return the closest returns of records after so many firings that are not alike.
+    """Return the closest returns of records after `period` firings that are not alike, `most` at most.
 
-    Parameters
-    ----------
-    records : Records
-        Of many motions.
-    period : int
-        Number of firings.
-    most : int
-        Largest number of guesses.
-    scales : array, shape (2,)
-        Half-widths of the window.
-
-    Returns
-    -------
-    list of Guess
-        The first half are the closest of all, the others the closest of those that begin early.
+    The first half are the closest of all, the others the closest of those that begin early; distances are in
+    the scales, the half-widths of the window.
     """
     scaled = records.states / scales
     count = scaled.shape[1] - period
@@ -203,53 +147,41 @@ def close_returns(records: Records, period: int, most: int, scales: FloatArray) 
     # Late returns lie close to what attracts, early ones everywhere.
     early = gap.copy()
     early[:, _EARLY:] = np.inf
-    found: list[Guess] = []
+    guesses: list[Guess] = []
     kept = np.empty((most, period, 2))
     for among, up_to, apart in ((gap, most - most // 2, _ALIKE), (early, most, _EARLY_ALIKE)):
         flat = among.reshape(-1)
         known = int(np.isfinite(flat).sum())
         for place in np.argsort(flat, kind="stable")[: min(known, _LOOKED_AT)]:
-            if len(found) == up_to:
+            if len(guesses) == up_to:
                 break
             member, first = divmod(int(place), count)
             cycle = scaled[member, first : first + period]
-            if _is_new(cycle, kept[: len(found)], apart):
-                kept[len(found)] = cycle
-                found.append(_guess(records, member, first, period))
-    return found
+            if _is_new(cycle, kept[: len(guesses)], apart):
+                kept[len(guesses)] = cycle
+                starts = np.flatnonzero(records.usable[member, first : first + period])
+                lengths = np.diff(np.append(starts, period)).astype(np.int64)
+                guesses.append(Guess(records.states[member, first + starts], lengths))
+    return guesses
 
 
-def joined(shorter: Sequence[Closing], period: int, most: int, scales: FloatArray) -> list[Guess]:
-    """Return guesses made of two shorter orbits, one run through after the other.
+def joined(shorter: Sequence[Guess], period: int, most: int, scales: FloatArray) -> list[Guess]:
+    """Return guesses of `period` firings made of two shorter orbits, one run through after the other.
 
-    Parameters
-    ----------
-    shorter : sequence of Closing
-        Orbits of fewer firings.
-    period : int
-        Number of firings.
-    most : int
-        Largest number of guesses.
-    scales : array, shape (2,)
-        Half-widths of the window.
-
-    Returns
-    -------
-    list of Guess
-        Those with the smallest jump from one orbit to the other first.
+    `most` at most, those with the smallest jump from one orbit to the other first.
     """
-    found: list[tuple[float, Guess]] = []
-    for k, one in enumerate(shorter):
+    guesses: list[tuple[float, Guess]] = []
+    for k, orbit in enumerate(shorter):
         for other in shorter[:k]:
-            if int(one.firings.sum() + other.firings.sum()) != period:
+            if int(orbit.firings.sum() + other.firings.sum()) != period:
                 continue
-            gaps = np.abs((one.states[:, np.newaxis] - other.states) / scales).max(axis=2)
+            gaps = np.abs((orbit.states[:, np.newaxis] - other.states) / scales).max(axis=2)
             here, there = (int(place) for place in np.unravel_index(np.argmin(gaps), gaps.shape))
-            states = [np.roll(one.states, -here, axis=0), np.roll(other.states, -there, axis=0)]
-            firings = [np.roll(one.firings, -here), np.roll(other.firings, -there)]
+            states = [np.roll(orbit.states, -here, axis=0), np.roll(other.states, -there, axis=0)]
+            firings = [np.roll(orbit.firings, -here), np.roll(other.firings, -there)]
             guess = Guess(np.concatenate(states), np.concatenate(firings))
-            found.append((float(gaps[here, there]), guess))
-    return [guess for _gap, guess in sorted(found, key=lambda pair: pair[0])[:most]]
+            guesses.append((float(gaps[here, there]), guess))
+    return [guess for _gap, guess in sorted(guesses, key=lambda pair: pair[0])[:most]]
 
 
 def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
@@ -260,9 +192,3 @@ def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
         float(np.abs(kept - np.roll(cycle, shift, axis=0)).max(axis=(1, 2)).min()) > apart
         for shift in range(len(cycle))
     )
-
-
-def _guess(records: Records, member: int, first: int, period: int) -> Guess:
-    starts = np.flatnonzero(records.usable[member, first : first + period])
-    lengths = np.diff(np.append(starts, period))
-    return Guess(records.states[member, first + starts], lengths.astype(np.int64))

@@ -6,15 +6,21 @@ derivative from their differences: good enough for Newton's method to come close
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.chaos.orbits.newton import CLOSED, Images
-from printhammer.chaos.strobe.map import IN_PACK, WITH_MEMORY, Image, image_of, usable
-from printhammer.errors import InputError
+from printhammer.chaos.strobe.map import (
+    IN_PACK,
+    RANGE_LEFT,
+    WITH_MEMORY,
+    Image,
+    image_of,
+    possible,
+    usable,
+)
 from printhammer.run.ensemble import Ensemble
-from printhammer.run.start import initial_state
 from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
@@ -23,7 +29,6 @@ if TYPE_CHECKING:
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
-RANGE_LEFT: Final = "range left"
 _SPACING: Final = 1e-5
 """Distance of neighbours, in half-widths of the window."""
 _PIECE: Final = 30_000
@@ -31,17 +36,7 @@ _PIECE: Final = 30_000
 
 
 class ExactMaps:
-    """Images with derivatives from the tangent flow, one at a time in threads.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer, periodic drive and phase of the section.
-    tolerance : float
-        Of the integration.
-    threads : int, optional
-        By default as many as there are cores.
-    """
+    """Images with derivatives from the tangent flow, one at a time in threads."""
 
     def __init__(self, regime: Regime, tolerance: float, threads: int | None = None) -> None:
         self.regime, self.tolerance = regime, tolerance
@@ -53,27 +48,15 @@ class ExactMaps:
         def image(i: int) -> Image:
             return image_of(self.regime, states[i], int(firings[i]), self.tolerance, contacts=False)
 
-        found = Images.empty(len(states))
-        for i, one in enumerate(mapped(image, range(len(states)), self.threads)):
-            found.states[i], found.jacobians[i], found.smooth[i] = one.state, one.jacobian, one.smooth
-            found.reasons[i] = CLOSED if one.ok else one.status
-        return found
+        images = Images.empty(len(states))
+        for i, own in enumerate(mapped(image, range(len(states)), self.threads)):
+            images.states[i], images.jacobians[i], images.smooth[i] = own.state, own.jacobian, own.smooth
+            images.reasons[i] = CLOSED if own.ok else own.status
+        return images
 
 
 class FastMaps:
-    """Images with derivatives from differences, in an ensemble.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer, periodic drive and phase of the section.
-    tolerance : float
-        Of the integration.
-    longest : int
-        Largest number of firings.
-    threads : int, optional
-        By default as many as there are cores; the images do not depend on it.
-    """
+    """Images after `longest` firings at most with derivatives from differences, in an ensemble."""
 
     def __init__(self, regime: Regime, tolerance: float, longest: int, threads: int | None = None) -> None:
         self.regime, self.tolerance, self.threads = regime, tolerance, threads
@@ -83,58 +66,41 @@ class FastMaps:
 
     def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
         """Return the images of states, each after its own number of firings."""
-        found = Images.empty(len(states))
-        step = _SPACING * self.scales
+        images = Images.empty(len(states))
+        step, hammer = _SPACING * self.scales, self.regime.hammer
         neighbours = states[:, np.newaxis] + np.array([[0.0, 0.0], [step[0], 0.0], [0.0, step[1]]])
-        allowed = np.array([all(self._possible(row) for row in three) for three in neighbours], np.bool_)
-        found.reasons[~allowed] = RANGE_LEFT
-        out = np.array(
-            [not all(usable(self.regime.hammer, x, v) for x, v in three) for three in neighbours], np.bool_
+        allowed, whole = (
+            np.array([all(test(hammer, x, v) for x, v in three) for three in neighbours], np.bool_)
+            for test in (possible, usable)
         )
-        found.reasons[allowed & out] = IN_PACK
-        rows = np.flatnonzero(allowed & ~out)
-        for begin in range(0, len(rows), _PIECE // 3):
-            self._piece(rows[begin : begin + _PIECE // 3], neighbours, firings, found, step)
-        return found
-
-    def _possible(self, state: FloatArray) -> bool:
-        try:
-            initial_state(self.regime.hammer, (float(state[0]), float(state[1])))
-        except InputError:
-            return False
-        return True
-
-    def _piece(
-        self,
-        rows: npt.NDArray[np.int64],
-        neighbours: FloatArray,
-        firings: npt.NDArray[np.int64],
-        found: Images,
-        step: FloatArray,
-    ) -> None:
-        ends = np.repeat(self.moments[firings[rows]], 3)
-        ensemble = Ensemble(
-            self.regime.hammer,
-            self.drive,
-            ends,
-            states=neighbours[rows].reshape(-1, 2),
-            starts=float(self.moments[0]),
-            tolerance=self.tolerance,
-        )
-        result = ensemble.run(strobes=ends[:, np.newaxis], threads=self.threads)  # type: ignore[arg-type]
-        table = result.strobes
-        assert table is not None
-        shape = (len(rows), 3)
-        final = np.stack([table.x[:, 0].reshape(shape), table.v[:, 0].reshape(shape)], axis=2)
-        kept = np.isin(table.branch[:, 0].reshape(shape), WITH_MEMORY).any(axis=1)
-        names = np.array(result.status_names).reshape(shape)
-        stopped = ~result.ok.reshape(shape)
-        found.states[rows] = final[:, 0]
-        found.jacobians[rows] = np.stack(
-            [(final[:, 1 + k] - final[:, 0]) / step[k] for k in range(2)], axis=2
-        )
-        found.smooth[rows] = True
-        why = np.where(kept, IN_PACK, CLOSED)
-        first = np.argmax(stopped, axis=1)
-        failed = stopped.any(axis=1)
-        found.reasons[rows] = np.where(failed, names[np.arange(len(rows)), first], why)
+        images.reasons[~allowed] = RANGE_LEFT
+        images.reasons[allowed & ~whole] = IN_PACK
+        every = np.flatnonzero(allowed & whole)
+        for begin in range(0, len(every), _PIECE // 3):
+            rows = every[begin : begin + _PIECE // 3]
+            ends = np.repeat(self.moments[firings[rows]], 3)
+            ensemble = Ensemble(
+                hammer,
+                self.drive,
+                ends,
+                states=neighbours[rows].reshape(-1, 2),
+                starts=float(self.moments[0]),
+                tolerance=self.tolerance,
+            )
+            strobes: Any = ends[:, np.newaxis]
+            result = ensemble.run(strobes=strobes, threads=self.threads)
+            table = result.strobes
+            assert table is not None
+            shape = (len(rows), 3)
+            final = np.stack([table.x[:, 0].reshape(shape), table.v[:, 0].reshape(shape)], axis=2)
+            kept = np.isin(table.branch[:, 0].reshape(shape), WITH_MEMORY).any(axis=1)
+            names = np.array(result.status_names).reshape(shape)
+            stopped = ~result.ok.reshape(shape)
+            images.states[rows] = final[:, 0]
+            slopes = [(final[:, 1 + k] - final[:, 0]) / step[k] for k in range(2)]
+            images.jacobians[rows] = np.stack(slopes, axis=2)
+            images.smooth[rows] = True
+            why = np.where(kept, IN_PACK, CLOSED)
+            first = np.argmax(stopped, axis=1)
+            images.reasons[rows] = np.where(stopped.any(axis=1), names[np.arange(len(rows)), first], why)
+        return images

@@ -58,13 +58,19 @@ class StrobeMaps(Protocol):
 
 
 @dataclass(frozen=True)
-class Closing:
-    """What Newton's method made of one guess."""
+class Guess:
+    """A stretch of a motion that nearly closes."""
 
     states: FloatArray
     """States at the starts of the segments, shape (m, 2)."""
     firings: npt.NDArray[np.int64]
     """Number of firings in each segment, shape (m,)."""
+
+
+@dataclass(frozen=True)
+class Closing(Guess):
+    """What Newton's method made of one guess."""
+
     jacobians: FloatArray
     """Derivative of the end of each segment with respect to its start. Shape (m, 2, 2)."""
     residual: float
@@ -92,30 +98,12 @@ def close_orbits(
 ) -> list[Closing]:
     """Make guesses of orbits, all of as many segments, close by Newton's method with shortened steps.
 
-    Parameters
-    ----------
-    maps : callable
-        Makes the images.
-    guesses : array, shape (n, m, 2)
-        States at the starts of the segments of each orbit.
-    firings : int array, shape (n, m)
-        Numbers of firings in the segments.
-    scales : array, shape (2,)
-        Half-widths of the window, m and m/s.
-    goal : float
-        Residual, in half-widths, at which no more is asked for.
-    enough : float
-        Residual which will do where it gets no smaller.
-    iterations : int
-        Largest number of evaluations of each orbit.
-
-    Returns
-    -------
-    list of Closing
-        One for each guess.
+    Guesses are states at the starts of the segments, shape (n, m, 2), with numbers of firings, shape (n, m);
+    the scales are the half-widths of the window, m and m/s. In units of these, `goal` is the residual at
+    which no more is asked for, and `enough` that which will do where it gets no smaller; `iterations` is the
+    largest number of evaluations of each orbit.
     """
     search = _Search(maps, guesses, firings, scales)
-    search.start()
     for _ in range(iterations):
         rows = search.step(goal, enough)
         if not rows.size:
@@ -140,13 +128,9 @@ class _Search:
         self.share = np.ones(count)
         self.direction = np.zeros_like(self.z)
         self.open = np.ones(count, np.bool_)
-
-    def start(self) -> None:
-        """Evaluate the guesses."""
-        every = np.arange(len(self.z))
+        every = np.arange(count)
         self._take(every, *self._evaluate(self.z, every))
-        failed = ~np.isfinite(self.residual)
-        self.open &= ~failed
+        self.open &= np.isfinite(self.residual)
 
     def step(self, goal: float, enough: float) -> npt.NDArray[np.int64]:
         """Try one step of every orbit that is open; return which those were."""
@@ -164,11 +148,11 @@ class _Search:
         left = rows[~better]
         self.share[left] *= 0.5
         close = self.residual[left] <= enough
-        self._end_rows(left[close], CLOSED)
+        self._end(left[close], CLOSED)
         given_up = ~close & (self.share[left] < _LEAST_SHARE)
         why = np.where(reasons[~better] == CLOSED, STUCK, reasons[~better])
         for row, reason in zip(left[given_up], why[given_up], strict=True):
-            self._end_rows(np.array([row]), str(reason))
+            self._end(np.array([row]), str(reason))
         return rows
 
     def result(self, enough: float) -> list[Closing]:
@@ -186,10 +170,7 @@ class _Search:
             for i in range(len(self.z))
         ]
 
-    def _end(self, which: npt.NDArray[np.bool_], reason: str) -> None:
-        self._end_rows(np.flatnonzero(which), reason)
-
-    def _end_rows(self, rows: npt.NDArray[np.int64], reason: str) -> None:
+    def _end(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_], reason: str) -> None:
         self.reasons[rows] = reason
         self.open[rows] = False
 
@@ -242,6 +223,6 @@ class _Search:
                 step = np.full(2 * m, np.nan)
             size = float(np.abs(step).max())
             if not np.isfinite(size):
-                self._end_rows(np.array([row]), SINGULAR)
+                self._end(np.array([row]), SINGULAR)
                 continue
             self.direction[row] = (step * min(1.0, _LONGEST_STEP / size if size else 1.0)).reshape(m, 2)

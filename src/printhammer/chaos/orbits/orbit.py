@@ -270,17 +270,7 @@ def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orb
 
 
 def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
-    """Return all about an orbit that Newton's method has closed.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer, periodic drive and phase of the section.
-    closing : Closing
-        The orbit.
-    tolerance : float
-        Of the integration.
-    """
+    """Return all about an orbit that Newton's method has closed, or why it has not."""
     firings = int(closing.firings.sum())
     if not closing.closed:
         return no_orbit(regime, firings, tolerance, closing.reason)
@@ -364,8 +354,8 @@ class _Run:
         firings = self.regime.moments(self.train, self.periods, 0.0)
         marks = firings[:-1] if self.regime.phase == 0.0 else firings[1:]
         marks = np.concatenate([self.sections[:1], marks])
-        found = follow(self.problem, marks, np.eye(3), renormalise=False).states[1:]
-        return found if self.regime.phase == 0.0 else np.roll(found, 1, axis=0)
+        states = follow(self.problem, marks, np.eye(3), renormalise=False).states[1:]
+        return states if self.regime.phase == 0.0 else np.roll(states, 1, axis=0)
 
 
 def _contacts_and_dots(
@@ -383,40 +373,37 @@ def _contacts_and_dots(
         if contact.initial or not begin <= contact.t_in < begin + period:
             continue
         back = run.fired_at + (period if contact.t_in - run.fired_at >= period else 0.0)
-        fired = None if contact.firing is None else (contact.firing - before) % firings
-        contacts.append(_earlier(contact, back, fired if regime.drive is None else None))
+        fired = contact.firing if regime.drive is None else None
+        contacts.append(
+            replace(
+                contact,
+                t_in=contact.t_in - back,
+                t_out=None if contact.t_out is None else contact.t_out - back,
+                t_peak=contact.t_peak - back,
+                firing=None if fired is None else (fired - before) % firings,
+            )
+        )
     contacts.sort(key=lambda contact: contact.t_in)
     if regime.drive is not None:
         return tuple(contacts), ()
-    found = motion.dots[before + skipped : before + skipped + firings]
+    fired_dots = motion.dots[before + skipped : before + skipped + firings]
     dots = [
         replace(dot, index=k, fired_at=k * regime.period)
-        for k, dot in enumerate([*found[firings - skipped :], *found[: firings - skipped]])
+        for k, dot in enumerate([*fired_dots[firings - skipped :], *fired_dots[: firings - skipped]])
     ]
     return tuple(contacts), tuple(dots)
-
-
-def _earlier(contact: Contact, back: float, firing: int | None) -> Contact:
-    """Return a contact with times on another axis."""
-    return replace(
-        contact,
-        t_in=contact.t_in - back,
-        t_out=None if contact.t_out is None else contact.t_out - back,
-        t_peak=contact.t_peak - back,
-        firing=firing,
-    )
 
 
 def _numbers(values: Iterable[float | None]) -> FloatArray:
     return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
 
 
-def orbits_table(found: Sequence[Orbit], attributes: Mapping[str, Any]) -> pd.DataFrame:
+def orbits_table(orbits: Sequence[Orbit], attributes: Mapping[str, Any]) -> pd.DataFrame:
     """Return orbits as a table, a row for each firing of each."""
     import pandas as pd
 
     tables = []
-    for number, orbit in enumerate(found):
+    for number, orbit in enumerate(orbits):
         columns: dict[str, Any] = {"orbit": np.full(orbit.firings, number)}
         entries = orbit.entries()
         for name, (note, value) in entries.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
 
-    from printhammer.chaos.orbits.guesses import Guess, Records
+    from printhammer.chaos.orbits.guesses import Records
+    from printhammer.chaos.orbits.newton import Guess
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
@@ -87,8 +88,8 @@ class Orbits(Result):
     @property
     def counts(self) -> dict[str, int]:
         """Number of orbits of each kind that there is."""
-        told = Counter(orbit.kind for orbit in self.found)
-        return {kind: told[kind] for kind in KINDS if told[kind]}
+        counts = Counter(orbit.kind for orbit in self.found)
+        return {kind: counts[kind] for kind in KINDS if counts[kind]}
 
     @property
     def message(self) -> str:
@@ -173,8 +174,7 @@ def orbits(
     if most > MOST_FIRINGS:
         raise InputError(f"longest = {most}, expected at most {MOST_FIRINGS} firings")
     check_tolerance(tolerance)
-    search = _Search(regime, most, several, tolerance, thread_count(threads), progress)
-    return search.run(count)
+    return _Search(regime, most, several, tolerance, thread_count(threads), progress).run(count)
 
 
 def orbit(
@@ -199,10 +199,8 @@ def orbit(
     phase : float, optional
         Instead of that of the regime. The armature must not be on its way out of the pack there, where the
         state has a memory.
-    tolerance : float, optional
-        Error allowed in one step of the runs.
-    threads : int, optional
-        By default as many as there are cores.
+    tolerance, threads
+        As for `orbits`.
 
     Returns
     -------
@@ -217,11 +215,10 @@ def orbit(
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     check_tolerance(tolerance)
-    found = read_state(state)
+    states = [read_state(state)]
     if count > MOST_FIRINGS:
         raise InputError(f"firings = {count}, expected at most {MOST_FIRINGS}")
     scales = regime.window.half_widths
-    states, images = [found], None
     exact = ExactMaps(regime, tolerance, threads)
     for _ in range(count - 1):
         images = exact(states[-1][np.newaxis], np.ones(1, np.int64))
@@ -245,42 +242,34 @@ def shortest(closing: Closing, scales: FloatArray) -> Closing:
         after = int(ends[k - 1])
         gap = float(np.abs((closing.states[k] - closing.states[0]) / scales).max())
         if total % after == 0 and gap <= _SAME:
-            return Closing(
-                closing.states[:k],
-                closing.firings[:k],
-                closing.jacobians[:k],
-                closing.residual,
-                closing.smooth,
-                closing.reason,
-            )
+            parts = closing.states[:k], closing.firings[:k], closing.jacobians[:k]
+            return Closing(*parts, closing.residual, closing.smooth, closing.reason)
     return closing
 
 
+@dataclass
 class _Search:
     """A search that is under way."""
 
-    def __init__(
-        self,
-        regime: Regime,
-        longest: int,
-        several: int,
-        tolerance: float,
-        threads: int,
-        progress: Progress | None,
-    ) -> None:
-        self.regime, self.longest, self.several = regime, longest, several
-        self.tolerance, self.threads, self.progress = tolerance, threads, progress
-        self.scales = regime.window.half_widths
+    regime: Regime
+    longest: int
+    several: int
+    tolerance: float
+    threads: int
+    progress: Progress | None
+
+    def __post_init__(self) -> None:
+        self.scales = self.regime.window.half_widths
         self.failures: Counter[str] = Counter()
-        self.tried = [0] * longest
+        self.tried = [0] * self.longest
         self.repeats = 0
         self.done, self.all = 0, 1
 
     def run(self, starts: int) -> Orbits:
         rest = np.array([first_state(self.regime)])
         self.all = 2 + 2 * self.longest
-        (seen, *_others) = record(self.regime, rest, 1, _LONG, self.threads)
-        begun = np.vstack([rest, spread(self.regime, starts, seen.states[0])])
+        (settling, *_others) = record(self.regime, rest, 1, _LONG, self.threads)
+        begun = np.vstack([rest, spread(self.regime, starts, settling.states[0])])
         records = record(self.regime, begun, 2 * self.longest, _LONG, self.threads)
         self._tell(1)
         closed: list[tuple[Regime, Closing]] = []
@@ -291,11 +280,11 @@ class _Search:
             regime = replace(self.regime, phase=phase)
             closed += [(regime, closing) for closing in self._through(regime, kept)]
         self._tell(self.all - self.done - 1)
-        found = self._described(closed)
+        described = self._described(closed)
         self._tell(1)
         return Orbits(
             regime=self.regime,
-            found=tuple(found),
+            found=tuple(described),
             longest=self.longest,
             starts=len(begun),
             guesses=tuple(self.tried),
@@ -318,22 +307,20 @@ class _Search:
             tried += joined(different, period, self.several, self.scales)
             self.tried[period - 1] += len(tried)
             for closing in _closed(fast, tried, self.scales, _FAST):
-                if closing.closed:
-                    self._add(different, shortest(closing, self.scales))
-                else:
-                    self.failures[closing.reason] += 1
+                self._add(different, closing)
             self._tell(1)
         exact = ExactMaps(regime, self.tolerance, self.threads)
         refined: list[Closing] = []
         for closing in _closed(exact, different, self.scales, _EXACT):
-            if closing.closed:
-                self._add(refined, shortest(closing, self.scales))
-            else:
-                self.failures[closing.reason] += 1
+            self._add(refined, closing)
         return refined
 
     def _add(self, different: list[Closing], closing: Closing) -> None:
-        """Add an orbit unless it is among them: orbits that share a state are one."""
+        """Add an orbit that closes unless it is among them: orbits that share a state are one."""
+        if not closing.closed:
+            self.failures[closing.reason] += 1
+            return
+        closing = shortest(closing, self.scales)
         for k, other in enumerate(different):
             gaps = np.abs((other.states[:, np.newaxis] - closing.states) / self.scales).max(axis=2)
             if gaps.min() <= _SAME:
@@ -345,44 +332,43 @@ class _Search:
 
     def _described(self, closed: Sequence[tuple[Regime, Closing]]) -> list[Orbit]:
         """Return all about the orbits, without those that were found at another section too."""
-        found: list[Orbit] = []
-        for one in mapped(lambda pair: orbit_of(*pair, self.tolerance), closed, self.threads):
-            if not one.ok:
-                self.failures[one.status] += 1
-            elif any(self._same(one, other) for other in found):
+        different: list[Orbit] = []
+        for orbit in mapped(lambda pair: orbit_of(*pair, self.tolerance), closed, self.threads):
+            if not orbit.ok:
+                self.failures[orbit.status] += 1
+            elif any(self._same(orbit, other) for other in different):
                 self.repeats += 1
             else:
-                found.append(one)
-        return sorted(found, key=lambda orbit: (orbit.firings, KINDS.index(orbit.kind), *orbit.x, *orbit.v))
+                different.append(orbit)
+        return sorted(
+            different, key=lambda orbit: (orbit.firings, KINDS.index(orbit.kind), *orbit.x, *orbit.v)
+        )
 
-    def _same(self, one: Orbit, other: Orbit) -> bool:
-        if one.firings != other.firings:
+    def _same(self, orbit: Orbit, other: Orbit) -> bool:
+        if orbit.firings != other.firings:
             return False
         gaps = np.maximum(
-            np.abs(one.x[0] - other.x) / self.scales[0], np.abs(one.v[0] - other.v) / self.scales[1]
+            np.abs(orbit.x[0] - other.x) / self.scales[0], np.abs(orbit.v[0] - other.v) / self.scales[1]
         )
         nearest = int(np.argmin(gaps))
-        memory = abs(one.memory[0] - other.memory[nearest]) / self.scales[0]
-        return bool(max(gaps[nearest], memory) <= _SAME and one.branch[0] == other.branch[nearest])
+        memory = abs(orbit.memory[0] - other.memory[nearest]) / self.scales[0]
+        return bool(max(gaps[nearest], memory) <= _SAME and orbit.branch[0] == other.branch[nearest])
 
 
 def _closed(
     maps: ExactMaps | FastMaps,
-    tried: Sequence[Guess] | Sequence[Closing],
+    tried: Sequence[Guess],
     scales: FloatArray,
     options: Mapping[str, Any],
 ) -> list[Closing]:
     """Return what becomes of guesses, in their order; those with as many segments are closed together."""
-    found: dict[int, Closing] = {}
+    known: dict[int, Closing] = {}
     counts = [len(guess.firings) for guess in tried]
     for segments in sorted(set(counts)):
         rows = [i for i, count in enumerate(counts) if count == segments]
-        closings = close_orbits(
-            maps,
-            np.array([tried[i].states for i in rows]),
-            np.array([tried[i].firings for i in rows]),
-            scales,
-            **options,
+        states, firings = (
+            np.array([getattr(tried[i], name) for i in rows]) for name in ("states", "firings")
         )
-        found |= dict(zip(rows, closings, strict=True))
-    return [found[i] for i in range(len(tried))]
+        closings = close_orbits(maps, states, firings, scales, **options)
+        known |= dict(zip(rows, closings, strict=True))
+    return [known[i] for i in range(len(tried))]

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 
-__all__ = ["IN_PACK", "MAP_TOLERANCE", "Image", "strobe_map", "strobe_maps", "strobe_slope"]
-
 MAP_TOLERANCE: Final = 1e-13
 """Tolerance with which the map is computed: its noise limits how well a fixed point can be known."""
 
@@ -51,7 +49,9 @@ WITH_MEMORY: Final = tuple(
 )
 """Modes whose state has a memory."""
 _OK: Final = "ok"
-_RANGE_LEFT: Final = "range left"
+RANGE_LEFT: Final = "range left"
+"""Status where no motion can be at a displacement."""
+
 _TURN_STEPS: Final = 60
 _STILL: Final = 1e-9
 """Speed, in units of the typical one, below which an extremum is found: its place is exact to the square."""
@@ -143,19 +143,13 @@ def strobe_map(
 
 
 def read_state(state: npt.ArrayLike) -> FloatArray:
-    """Read displacement, m, and velocity, m/s.
-
-    Raises
-    ------
-    InputError
-        It is not two finite numbers.
-    """
-    found = np.asarray(state, dtype=np.float64)
-    if found.shape != (2,) or not np.isfinite(found).all():
+    """Read displacement, m, and velocity, m/s; InputError where it is not two finite numbers."""
+    pair = np.asarray(state, dtype=np.float64)
+    if pair.shape != (2,) or not np.isfinite(pair).all():
         raise InputError(
             f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
         )
-    return found
+    return pair
 
 
 def strobe_maps(
@@ -179,10 +173,8 @@ def strobe_maps(
         Displacements, m, and velocities, m/s.
     firings, phase, tolerance, contacts
         As for `strobe_map`, for all.
-    threads : int, optional
-        By default as many as there are cores; the images do not depend on it.
-    progress : callable, optional
-        Called now and then with the number of images that are done and of all.
+    threads, progress
+        As for `printhammer.chaos.strobes`.
 
     Raises
     ------
@@ -263,11 +255,10 @@ def image_of(
     """Do as `strobe_map` with arguments that are known to be right."""
     train, _ = regime.train(firings)
     moments = regime.moments(train, firings)
-    try:
-        start = initial_state(regime.hammer, (float(state[0]), float(state[1])))
-    except InputError:
-        return _no_image(_RANGE_LEFT)
-    if not usable(regime.hammer, start[0], start[1]):
+    start = float(state[0]), float(state[1])
+    if not possible(regime.hammer, *start):
+        return _no_image(RANGE_LEFT)
+    if not usable(regime.hammer, *start):
         return _no_image(IN_PACK)
     problem = Problem(regime.hammer, train, start, float(moments[0]), tolerance)
     followed = follow(problem, moments[[0, -1]], np.eye(3), renormalise=False)
@@ -291,6 +282,15 @@ def image_of(
     )
 
 
+def possible(hammer: Hammer, x: float, v: float) -> bool:
+    """Whether a motion can begin with a displacement, m, and a velocity, m/s."""
+    try:
+        initial_state(hammer, (x, v))
+    except InputError:
+        return False
+    return True
+
+
 def usable(hammer: Hammer, x: float, v: float) -> bool:
     """Whether displacement, m, and velocity, m/s, alone are a state: not so on the way out of the pack."""
     return not (v <= 0.0 and x > front_with_memory(hammer))
@@ -312,11 +312,11 @@ def margin_of(problem: Problem, record: Record) -> float:
     hammer, (way, speed) = problem.hammer, problem.scales
     surfaces = [place for place in (hammer.position, hammer.front) if place is not None]
     x, sign = _turns(problem, record)
-    found = [sign * (x - place) / way for place in surfaces]
+    margins = [sign * (x - place) / way for place in surfaces]
     nodes = record.nodes
     rebound = (nodes[1:, 0] == nodes[:-1, 0]) & (nodes[:-1, 2] < 0.0) & (nodes[1:, 2] >= 0.0)
-    found.append((nodes[:-1, 2][rebound] / speed) ** 2)
-    every = np.concatenate(found)
+    margins.append((nodes[:-1, 2][rebound] / speed) ** 2)
+    every = np.concatenate(margins)
     return float(every[np.argmin(np.abs(every))]) if every.size else math.nan
 
 

@@ -139,7 +139,7 @@ def strobe(
     InputError
         An argument is not what is described above, or the hammer has no waveform or no rest state.
     """
-    (found,) = strobes(
+    (points_of_train,) = strobes(
         Regime.of(hammer, **firing),
         points=points,
         transient=transient,
@@ -148,7 +148,7 @@ def strobe(
         verdict=verdict,
         every_exponent=True,
     )
-    return found
+    return points_of_train
 
 
 def strobes(
@@ -185,7 +185,7 @@ def strobes(
         Whether to compute the exponent of periodic trains too, which takes several times as long as their
         points and does not change the verdict.
     threads : int, optional
-        By default as many as there are cores; the points do not depend on it.
+        By default as many as there are cores; the results do not depend on it.
     progress : callable, optional
         Called now and then with the amount of work that is done and of all.
 
@@ -206,13 +206,13 @@ def strobes(
     many = regimes_of(hammers, periods, drives, waveform=waveform, overlap=overlap, phase=phase)
     rows = None if states is None else np.asarray(states, dtype=np.float64).reshape(-1, 2).tolist()
     size = max(len(many), 0 if rows is None else len(rows)) if many and rows != [] else 0
-    for name, given in (("hammers and periods", many), ("states", rows)):
-        if given is not None and len(given) not in (1, size):
-            raise InputError(f"{name}: {len(given)} are given, expected 1 or {size}")
+    for name, entries in (("hammers and periods", many), ("states", rows)):
+        if entries is not None and len(entries) not in (1, size):
+            raise InputError(f"{name}: {len(entries)} are given, expected 1 or {size}")
     begun = [None] if rows is None else [(x, v) for x, v in rows]
     trains = [Train.of(many[i % len(many)], fired, begun[i % len(begun)]) for i in range(size)]
     chosen = np.arange(skipped + 1, skipped + count + 1)
-    found, verdicts = run_trains(
+    every, verdicts = run_trains(
         trains,
         chosen,
         tolerance,
@@ -222,18 +222,15 @@ def strobes(
         progress=progress,
     )
     return [
-        strobe_of(train, chosen, states_found, tolerance, judged)
-        for train, states_found, judged in zip(trains, found, verdicts, strict=True)
+        strobe_of(train, chosen, states_of_train, tolerance, judged)
+        for train, states_of_train, judged in zip(trains, every, verdicts, strict=True)
     ]
 
 
 def points_of(series: Any, firing: Firing) -> Any:
-    """Return the settled strobe points of a regime, or of a hammer and how it is fired; else what is given.
+    """Return the settled strobe points of a regime, or of a hammer and how it is fired; others as they are.
 
-    Raises
-    ------
-    InputError
-        As for `strobe`; or points are given, and how to fire beside them.
+    InputError as for `strobe`, or where there are points, and how to fire beside them.
     """
     if isinstance(series, Hammer | Regime):
         return strobe(series, points=_SETTLED, transient=_SETTLED, verdict=False, **firing)
@@ -252,12 +249,7 @@ def strobe_of(
         period=train.period,
         phase=train.regime.phase,
         firing=firing,
-        t=states.t,
-        x=states.x,
-        v=states.v,
-        branch=states.branch,
-        memory=states.memory,
-        status=states.status,
+        **vars(states),
         tolerance=tolerance,
         verdict=judged,
     )

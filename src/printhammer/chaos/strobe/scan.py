@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.chaos.strobe.train import Train, exponents_of, run_trains
+from printhammer.chaos.strobe.train import Train, exponents_of, exponents_onward, run_trains
 from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, period_of, verdict
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
@@ -45,10 +45,9 @@ CLOSER: Final = 1e-2
 LARGEST_MULTIPLIER: Final = 0.99
 """Largest absolute value of an eigenvalue with which it does."""
 
-_BEFORE: Final = 100
-_SHORT: Final = 300
+_SHORT: Final = 301
 _SURE: Final = 5.0
-"""Firings before an exponent counts, firings over which it does, standard errors that it takes."""
+"""Firings over which an exponent counts at first, and standard errors that it takes then."""
 
 
 def scan(
@@ -90,25 +89,25 @@ def scan(
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64)).tolist()
     regimes = [Regime.of(hammer, period=time) for time in times]
-    found: dict[int, Verdict] = {}
+    verdicts: dict[int, Verdict] = {}
 
     def tell() -> None:
         if progress is not None:
-            progress(len(found), len(times))
+            progress(len(verdicts), len(times))
 
     for last in STAGES:
-        left = [i for i in range(len(times)) if i not in found]
+        left = [i for i in range(len(times)) if i not in verdicts]
         trains = [Train.of(regimes[i], last) for i in left]
         window = (last // 2 + 1, last)
         states, _ = run_trains(trains, np.arange(window[0], last + 1), tolerance, None, threads=threads)
         settled = _settled(trains, states, window, tolerance, threads)
-        found |= {i: judged for i, judged in zip(left, settled, strict=True) if judged is not None}
+        verdicts |= {i: judged for i, judged in zip(left, settled, strict=True) if judged is not None}
         tell()
-    left = [i for i in range(len(times)) if i not in found]
+    left = [i for i in range(len(times)) if i not in verdicts]
     trains = [Train.of(regimes[i], LAST) for i in left]
-    found |= dict(zip(left, _followed(trains, tolerance, exponents, threads), strict=True))
+    verdicts |= dict(zip(left, _followed(trains, tolerance, exponents, threads), strict=True))
     tell()
-    return [found[i] for i in range(len(times))]
+    return [verdicts[i] for i in range(len(times))]
 
 
 def _settled(
@@ -119,19 +118,17 @@ def _settled(
     threads: int | None,
 ) -> list[Verdict | None]:
     """Return the verdicts on trains that have settled, None for the others."""
-    distances = [found.distances(train) for found, train in zip(states, trains, strict=True)]
-    closer: list[int | None] = []
-    for row, found in zip(distances, states, strict=True):
+    distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
+    periods: dict[int, int] = {}
+    for i, row in enumerate(distances):
         period = period_of(row)
-        done = period is not None and found.status == "ok" and row[period - 1] <= CLOSER * AGREEMENT
-        closer.append(period if done else None)
-    candidates = [(i, period) for i, period in enumerate(closer) if period is not None]
+        if period is not None and states[i].status == "ok" and row[period - 1] <= CLOSER * AGREEMENT:
+            periods[i] = period
+    candidates = list(periods)
     largest = mapped(
-        lambda found: largest_multiplier(trains[found[0]], states[found[0]], found[1], tolerance),
-        candidates,
-        threads,
+        lambda i: largest_multiplier(trains[i], states[i], periods[i], tolerance), candidates, threads
     )
-    stable = {i for (i, _), size in zip(candidates, largest, strict=True) if size <= LARGEST_MULTIPLIER}
+    stable = {i for i, size in zip(candidates, largest, strict=True) if size <= LARGEST_MULTIPLIER}
     return [
         verdict(distances[i], firings, tolerance, None) if i in stable else None for i in range(len(trains))
     ]
@@ -148,17 +145,17 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
     if _in_pack(train, states, -1):
         return np.inf
     # What is left of the pulses before is left out: it is the same for all neighbouring motions.
-    found = tangent_map(
+    tangent = tangent_map(
         train.hammer,
         train.regime.pulses(period),
         0.0,
         period * train.period,
-        state=(float(states.x[-1]), float(states.v[-1])),
+        state=_state(states, -1),
         tolerance=tolerance,
     )
-    if not found.ok or not found.smooth or found.matrix.shape != (2, 2):
+    if not tangent.ok or not tangent.smooth or tangent.matrix.shape != (2, 2):
         return np.inf
-    return float(np.abs(np.linalg.eigvals(found.matrix)).max())
+    return float(np.abs(np.linalg.eigvals(tangent.matrix)).max())
 
 
 def _followed(
@@ -167,19 +164,18 @@ def _followed(
     """Return the verdicts on trains that are followed to the end."""
     judged = (FIRST, LAST)
     states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), tolerance, None, threads=threads)
-    distances = [found.distances(train) for found, train in zip(states, trains, strict=True)]
-    stopped = ["" if found.status == "ok" else found.status for found in states]
+    distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
+    stopped = ["" if own.status == "ok" else own.status for own in states]
     verdicts = {
         i: verdict(row, judged, tolerance, None, why)
         for i, (row, why) in enumerate(zip(distances, stopped, strict=True))
         if why or not exponents or period_of(row) is not None
     }
-    short = (_BEFORE + 1, _BEFORE + _SHORT + 1)
     left = [i for i in range(len(trains)) if i not in verdicts]
     # A start inside the pack would need its memory; such a train gets its exponent the long way.
     on_it = [i for i in left if not _in_pack(trains[i], states[i], 0)]
-    begun = [_continued(trains[i], states[i], short[1]) for i in on_it]
-    for i, exponent in zip(on_it, exponents_of(begun, short, tolerance, threads=threads), strict=True):
+    begun = [(trains[i].regime, _state(states[i], 0)) for i in on_it]
+    for i, exponent in zip(on_it, exponents_onward(begun, _SHORT, tolerance, threads=threads), strict=True):
         if exponent.smooth and exponent.value > _SURE * exponent.standard_error:
             verdicts[i] = verdict(distances[i], judged, tolerance, exponent)
     left = [i for i in left if i not in verdicts]
@@ -194,6 +190,5 @@ def _in_pack(train: Train, states: States, row: int) -> bool:
     return train.hammer.front is not None and bool(states.x[row] > train.hammer.front)
 
 
-def _continued(train: Train, states: States, pulses: int) -> Train:
-    """Return a train that starts at the first of some states, as if nothing had been fired before."""
-    return Train(train.regime, train.regime.pulses(pulses), (float(states.x[0]), float(states.v[0])))
+def _state(states: States, row: int) -> tuple[float, float]:
+    return float(states.x[row]), float(states.v[row])

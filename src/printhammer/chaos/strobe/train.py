@@ -11,7 +11,7 @@ import numpy as np
 from printhammer.chaos.strobe.verdict import period_of, repeats, verdict
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.window import window_of
-from printhammer.support.threads import mapped
+from printhammer.support.threads import mapped, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,6 +31,9 @@ HELD_BRANCHES: Final = {
     for branch in ("loading", "unloading")
 }
 """Branches of the pack on which the armature rests, and those that they are part of."""
+
+_BEFORE: Final = 100
+"""Firings before an exponent counts."""
 
 
 @dataclass(frozen=True)
@@ -95,10 +98,10 @@ def pack_branches(
     x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray
 ) -> npt.NDArray[np.int64]:
     """Return the branches of the pack on which states lie, 0 outside of it."""
-    found = np.where(x > front, branch, 0).astype(np.int64)
+    branches = np.where(x > front, branch, 0).astype(np.int64)
     for held, part_of in HELD_BRANCHES.items():
-        found[found == held] = part_of
-    return found
+        branches[branches == held] = part_of
+    return branches
 
 
 def run_trains(
@@ -111,86 +114,72 @@ def run_trains(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[list[States], list[Verdict | None]]:
-    """Run trains and judge them.
+    """Return the states of trains at chosen firings, each at the phase of its regime, and verdicts on them.
 
-    Parameters
-    ----------
-    trains : sequence of Train
-        The trains.
-    chosen : int array
-        Numbers of the firings whose states are wanted, each at the phase of its regime.
-    tolerance : float
-        Of the integration.
-    judged : tuple of int or None
-        First and last firing for the verdict; None for no verdict.
-    every_exponent : bool, optional
-        Whether to compute the exponent of periodic trains too.
-    threads, progress
-        As for `printhammer.Ensemble.run`.
-
-    Returns
-    -------
-    states : list of States
-        At the chosen firings.
-    verdicts : list of Verdict or None
-        One for each train.
+    A verdict is about the firings from the first to the last that are `judged`; there is none where that is
+    None. Exponents of periodic trains are computed only where `every_exponent` is true.
     """
     if not trains:
         return [], []
     total = len(trains)
-
-    def tell(done: int) -> None:
-        if progress is not None:
-            progress(done, total if judged is None else 2 * total)
-
     firings = np.arange(judged[0], judged[1] + 1) if judged is not None else np.zeros(0, np.int64)
     own = [train.times(chosen) + train.regime.phase * train.period for train in trains]
     theirs = [train.times(firings) for train in trains]
     every = [np.union1d(mine, other) for mine, other in zip(own, theirs, strict=True)]
     after = np.array([max(int(chosen.max(initial=1)), int(firings.max(initial=1))) + 1])
     ends = [float(train.times(after)[0]) for train in trains]
-    given = [train.state for train in trains]
+    begun = [train.state for train in trains]
     ensemble = Ensemble(
         [train.hammer for train in trains],
         [train.drive for train in trains],
         ends,
-        states=None if None in given else np.array(given),
+        states=None if None in begun else np.array(begun),
         tolerance=tolerance,
     )
-    result = ensemble.run(strobes=every, threads=threads, progress=lambda done, _all: tell(done))
+    tell = shifted(progress, 0, total if judged is None else 2 * total)
+    result = ensemble.run(strobes=every, threads=threads, progress=tell)
     table, names = result.strobes, result.status_names
     assert table is not None
 
     def at(i: int, times: FloatArray) -> States:
         rows = np.searchsorted(every[i], times)
-        return States(
-            times,
-            table.x[i, rows].copy(),
-            table.v[i, rows].copy(),
-            table.branch[i, rows].copy(),
-            table.memory[i, rows].copy(),
-            names[i],
+        x, v, branch, memory = (
+            part[i, rows].copy() for part in (table.x, table.v, table.branch, table.memory)
         )
+        return States(times, x, v, branch, memory, names[i])
 
     states = [at(i, times) for i, times in enumerate(own)]
     if judged is None:
         return states, [None] * total
-    seen = [at(i, times) for i, times in enumerate(theirs)]
     stopped = [names[i] if result.reached[i] < theirs[i][-1] else "" for i in range(total)]
-    distances = [found.distances(train) for found, train in zip(seen, trains, strict=True)]
+    distances = [at(i, theirs[i]).distances(train) for i, train in enumerate(trains)]
     open_cases = [
         i for i in range(total) if not stopped[i] and (every_exponent or period_of(distances[i]) is None)
     ]
-    before = 2 * total - len(open_cases)
+    tell = shifted(progress, 2 * total - len(open_cases), 2 * total)
     exponents = exponents_of(
-        [trains[i] for i in open_cases],
-        judged,
-        tolerance,
-        threads=threads,
-        progress=lambda done, _all: tell(before + done),
+        [trains[i] for i in open_cases], judged, tolerance, threads=threads, progress=tell
     )
     growth = dict(zip(open_cases, exponents, strict=True))
     return states, [verdict(distances[i], judged, tolerance, growth.get(i), stopped[i]) for i in range(total)]
+
+
+def exponents_onward(
+    begun: Sequence[tuple[Regime, tuple[float, float]]],
+    points: int,
+    tolerance: float,
+    *,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[Exponent]:
+    """Return the largest exponents of trains that go on from states at a firing.
+
+    Over so many points, after a hundred firings.
+    """
+    window = _BEFORE + 1, _BEFORE + points
+    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
+    trains = [Train(regime, regime.pulses(window[1] + 2), state) for regime, state in begun]
+    return exponents_of(trains, window, tolerance, threads=threads, progress=progress)
 
 
 def exponents_of(

@@ -89,22 +89,22 @@ class Verdict:
     @property
     def phrases(self) -> list[str]:
         """The evidence, a phrase each."""
-        told = []
+        phrases = []
         if self.period is not None:
-            told.append(f"states {_firings(self.period)} apart agree to {self.distance:.1e} of the window")
+            phrases.append(f"states {_firings(self.period)} apart agree to {self.distance:.1e} of the window")
         elif self.nearest is not None:
-            told.append(
+            phrases.append(
                 f"no period up to {LARGEST_PERIOD}: states {_firings(self.nearest)} apart come closest,"
                 f" to {self.distance:.1e} of the window"
             )
         elif not self.stopped:
-            told.append(
+            phrases.append(
                 f"no period up to {LARGEST_PERIOD}: states that far apart lie on other branches of the pack"
             )
         if not math.isnan(self.exponent):
-            told.append(f"largest exponent {self.exponent:+.4g} ± {self.standard_error:.2g} per firing")
-        told.append(f"firings {self.first} to {self.last}, tolerance {self.tolerance:g}")
-        return told
+            phrases.append(f"largest exponent {self.exponent:+.4g} ± {self.standard_error:.2g} per firing")
+        phrases.append(f"firings {self.first} to {self.last}, tolerance {self.tolerance:g}")
+        return phrases
 
     @property
     def evidence(self) -> str:
@@ -141,33 +141,21 @@ def repeats(
 ) -> FloatArray:
     """Return how far states q apart are from each other at most, for q from 1 on, shape (longest,).
 
-    Parameters
-    ----------
-    states : array, shape (n, 3)
-        Displacement, velocity and memory of the pack at successive firings.
-    branches : int array, shape (n,)
-        Branch of the force law inside the pack, 0 outside.
-    scales : array, shape (3,)
-        By which differences are divided.
-    longest : int, optional
-        Largest q.
-
-    Returns
-    -------
-    array
-        Largest absolute difference of a component, in units of its scale. Infinite where states q apart lie
-        on different branches, where one is not known, and where q is more than half of n, so that every
-        state is compared at least once.
+    States, shape (n, 3), are displacement, velocity and memory of the pack at successive firings; their
+    branches, shape (n,), those of the force law inside the pack, 0 outside. A distance is the largest
+    absolute difference of a component, in units of its scale: infinite where states q apart lie on different
+    branches, where one is not known, and where q is more than half of n, so that every state is compared at
+    least once.
     """
     scaled = states / scales
     count = len(scaled)
-    found = np.full(longest, np.inf)
+    distances = np.full(longest, np.inf)
     if not np.isfinite(scaled).all():
-        return found
+        return distances
     for q in range(1, min(longest, count // 2) + 1):
         if np.array_equal(branches[q:], branches[:-q]):
-            found[q - 1] = np.abs(scaled[q:] - scaled[:-q]).max()
-    return found
+            distances[q - 1] = np.abs(scaled[q:] - scaled[:-q]).max()
+    return distances
 
 
 def period_of(distances: FloatArray) -> int | None:
@@ -183,25 +171,10 @@ def verdict(
     exponent: Exponent | None,
     stopped: str = "",
 ) -> Verdict:
-    """Judge a train.
+    """Judge a train by the distances from `repeats` between the first and the last of some firings.
 
-    Parameters
-    ----------
-    distances : array
-        From `repeats`.
-    firings : tuple of int
-        First and last firing that they are about.
-    tolerance : float
-        Of the integration.
-    exponent : Exponent or None
-        Largest exponent over these firings; None where it was not computed.
-    stopped : str, optional
-        How the run ended if it did not get to the last of them.
-
-    Returns
-    -------
-    Verdict
-        The verdict.
+    `exponent` is the largest one over these firings, None where it was not computed; `stopped` says how the
+    run ended if it did not get to the last of them.
     """
     period = None if stopped else period_of(distances)
     closest = period
@@ -226,6 +199,11 @@ def verdict(
     )
 
 
+def is_positive(exponent: Exponent) -> bool:
+    """Tell whether an exponent is known, and positive by `SIGNIFICANT` standard errors."""
+    return bool(exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error)
+
+
 def _strange(exponent: Exponent | None) -> tuple[bool, str]:
     """Return whether neighbouring motions part, or why one cannot tell."""
     if exponent is None:
@@ -234,7 +212,7 @@ def _strange(exponent: Exponent | None) -> tuple[bool, str]:
         return False, f"no period, and the tangent flow ended early: {exponent.status}"
     if not exponent.smooth:
         return False, "no period, and no exponent, since the motion passes a touch without velocity"
-    if exponent.value > SIGNIFICANT * exponent.standard_error:
+    if is_positive(exponent):
         return True, ""
     return False, (
         f"no period up to {LARGEST_PERIOD}, and the largest exponent is not positive by"

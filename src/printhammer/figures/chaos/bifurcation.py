@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.diagram import hysteresis, windows_of
+from printhammer.chaos.bifurcation.diagram import hysteresis
 from printhammer.chaos.bifurcation.windows import cells
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
@@ -227,7 +227,7 @@ def _bands(strip: Axes, diagram: Bifurcation, across: Scale) -> None:
     for way, name in enumerate(diagram.directions):
         place = 0
         level = len(diagram.directions) - 1 - way
-        for window in windows_of(diagram, name):
+        for window in diagram.windows(name):
             stopped = diagram.status[way, place : place + window.columns] != "ok"
             ends = across.shown([starts[place], starts[place + window.columns]])
             shade = SHADES[_kind(window.verdict, bool(stopped.all()))]
