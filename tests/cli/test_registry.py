@@ -29,6 +29,8 @@ NEEDED = {
     "reconstruct search": ("new.jsonl",),
     "reconstruct judge": ("a.jsonl", "new.jsonl"),
     "reconstruct base-rates": ("new.json",),
+    "reconstruct schemes": ("new.json",),
+    "reconstruct front": ("a.jsonl",),
     "reconstruct predictions": ("a.jsonl", "b.jsonl", "new.json"),
     "reconstruct family": ("a.jsonl",),
     "reconstruct ship": ("a.jsonl", "b.jsonl"),

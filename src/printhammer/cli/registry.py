@@ -34,7 +34,7 @@ VERBS: Final[tuple[Verb, ...]] = (
     *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped),
     *(fit.magnet, fit.spring, fit.pack, fit.backstop, fit.motion),
     *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),
-    *(reconstruct.schemes, reconstruct.predictions, reconstruct.family, reconstruct.ship),
+    *(reconstruct.schemes, reconstruct.front, reconstruct.predictions, reconstruct.family, reconstruct.ship),
 )
 
 GROUPS: Final = {

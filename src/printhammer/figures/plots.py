@@ -18,6 +18,7 @@ PLOTS: Final = {
     "Feedback": "control.feedback.plot",
     "Feedback.run": "control.feedback_run.plot",
     "Fit": "fit.plot",
+    "Front": "front.plot",
     "ImpactTrain": "chaos.impact_train.plot",
     "LeastWork": "control.energy.plot",
     "LeastWorkRates": "control.energy_rates.plot",

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
+from printhammer.cli.screen import Column, table
+from printhammer.cli.units import Units
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -214,6 +216,37 @@ def schemes(
         ],
         files={"out": Content.text(partial(_json, table))},
     )
+
+
+_FRONT: Final[tuple[Column[Any], ...]] = (
+    Column("candidate", lambda row: row["candidate"]),
+    Column("panels of\nFig. 11", lambda row: row["panels"]),
+    Column("other\nclaims", lambda row: row["others"]),
+    Column("all other\nstated", lambda row: "yes" if row["stated"] else "no"),
+    Column("buzz\nprinting", lambda row: "yes" if row["buzzes"] else "no"),
+)
+
+
+@verb(
+    "reconstruct front",
+    "printhammer reconstruct front judged.jsonl --out front.csv",
+    out=opt.results("Front"),
+)
+def front(
+    judged: list[Path] = opt.argument(
+        "JUDGED...", "Logs of judged candidates.", type=Path, is_input=True, many=True, default=...
+    ),
+    core_hours: float = opt.bounded(0, "Time that the searches took.", default=0.0),
+) -> Answer:
+    """Show panels of Fig. 11 against all other claims, and the hammers that no other one beats in both."""
+    from printhammer.reconstruction.judging.front import front as pareto
+    from printhammer.reconstruction.judging.log import read_judged
+
+    rows = [row for path in judged for row in read_judged(path, some=True)]
+    result = pareto(rows, 3600.0 * core_hours)
+    best = result.to_dataframe().reset_index().query("on_front").sort_values("panels", ascending=False)
+    shown = table(_FRONT, [row for _, row in best.iterrows()], Units.SI)
+    return Answer([shown, "", result.title], files={"out": Content.of(result)})
 
 
 @verb("reconstruct family", "printhammer reconstruct family judged.jsonl --out family")
