@@ -17,6 +17,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import SHAPES, Sampled, Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.hammer.names import range_of
 from printhammer.studio import bounds
 from printhammer.studio.states.shelf import Shelf
 from printhammer.support.constants import quantities
@@ -76,17 +77,17 @@ class State:
         InputError
             There is no such constant, it is too far from the hammer's own, or the hammer would not be one.
         """
-        from printhammer.studio.states.controls import range_of
-
         base = self.base
         for key, value in self.constants:
             constant = base.constants.get(key)
             if constant is None or key.startswith("waveform."):
                 known = ", ".join(name for name in base.constants if not name.startswith("waveform."))
                 raise InputError(f"constants.{key} is not known, expected one of {known}")
-            low, high = range_of(base, key)
-            if not low <= value <= high:
-                raise InputError(f"{key} = {value:.9g} {constant.si_unit}, expected {low:.6g} to {high:.6g}")
+            span = range_of(base, key, bounds.SPAN)
+            if not span.low <= value <= span.high:
+                raise InputError(
+                    f"{key} = {value:.9g} {constant.si_unit}, expected {span.low:.6g} to {span.high:.6g}"
+                )
         return base.replace(dict(self.constants), source="set in the studio") if self.constants else base
 
     @cached_property
