@@ -22,7 +22,7 @@ from printhammer.support.outputs import write_file
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from printhammer.claims import Result
+    from printhammer.claims import JudgedClaim
     from printhammer.hammer.hammer import Hammer
     from printhammer.reconstruction.results import BaseRates, Results
 
@@ -106,7 +106,7 @@ def write_report(
     return report
 
 
-def claims_json(results: list[Result], rates: BaseRates | None = None) -> str:
+def claims_json(results: list[JudgedClaim], rates: BaseRates | None = None) -> str:
     """Return the claims as JSON: a list of objects with name, kind, value, band, verdict and more."""
     entries = []
     for result in results:
@@ -125,7 +125,7 @@ def _draw(
     context: Context,
     number: int,
     says: Mapping[str, str],
-    results: list[Result],
+    results: list[JudgedClaim],
     folder: Path,
     written: list[Path],
 ) -> Drawing | None:

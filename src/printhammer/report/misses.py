@@ -10,7 +10,7 @@ from printhammer.report.quantities import band_text, split_name, value_text
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from printhammer.claims import Claim, Result
+    from printhammer.claims import Claim, JudgedClaim
 
 _LEAST: Final = {"above", "at_least"}
 
@@ -28,7 +28,7 @@ class Miss:
     """How far that is apart."""
 
 
-def misses(result: Result) -> list[Miss]:
+def misses(result: JudgedClaim) -> list[Miss]:
     """Return what of a result is not within its band; nothing where nothing could be measured."""
     return [] if result.value is None else misses_of(result.claim, result.value)
 
