@@ -9,7 +9,8 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
-from printhammer.figures.elements.style import new_figure, sign, styled
+from printhammer.figures.elements.marks import legend_in_columns
+from printhammer.figures.elements.style import new_panel, sign, styled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -73,8 +74,7 @@ def plot(
         raise InputError("branches: expected at least one to draw")
     if show not in _SHOWN:
         raise InputError(f"show = {show!r}, expected one of {', '.join(_SHOWN)}")
-    figure = new_figure(4.4)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(4.4)
     heading, factor = axis_of(found[0].parameter, found[0].unit)
     name, _, shown, times = _SHOWN[show]
     for branch in found:
@@ -178,15 +178,8 @@ def _legend(ax: Axes, branches: Sequence[Branch], kinds: Sequence[str]) -> None:
         if kind in kinds:
             colour = style.MUTED if kind == "grazing" else style.INK
             handles.append(Line2D([], [], ls="none", mec=colour, mew=style.THIN, label=kind, **look))
-    columns = 3 if len(handles) > 4 else len(handles)
-    ax.legend(
-        handles=handles,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=columns,
-        fontsize=style.TINY + 0.5 if len(handles) > 6 else style.SMALL,
-        frameon=False,
-    )
+    size = style.TINY + 0.5 if len(handles) > 6 else style.SMALL
+    legend_in_columns(ax, handles, 3 if len(handles) > 4 else len(handles), size)
 
 
 def _remarks(branches: Sequence[Branch]) -> list[str]:

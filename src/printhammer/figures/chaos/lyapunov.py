@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.chaos.exponents.zero_one import CHAOTIC, REGULAR
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import HALO, note
+from printhammer.figures.elements.marks import HALO, dashed, dots, heading, note
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled
 
@@ -46,7 +46,7 @@ def plot(spectrum: Lyapunov) -> Figure:
     lower.set_xscale("log")
     # Also where no estimate is finite.
     lower.set_xlim(max(0.9 * float(counts[0]), 0.5), 1.1 * float(counts[-1]))
-    upper.set_title(_title(spectrum), loc="left", fontsize=style.SMALL)
+    heading(upper, _title(spectrum))
     remarks = [] if spectrum.ok else [f"The run ended early: {spectrum.status}."]
     if not spectrum.smooth:
         remarks.append("The motion passes a touch without velocity, where it has no derivative.")
@@ -106,8 +106,7 @@ def plot_chart(chart: LyapunovChart) -> Figure:
         ax.set_ylabel(f"$\\lambda_{k + 1}$  [1/firing]")
     axes[0].axhline(0.0, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="zero")
     _bars(axes[2], at, chart.k, np.zeros(len(at)), style.INK, agree, order)
-    for level in (REGULAR, CHAOTIC):
-        axes[2].axhline(level, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)), zorder=1.0)
+    dashed(axes[2].axhline, REGULAR, CHAOTIC, zorder=1.0)
     axes[2].set_ylim(-0.25, 1.15)
     axes[2].set_ylabel("K of the 0-1 test")
     label(axes[2], "x", time, "Time between firings")
@@ -130,19 +129,9 @@ def _bars(
     reach = _SIGMAS * np.where(np.isfinite(errors), errors, 0.0)
     for filled in (True, False):
         some = finite & (agree == filled)
-        ax.errorbar(
-            at[some],
-            values[some],
-            yerr=reach[some],
-            fmt="o",
-            ms=3.5,
-            mew=0.9,
-            mec=colour,
-            mfc=colour if filled else "white",
-            ecolor=colour,
-            elinewidth=style.THIN,
-            zorder=3.0,
-        )
+        mark: dict[str, Any] = {"ms": 3.5, "mew": 0.9, "mec": colour, "mfc": colour if filled else "white"}
+        bar: dict[str, Any] = {"yerr": reach[some], "ecolor": colour, "elinewidth": style.THIN}
+        ax.errorbar(at[some], values[some], fmt="o", zorder=3.0, **mark, **bar)
 
 
 def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
@@ -176,15 +165,10 @@ def plot_zero_one(test: ZeroOne) -> Figure:
     steps = np.arange(1, len(test.displacement) + 1)
     growth.plot(steps, test.displacement, color=style.BLUE, lw=style.THIN, gid="displacement")
     growth.set(xlabel="Steps n", ylabel="Mean square displacement")
-    angles.plot(
-        test.angles, test.correlations, ls="none", marker="o", ms=2.4, mew=0.0, color=style.BLUE, gid="k"
-    )
-    shown = test.shown
-    angles.plot(
-        test.angles[shown], test.correlations[shown], marker="o", ms=7.0, mfc="none", mec=style.ORANGE
-    )
-    for level in (REGULAR, CHAOTIC):
-        angles.axhline(level, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)))
+    dots(angles, test.angles, test.correlations, 2.4, style.BLUE, gid="k")
+    ringed = test.angles[test.shown], test.correlations[test.shown]
+    angles.plot(*ringed, marker="o", ms=7.0, mfc="none", mec=style.ORANGE)
+    dashed(angles.axhline, REGULAR, CHAOTIC)
     angles.set(xlabel="Angle c  [rad]", ylabel="Correlation $K_c$", ylim=(-1.1, 1.1))
     for ax in (path, growth, angles):
         ax.tick_params(axis="both", top=True, right=True)

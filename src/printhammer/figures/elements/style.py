@@ -111,6 +111,12 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def new_panel(height: float, width: float = WIDTH) -> tuple[Figure, Axes]:
+    """Return a figure as `new_figure` does, with one panel."""
+    figure = new_figure(height, width)
+    return figure, figure.add_subplot()
+
+
 def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
     """Divide a figure into a panel and a slim strip below it on the same time axis."""
     grid = figure.add_gridspec(2, 1, height_ratios=(ratio, 1.0), hspace=0.03)
