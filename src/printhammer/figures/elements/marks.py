@@ -122,6 +122,11 @@ def note(ax: Axes, text: str, at: tuple[float, float], **options: Any) -> Text:
     return ax.text(*at, text, transform=ax.transAxes, **style)
 
 
+def inside(ax: Axes, text: str, x: float, y: float, color: str) -> None:
+    """Write tiny in the middle of a cell at a place in data units."""
+    ax.text(x, y, text, ha="center", va="center", fontsize=TINY, color=color)
+
+
 def beside(
     ax: Axes,
     text: str,
