@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import ALONG_Y, beside, note
+from printhammer.figures.elements.marks import ALONG_Y, beside, heading, note
 from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.units import from_si
 
@@ -63,12 +63,12 @@ def family(
     ax = top.add_subplot()
     _constants(ax, rows, own, members, ranks, shades)
     key = f"A dot for each of {len(members)} hammers; darker: higher {told[order]['title']}"
-    ax.set_title(key, loc="left", fontsize=style.SMALL, color=style.MUTED)
+    heading(ax, key, color=style.MUTED)
     grid = bottom.add_gridspec(deep, _COLUMNS, wspace=0.06)
     for number, (name, entry) in enumerate(told.items()):
         column, row = divmod(number, deep)
         strip = bottom.add_subplot(grid[row, column])
-        _conclusion(strip, entry, [found.get(name) for found in conclusions], ranks, shades)
+        _conclusion(strip, entry, [member.get(name) for member in conclusions], ranks, shades)
     sign(figure, hammer)
     return figure
 
@@ -145,9 +145,8 @@ def _conclusion(
     ax.tick_params(axis="x", labelsize=style.TINY, pad=1.5)
     ax.spines[["left", "right", "top"]].set_visible(False)
     missing = int((~known).sum())
-    told = f"{entry['title'].replace(' us ', ' µs ')}  [{written}]" + (
-        f", {missing} without" if missing else ""
-    )
-    ax.set_title(told, loc="left", fontsize=style.SMALL, color=style.INK, pad=2.0)
+    text = f"{entry['title'].replace(' us ', ' µs ')}  [{written}]"
+    text += f", {missing} without" if missing else ""
+    heading(ax, text, color=style.INK, pad=2.0)
     word = "robust" if entry["robust"] else "depends"
     note(ax, word, (1.0, 1.02), ha="right", va="bottom", color=colour, fontsize=style.TINY)

@@ -4,17 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from printhammer.figures.elements import style
+from printhammer.figures.elements import marks, style
 from printhammer.figures.elements.curves import places, times_of
-from printhammer.figures.elements.marks import (
-    curve,
-    dashed,
-    drive_strip,
-    firings,
-    legend_above,
-    name_lines,
-    place_lines,
-)
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
 
@@ -79,23 +70,23 @@ def timeline(
 
     panel.set_xlim(0.0, float(time.shown(until)))
     panel.set_ylim(float(way.shown(low)), float(way.shown(high)))
-    place_lines(panel, hammer, way)
+    marks.place_lines(panel, hammer, way)
     several = len(motions) > 1
     for number, (motion, grid, path) in enumerate(zip(motions, grids, paths, strict=True)):
         colour, dash, width = _LOOKS[number % len(_LOOKS)]
         gid = f"displacement {number + 1}" if several else "displacement"
         # Later motions lie under earlier ones where they agree.
         order = 3.0 - 0.1 * number
-        curve(panel, time.shown(grid), way.shown(path), gid, colour, ls=dash, lw=width, zorder=order)
+        marks.curve(panel, time.shown(grid), way.shown(path), gid, colour, ls=dash, lw=width, zorder=order)
         if show_firings:
             fired = motion.drive.times[motion.drive.times <= until]
-            firings(panel, fired, time, colour if several else style.BLUE)
-    drive_strip(strip, motions, grids, until, [look[0] for look in _LOOKS[: len(motions)]])
-    name_lines(panel, hammer, way)
+            marks.firings(panel, fired, time, colour if several else style.BLUE)
+    marks.drive_strip(strip, motions, grids, until, [look[0] for look in _LOOKS[: len(motions)]])
+    marks.name_lines(panel, hammer, way)
     if labels:
         _legend(panel, labels)
     elif heading:
-        panel.set_title(heading, loc="left", fontsize=style.SMALL, color=style.INK, pad=4.0)
+        marks.heading(panel, heading, color=style.INK, pad=4.0)
     label(panel, "y", way)
     messages = [motion.message for motion in motions if motion.message]
     sign(figure, hammer, *remarks, *messages)
@@ -124,7 +115,7 @@ def current_between(ax: Axes, motion: Motion, largest: float) -> None:
     """Draw the current of a motion, A, against time, ms, and its bounds to either side as dashed lines."""
     ax.plot(scale("time").factor * motion.t, motion.current, color=style.BLUE, lw=style.THIN, gid="current")
     ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
-    dashed(ax.axhline, -largest, largest)
+    marks.dashed(ax.axhline, -largest, largest)
     ax.set_ylabel("Current  [A]")
 
 
@@ -143,4 +134,4 @@ def _legend(panel: Axes, labels: Sequence[str]) -> None:
         Line2D([], [], color=colour, ls=dash, lw=style.THIN + 0.5, label=text)
         for (colour, dash, _width), text in zip(_LOOKS, labels, strict=False)
     ]
-    legend_above(panel, handles)
+    marks.legend_above(panel, handles)
