@@ -33,17 +33,12 @@ def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **tol
         Arrays by name: float32, float64, uint16, int32 or uint8; others are turned into float32.
     **told
         The rest of the heading; NaN and infinity become null.
-
-    Returns
-    -------
-    bytes
-        The frame.
     """
     parts: list[bytes] = []
     listed: list[dict[str, Any]] = []
     offset = 0
-    for name, given in (arrays or {}).items():
-        array = np.asarray(given)
+    for name, values in (arrays or {}).items():
+        array = np.asarray(values)
         code = f"{array.dtype.kind}{array.dtype.itemsize}"
         if code not in _DTYPES:
             code = "f4"
