@@ -88,44 +88,12 @@ def to_si(value: float, unit: str, si_unit: str) -> float:
 
 
 def from_si(value: float, si_unit: str, unit: str) -> float:
-    """Convert a number in SI to a unit.
-
-    Parameters
-    ----------
-    value : float
-        Number in `si_unit`.
-    si_unit : str
-        SI unit of `value`.
-    unit : str
-        Unit of the result.
-
-    Returns
-    -------
-    float
-        Correctly rounded.
-
-    Raises
-    ------
-    InputError
-        As for `to_si`.
-    """
+    """Convert a number in `si_unit` to `unit`; arguments and errors otherwise as for `to_si`."""
     return _scaled(value, 1 / _factor(unit, si_unit), si_unit)
 
 
 def parse(text: str, si_unit: str) -> float:
-    """Read a number with its unit, such as "60 lbf", into SI.
-
-    Parameters
-    ----------
-    text : str
-        Number and unit; the unit may be left out only where `si_unit` is "1".
-    si_unit : str
-        SI unit of the result.
-
-    Returns
-    -------
-    float
-        Value in `si_unit`.
+    """Read a number with its unit, such as "60 lbf", into SI; arguments as for `split`.
 
     Raises
     ------
