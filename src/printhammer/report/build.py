@@ -83,7 +83,9 @@ def write_report(
         drawn = None if figures is None else set(figures)
         written: list[Path] = []
         drawings = []
-        for number, says in _sayings().items():
+        sayings = files("printhammer").joinpath("report", "figures.toml").read_text(encoding="utf-8")
+        for name, says in tomllib.loads(sayings).items():
+            number = int(name)
             if drawn is not None and number not in drawn:
                 continue
             tell(f"figure {number}")
@@ -113,12 +115,6 @@ def claims_json(results: list[JudgedClaim], rates: BaseRates | None = None) -> s
         share = rates.share(result.claim.name) if rates is not None else None
         entries.append({**result.as_dict(), "base_rate": None if share is None else share.as_dict()})
     return json.dumps(entries, indent=2, allow_nan=False) + "\n"
-
-
-def _sayings() -> dict[int, dict[str, str]]:
-    """Return what the paper says of each figure."""
-    text = files("printhammer").joinpath("report", "figures.toml").read_text(encoding="utf-8")
-    return {int(number): entry for number, entry in tomllib.loads(text).items()}
 
 
 def _draw(

@@ -277,8 +277,8 @@ def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
         if kind == "hammer":
             name, text = content
             hammer = dropped_hammer(text) if text else shelf.hammer(name or shelf.names[0])
-            told = {"offered": shelf.names, "asked": name or shelf.names[0], "text": text, **vocabulary()}
-            return frame("hammer", serial, hammer=describe(hammer), **told)
+            heading = {"offered": shelf.names, "asked": name or shelf.names[0], "text": text, **vocabulary()}
+            return frame("hammer", serial, hammer=describe(hammer), **heading)
         if kind == "drop":
             return dropped(serial, *content)
         return frame("texts", serial, texts=texts_of(content))

@@ -121,8 +121,8 @@ def parameter_scale(diagram: Bifurcation) -> Scale:
     note = diagram.regime.quantity(diagram.parameter)
     unit, meaning = note.si, note.meaning
     if diagram.parameter == PERIOD:
-        found = scale("time", float(np.abs(diagram.values).max()))
-        return Scale(meaning.capitalize(), found.si, found.unit)
+        time = scale("time", float(np.abs(diagram.values).max()))
+        return Scale(meaning.capitalize(), time.si, time.unit)
     name = meaning.capitalize() if diagram.parameter == "rate" else f"{diagram.parameter}: {meaning}"
     return Scale(name, unit, unit)
 

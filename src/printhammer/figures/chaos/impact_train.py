@@ -35,14 +35,14 @@ def plot(train: ImpactTrain) -> Figure:
     for ax in (bars, returns, lags):
         ax.tick_params(axis="both", top=True, right=True)
         ax.locator_params(axis="both", nbins=5)
-    told = [
+    statistics = [
         f"{len(train.times)} impacts",
         f"mean interval {time.shown(train.mean):.4g} {time.sign}",
         f"coefficient of variation {train.variation:.3g}",
     ]
     if not np.isnan(train.fano):
-        told.append(f"Fano factor {train.fano:.3g} in {time.shown(train.window):.4g} {time.sign}")
-    figure.suptitle(", ".join(told), x=0.01, ha="left", fontsize=SMALL)
+        statistics.append(f"Fano factor {train.fano:.3g} in {time.shown(train.window):.4g} {time.sign}")
+    figure.suptitle(", ".join(statistics), x=0.01, ha="left", fontsize=SMALL)
     if train.hammer is not None:
         sign(figure, train.hammer)
     return figure

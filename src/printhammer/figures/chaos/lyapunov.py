@@ -39,7 +39,8 @@ def plot(spectrum: Lyapunov) -> Figure:
         _running(ax, counts, means[:, k], errors[:, k], colour)
         ax.set_ylabel(f"$\\lambda_{k + 1}$  [1/firing]")
         value, error = float(spectrum.exponents[k]), float(spectrum.standard_errors[k])
-        at, side = ((0.98, 0.96), "top") if value < _middle(ax) else ((0.98, 0.05), "bottom")
+        low, high = ax.get_ylim()
+        at, side = ((0.98, 0.96), "top") if value < 0.5 * (low + high) else ((0.98, 0.05), "bottom")
         note(ax, f"{value:+.4g} ± {error:.2g}", at, ha="right", va=side, color=colour, bbox=HALO)
     upper.axhline(0.0, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="zero")
     lower.set_xlabel("Number of firings averaged over")
@@ -55,13 +56,13 @@ def plot(spectrum: Lyapunov) -> Figure:
 
 
 def _title(spectrum: Lyapunov) -> str:
-    told = [shown_period(spectrum.period), spectrum.verdict.name.replace("-", " ")]
+    parts = [shown_period(spectrum.period), spectrum.verdict.name.replace("-", " ")]
     if not math.isnan(spectrum.dimension):
         error = f" ± {spectrum.dimension_error:.1g}" if spectrum.dimension_error else ""
-        told.append(f"dimension {spectrum.dimension:.4g}{error}")
+        parts.append(f"dimension {spectrum.dimension:.4g}{error}")
     if spectrum.zero_one is not None:
-        told.append(f"0-1 test: {spectrum.zero_one.verdict}")
-    return ", ".join(told)
+        parts.append(f"0-1 test: {spectrum.zero_one.verdict}")
+    return ", ".join(parts)
 
 
 def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colour: str) -> None:
@@ -79,11 +80,6 @@ def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colou
         room = max(0.25 * (high - low), 0.02 * max(abs(low), abs(high)), 1e-6)
         ax.set_ylim(low - room, high + room)
     ax.tick_params(axis="both", which="both", top=True, right=True)
-
-
-def _middle(ax: Axes) -> float:
-    low, high = ax.get_ylim()
-    return 0.5 * (low + high)
 
 
 @styled
@@ -135,19 +131,21 @@ def _bars(
 
 
 def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
-    told = []
+    remarks = []
     other = int(np.count_nonzero(~agree))
     if other:
-        told.append(
+        remarks.append(
             f"{other} of {len(agree)} trains (open marks): exponent and 0-1 test differ, or one is undecided."
         )
     infinite = int(np.count_nonzero(np.isneginf(chart.exponents[:, 0])))
     if infinite:
-        told.append(f"{infinite} trains forget their past altogether: exponents minus infinity, not drawn.")
+        remarks.append(
+            f"{infinite} trains forget their past altogether: exponents minus infinity, not drawn."
+        )
     stopped = sum(status != "ok" for status in chart.status)
     if stopped:
-        told.append(f"{stopped} runs ended early.")
-    return told
+        remarks.append(f"{stopped} runs ended early.")
+    return remarks
 
 
 @styled

@@ -94,8 +94,8 @@ def plot_orbit(orbit: Orbit) -> Figure:
     label(left, "y", speed)
     heading(left, f"{shown_period(orbit.regime.period)}: {orbit.name}")
     _traces(right, [orbit])
-    told = ", ".join(_number(multiplier) for multiplier in orbit.multipliers)
-    note(right, f"multipliers {told}", (0.03, 0.97), fontsize=style.TINY, bbox=HALO)
+    multipliers = ", ".join(_number(multiplier) for multiplier in orbit.multipliers)
+    note(right, f"multipliers {multipliers}", (0.03, 0.97), fontsize=style.TINY, bbox=HALO)
     sign(figure, orbit.regime.hammer)
     return figure
 
@@ -110,11 +110,11 @@ def _strobe_points(regime: Regime, points: int) -> FloatArray:
         else {"period": regime.period, "waveform": regime.waveform, "overlap": regime.overlap}
     )
     try:
-        found = strobed(regime.hammer, points=points, transient=points // 3, verdict=False, **own)
+        strobe = strobed(regime.hammer, points=points, transient=points // 3, verdict=False, **own)
     except InputError:
         return np.zeros((0, 2))
-    known = np.isfinite(found.x)
-    return np.column_stack([found.x[known], found.v[known]])
+    known = np.isfinite(strobe.x)
+    return np.column_stack([strobe.x[known], strobe.v[known]])
 
 
 def _plane(ax: Axes, regime: Regime, orbits: list[Orbit], under: FloatArray) -> None:

@@ -102,7 +102,7 @@ def map_frame(
     in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE])
     low, high = _limits(hammer.position, hammer.platen, x)
     arrays = {"codes": codes_of(x, low, high)}
-    told = {
+    heading = {
         "rates": [state.low, state.high],
         "end": end,
         "low": low,
@@ -114,7 +114,7 @@ def map_frame(
         "detail": "full" if size == FULL else "preview",
         "reason": "",
     }
-    return frame("map", serial, arrays, **told)
+    return frame("map", serial, arrays, **heading)
 
 
 def _end(state: State) -> float:

@@ -53,7 +53,7 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
         "strobe x": np.float32(x),
         "strobe v": np.float32(v),
     }
-    told: dict[str, Any] = {
+    heading: dict[str, Any] = {
         "status": motion.status,
         "message": motion.message,
         "places": {
@@ -68,7 +68,7 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
         "steps": motion.steps,
         "pulse": pulse_of(state.fired),
     }
-    return frame("motion", serial, arrays, **told), motion
+    return frame("motion", serial, arrays, **heading), motion
 
 
 def limited_run(
@@ -117,21 +117,21 @@ def dots_frame(serial: int, motion: Motion) -> bytes:
     """Return what the firings did, and the energies of the run."""
     dots = motion.dots
     struck = [dot for dot in dots if dot.struck]
-    energy = motion.energy
-    told: dict[str, Any] = {
+    forces, flights = [dot.peak_force or 0.0 for dot in struck], [dot.flight_time or 0.0 for dot in struck]
+    heading: dict[str, Any] = {
         "dots": [_fields(dot) for dot in dots],
-        "energy": _fields(energy),
+        "energy": _fields(motion.energy),
         "quality": {
             "fired": len(dots),
             "struck": len(struck),
             "extra": sum(dot.extra_contacts for dot in dots),
-            "force_low": min((dot.peak_force or 0.0 for dot in struck), default=None),
-            "force_high": max((dot.peak_force or 0.0 for dot in struck), default=None),
-            "flight_low": min((dot.flight_time or 0.0 for dot in struck), default=None),
-            "flight_high": max((dot.flight_time or 0.0 for dot in struck), default=None),
+            "force_low": min(forces, default=None),
+            "force_high": max(forces, default=None),
+            "flight_low": min(flights, default=None),
+            "flight_high": max(flights, default=None),
         },
     }
-    return frame("dots", serial, **told)
+    return frame("dots", serial, **heading)
 
 
 def _fields(made: Any) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
         "extra y": np.float32(page.extra_places[1]),
     }
     force, off = page.force_ratio[page.printed], page.placement_error[page.printed]
-    told = {
+    heading = {
         "wanted": int(page.lost.size),
         "good": int(page.good.sum()),
         "lost": int(page.lost.sum()),
@@ -87,4 +87,4 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
         "placement": [float(off.min()), float(off.max())] if off.size else None,
         "failed": int((page.status != "ok").sum()),
     }
-    return frame("line", serial, arrays, reason="", **told)
+    return frame("line", serial, arrays, reason="", **heading)

@@ -56,13 +56,13 @@ def strobe_frame(
 
     fired: dict[str, Any] = {"waveform": state.fired, "overlap": state.overlap, "rate": state.rate}
     section = strobe(state.changed, points=points, verdict=judged, **fired)
-    told: dict[str, Any] = {"status": section.status, "rate": state.rate, "verdict": None, "reason": ""}
-    told["exponent"] = exponent_so_far(state, points) if exponent else None
-    told["last"] = LATER[-1]
+    heading: dict[str, Any] = {"status": section.status, "rate": state.rate, "verdict": None, "reason": ""}
+    heading["exponent"] = exponent_so_far(state, points) if exponent else None
+    heading["last"] = LATER[-1]
     if section.verdict is not None:
-        told["verdict"] = {**section.verdict.as_dict(), "phrases": section.verdict.phrases}
+        heading["verdict"] = {**section.verdict.as_dict(), "phrases": section.verdict.phrases}
     arrays = {"x": np.float32(section.x), "v": np.float32(section.v)}
-    return frame("strobe", serial, arrays, **told)
+    return frame("strobe", serial, arrays, **heading)
 
 
 def exponent_so_far(state: State, points: int) -> dict[str, Any] | None:
