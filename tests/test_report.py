@@ -12,7 +12,7 @@ from printhammer.errors import InputError
 from printhammer.reconstruction.results import Results, results_in
 from printhammer.report import build, pdf, write_report
 from printhammer.report.citations import cited_figures
-from printhammer.report.misses import distance, misses_of
+from printhammer.report.misses import distance, misses
 from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text
 
 if TYPE_CHECKING:
@@ -373,7 +373,7 @@ def test_how_far_a_value_is_from_its_band(value: object, band: object, unit: str
 
 def test_words_that_differ_are_counted() -> None:
     claim = claims()["poincare"]
-    (miss,) = misses_of(claim, {"verdicts": ["strange"] * 12})
+    (miss,) = misses(claim, {"verdicts": ["strange"] * 12})
     # Eight of the twelve panels are printed as strange.
     assert miss.value == "8 of 12 as printed"
 

@@ -88,44 +88,12 @@ def to_si(value: float, unit: str, si_unit: str) -> float:
 
 
 def from_si(value: float, si_unit: str, unit: str) -> float:
-    """Convert a number in SI to a unit.
-
-    Parameters
-    ----------
-    value : float
-        Number in `si_unit`.
-    si_unit : str
-        SI unit of `value`.
-    unit : str
-        Unit of the result.
-
-    Returns
-    -------
-    float
-        Correctly rounded.
-
-    Raises
-    ------
-    InputError
-        As for `to_si`.
-    """
+    """Convert a number in `si_unit` to `unit`; arguments and errors otherwise as for `to_si`."""
     return _scaled(value, 1 / _factor(unit, si_unit), si_unit)
 
 
 def parse(text: str, si_unit: str) -> float:
-    """Read a number with its unit, such as "60 lbf", into SI.
-
-    Parameters
-    ----------
-    text : str
-        Number and unit; the unit may be left out only where `si_unit` is "1".
-    si_unit : str
-        SI unit of the result.
-
-    Returns
-    -------
-    float
-        Value in `si_unit`.
+    """Read a number with its unit, such as "60 lbf", into SI; arguments as for `split`.
 
     Raises
     ------
@@ -158,11 +126,11 @@ def split(text: str, si_unit: str) -> tuple[float, str]:
     InputError
         If `text` does not begin with a finite number, or lacks its unit.
     """
-    found = _NUMBER.fullmatch(text)
-    value = float(found[1]) if found else math.nan
-    if found is None or not math.isfinite(value):
+    match = _NUMBER.fullmatch(text)
+    value = float(match[1]) if match else math.nan
+    if match is None or not math.isfinite(value):
         raise InputError(f"{text!r} is not a finite number with a unit, expected {describe(si_unit)}")
-    unit = found[2].strip()
+    unit = match[2].strip()
     if not unit and si_unit != "1":
         raise InputError(f"{text!r} has no unit, expected {describe(si_unit)}")
     return value, unit or "1"
@@ -192,8 +160,8 @@ def _factor(unit: str, si_unit: str) -> Fraction:
     si_size, si_dimension = _measure(si_unit)
     if dimension != si_dimension:
         known = (name for name in DIMENSIONS if _measure(name)[1] == dimension)
-        found = next(known, None)
-        is_what = f"is {DIMENSIONS[found]}" if found else "is of another dimension"
+        same = next(known, None)
+        is_what = f"is {DIMENSIONS[same]}" if same else "is of another dimension"
         raise InputError(f"the unit {unit!r} {is_what}, expected {describe(si_unit)}")
     return size / si_size
 
@@ -220,11 +188,11 @@ def _measure(unit: str) -> tuple[Fraction, UnitsContainer]:
 def _factors(unit: str) -> Iterator[tuple[str, Fraction]]:
     """Split a unit into names and powers; a slash divides by the one factor that follows it."""
     text, position, sign = unit.translate(_SIGNS), 0, 1
-    while unit.isprintable() and (found := _FACTOR.match(text, position)):
-        if found["name"] != "1":
-            yield found["name"], sign * Fraction((found["power"] or "1").strip("() "))
-        position, sign = found.end(), -1 if found["operator"] == "/" else 1
-        if position == len(text) and not found["operator"]:
+    while unit.isprintable() and (match := _FACTOR.match(text, position)):
+        if match["name"] != "1":
+            yield match["name"], sign * Fraction((match["power"] or "1").strip("() "))
+        position, sign = match.end(), -1 if match["operator"] == "/" else 1
+        if position == len(text) and not match["operator"]:
             return
     raise InputError(_UNKNOWN.format(unit))
 

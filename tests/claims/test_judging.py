@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from printhammer.claims import JUDGES, PENDING, Context, Result, claims, judge, judge_all
+from printhammer.claims import JUDGES, PENDING, Context, JudgedClaim, claims, judge, judge_all
 from printhammer.claims.judging import measures
 from printhammer.report.build import claims_json
 
@@ -74,7 +74,13 @@ def test_a_hammer_without_a_rest_state_fails_with_the_reason(hammer: "ph.Hammer"
         assert "no rest state" in result.detail
 
 
-def assert_complete(result: Result) -> None:
+def test_the_former_name_of_a_judged_claim_is_understood() -> None:
+    from printhammer import claims as room
+
+    assert room.Result is JudgedClaim
+
+
+def assert_complete(result: JudgedClaim) -> None:
     assert result.detail.endswith(".")
     if result.verdict == "not yet":
         assert result.value is None

@@ -10,7 +10,7 @@ from tests.candidates import constants_in
 from tests.hammers import CRUDE
 
 import printhammer as ph
-from printhammer.claims import Result, claims
+from printhammer.claims import JudgedClaim, claims
 from printhammer.reconstruction import shipping as module
 from printhammer.reconstruction.judging.judged import FIGURE_11, STATED
 from printhammer.reconstruction.judging.shortlist import rounded
@@ -36,13 +36,13 @@ def row(mass: float, *, panels: int = 5, **verdicts: bool) -> dict[str, Any]:
 def some_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     """All claims hold for the shipped hammer but for some."""
 
-    def judge_all(_hammer: ph.Hammer, progress: Callable[[str], None] | None = None) -> list[Result]:
+    def judge_all(_hammer: ph.Hammer, progress: Callable[[str], None] | None = None) -> list[JudgedClaim]:
         for name in claims() if progress is not None else ():
             progress(name)
         return [
-            Result(claim, dict.fromkeys(claim.band, 0.5), "fails", "So it is.")
+            JudgedClaim(claim, dict.fromkeys(claim.band, 0.5), "fails", "So it is.")
             if name in FAILING
-            else Result(claim, {}, "holds", "")
+            else JudgedClaim(claim, {}, "holds", "")
             for name, claim in claims().items()
         ]
 

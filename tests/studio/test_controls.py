@@ -4,6 +4,7 @@ import pytest
 from tests.hammers import CRUDE
 
 from printhammer.hammer.hammer import Hammer, load, shipped
+from printhammer.hammer.names import range_of
 from printhammer.studio.states import controls
 from printhammer.units import to_si
 
@@ -49,8 +50,8 @@ def test_the_paper_lies_on_the_platen_whatever_is_moved() -> None:
             change = control[end] - control["value"]
             moved = {key: hammer.constants[key].si + weight * change for key, weight in moves.items()}
             for key, value in moved.items():
-                low, high = controls.range_of(hammer, key)
-                assert low <= value <= high, (control["key"], end, key)
+                span = range_of(hammer, key)
+                assert span.low <= value <= span.high, (control["key"], end, key)
             assert isinstance(hammer.replace(moved), Hammer)
 
 

@@ -50,6 +50,7 @@ def run(
     from printhammer.bench.problem import MEMBERS, frozen
     from printhammer.bench.report import Report
     from printhammer.errors import InputError
+    from printhammer.support.threads import thread_count
 
     if threads is not None and threads < 1:
         raise InputError(f"threads = {threads}, expected at least 1")
@@ -57,7 +58,7 @@ def run(
     task, others = frozen(), peers if peers is not None else Peers()
     here = machine.machine()
     lines, absent = table.measure(task, quick, 16 if quick else MEMBERS, others, report_step)
-    figures = ensembles.measure(task, quick, threads or min(2, machine.cores()), report_step)
+    figures = ensembles.measure(task, quick, threads or min(2, thread_count(None)), report_step)
     compiling = {}
     for engine in [] if quick else own.engines():
         report_step(f"compiling, {engine} engine")

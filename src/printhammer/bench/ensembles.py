@@ -172,10 +172,10 @@ def _mass(
 def _errors(
     runs: Ensemble, engine: Any, moments: list[FloatArray], true: list[FloatArray], stroke: float
 ) -> FloatArray:
-    found = runs.run(strobes=moments, engine=engine).strobes
-    assert found is not None
+    strobes = runs.run(strobes=moments, engine=engine).strobes
+    assert strobes is not None
     errors = []
-    for row, wanted in zip(found.x, true, strict=True):
+    for row, wanted in zip(strobes.x, true, strict=True):
         before = np.isfinite(wanted)
         # A run that was lost has no error, and is worse than any that has one.
         gap = np.abs(row - wanted)[before]

@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from printhammer import __version__
+from printhammer.support.threads import thread_count
 
 
 def machine() -> dict[str, str]:
@@ -24,7 +25,7 @@ def machine() -> dict[str, str]:
         busy = f"{os.getloadavg()[0]:.1f}"
     return {
         "processor": f"{processor} ({platform.machine()}{wide})",
-        "cores": str(cores()),
+        "cores": str(thread_count(None)),
         "other load before the run": busy,
         "system": platform.system(),
         "Python": platform.python_version(),
@@ -33,10 +34,3 @@ def machine() -> dict[str, str]:
         "Numba": version("numba"),
         "llvmlite": version("llvmlite"),
     }
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

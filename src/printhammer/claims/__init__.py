@@ -18,7 +18,7 @@ from printhammer.claims import (
 from printhammer.claims.buzz import buzz_search
 from printhammer.claims.context import Context, NotMeasurableError
 from printhammer.claims.definition import KINDS, Claim, claims
-from printhammer.claims.judging import JUDGES, PENDING, Measured, Result, judge, judge_all
+from printhammer.claims.judging import JUDGES, PENDING, JudgedClaim, Measured, judge, judge_all
 
 __all__ = [
     "JUDGES",
@@ -26,9 +26,9 @@ __all__ = [
     "PENDING",
     "Claim",
     "Context",
+    "JudgedClaim",
     "Measured",
     "NotMeasurableError",
-    "Result",
     "bursts",
     "buzz",
     "buzz_search",
@@ -44,3 +44,6 @@ __all__ = [
     "two_pulses",
     "verdicts",
 ]
+
+Result = JudgedClaim
+"""Former name of `JudgedClaim`."""

@@ -90,12 +90,12 @@ def order_of_onset(context: Context, _claim: Claim) -> Measured:
         value[f"{name}_varies_from_Hz"] = onset
         both = onset is not None and lost is not None
         value[f"rate_below_first_lost_dot_{name}_Hz"] = lost - onset if both and lost and onset else None
-    told = {name: f"at {rate:.0f} Hz" for name, rate in first.items()}
+    texts = {name: f"at {rate:.0f} Hz" for name, rate in first.items()}
     return Measured(
         value,
-        f"Flight times first vary {told.get('flight_time', 'at no rate before')}, forces"
-        f" {told.get('force', 'at no rate before')}; the first dot is lost"
-        f" {told.get('lost', 'at no rate tried')}.",
+        f"Flight times first vary {texts.get('flight_time', 'at no rate before')}, forces"
+        f" {texts.get('force', 'at no rate before')}; the first dot is lost"
+        f" {texts.get('lost', 'at no rate tried')}.",
     )
 
 
@@ -161,7 +161,7 @@ def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
     settings = claims()["hang_up_at_high_rate"].settings
     step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))
     waveform = context.waveform
-    rate, lowest, found = settings["last_rate_Hz"], None, []
+    rate, lowest, motions = settings["last_rate_Hz"], None, []
     if waveform.quantity == "current":
         while rate > 0.0 and _exceeds(PulseTrain(waveform, rate=rate, pulses=pulses), limit):
             rate -= step
@@ -171,9 +171,9 @@ def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
         if not hung_up(motion):
             break
         lowest = rate
-        found.append(motion)
+        motions.append(motion)
         rate -= step
-    return lowest, found, highest
+    return lowest, motions, highest
 
 
 @measures("hang_up_at_high_rate", *WHOLE)
@@ -224,23 +224,23 @@ def flight_time_spread(context: Context, claim: Claim) -> Measured:
     """Spread of the flight times of bursts at the strange strobe times."""
     settings, pulses = claim.settings, claim.settings["pulses"]
     _, _, slow = spreads(context.train(settings["rate_Hz"], pulses))
-    found: dict[str, Any] = {}
+    by_panel: dict[str, Any] = {}
     for period, verdict in printed_verdicts().items():
         if verdict == "strange":
             drive = PulseTrain(context.waveform, period=period, pulses=pulses)
-            found[panel_name(period)] = spreads(context.run(drive, float(drive.times[-1]) + 4e-3))[2]
-    known = [flight for flight in found.values() if flight is not None]
-    least = min(known) - slow if slow is not None and len(known) == len(found) else None
+            by_panel[panel_name(period)] = spreads(context.run(drive, float(drive.times[-1]) + 4e-3))[2]
+    known = [flight for flight in by_panel.values() if flight is not None]
+    least = min(known) - slow if slow is not None and len(known) == len(by_panel) else None
     over = {name: sum(flight > settings[name] for flight in known) for name in ("dot_matrix_s", "engraved_s")}
     value = {
         "least_spread_minus_low_rate_s": least,
         "low_rate_spread_s": slow,
-        "spreads_s": found,
+        "spreads_s": by_panel,
         "bursts_over_200_us": over["dot_matrix_s"],
         "bursts_over_30_us": over["engraved_s"],
     }
     return Measured(
         value,
-        f"Of {len(found)} bursts, {over['dot_matrix_s']} spread by more than 200 us, what dot-matrix"
+        f"Of {len(by_panel)} bursts, {over['dot_matrix_s']} spread by more than 200 us, what dot-matrix"
         f" printing tolerates, and {over['engraved_s']} by more than 30 us.",
     )

@@ -43,11 +43,11 @@ def _described(train: BuzzTrain) -> str:
 @measures("buzz_printing", *WHOLE)
 def buzz_printing(context: Context, claim: Claim) -> Measured:
     """Dots of the best train without a touch of the backstop, and their forces."""
-    found = buzz_search(context)
-    train = found.best
+    search = buzz_search(context)
+    train = search.best
     if train is None or not train.count:
-        nothing = {**dict.fromkeys(claim.band), "dots": 0, "trains_tried": found.tried}
-        return Measured(nothing, f"No train does: {found.reason}.")
+        nothing = {**dict.fromkeys(claim.band), "dots": 0, "trains_tried": search.tried}
+        return Measured(nothing, f"No train does: {search.reason}.")
     motion = context.run(PulseTrain(context.waveform, at=train.times), train.times[-1] + TAIL)
     dots = motion.dots[train.first : train.first + train.count]
     returns = [contact.t_in for contact in touches(motion)]
@@ -64,10 +64,12 @@ def buzz_printing(context: Context, claim: Claim) -> Measured:
         "interval_s": train.interval,
         "train": train.kind,
         "clear_from_the_first_firing": train.clear,
-        "trains_tried": found.tried,
+        "trains_tried": search.tried,
     }
-    if found.train is None:
-        return Measured(value, f"The best of {found.tried} trains tried, {_described(train)}, is not enough.")
+    if search.train is None:
+        return Measured(
+            value, f"The best of {search.tried} trains tried, {_described(train)}, is not enough."
+        )
     return Measured(
         value,
         f"{_described(train)}: {len(struck)} dots of {min(forces):.2f} to {max(forces):.2f} of the single"
@@ -96,8 +98,8 @@ def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
     }
     broken = [name for name, count in counts.items() if count < fewest]
     value = {"cases_broken": len(broken), "dots_left": counts}
-    told = ", ".join(f"{count} with {name}" for name, count in counts.items())
-    return Measured(value, f"Dots left of {train.count}: {told}.")
+    left = ", ".join(f"{count} with {name}" for name, count in counts.items())
+    return Measured(value, f"Dots left of {train.count}: {left}.")
 
 
 def _count(context: Context, hammer: Hammer, train: BuzzTrain, interval: float) -> int:

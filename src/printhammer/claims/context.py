@@ -55,7 +55,7 @@ class Context:
         self.tolerance = tolerance
         self.scheme: Scheme = scheme
         self._motions: dict[tuple[Any, ...], Motion] = {}
-        self._found: dict[str, Any] = {}
+        self._kept: dict[str, Any] = {}
 
     def need(self, name: str) -> Any:
         """Return a part or constant of the hammer.
@@ -65,16 +65,16 @@ class Context:
         NotMeasurableError
             The hammer does not have it.
         """
-        found = getattr(self.hammer, name)
-        if found is None:
+        part = getattr(self.hammer, name)
+        if part is None:
             raise NotMeasurableError(f"The hammer has no {name}")
-        return found
+        return part
 
     @property
     def waveform(self) -> Waveform:
         """The standard waveform of the hammer."""
-        found: Waveform = self.need("waveform")
-        return found
+        own: Waveform = self.need("waveform")
+        return own
 
     @property
     def position(self) -> float:
@@ -89,10 +89,10 @@ class Context:
 
     def once(self, name: str, search: Callable[[], _T]) -> _T:
         """Return what a search finds, the second time from the shelf."""
-        if name not in self._found:
-            self._found[name] = search()
-        found: _T = self._found[name]
-        return found
+        if name not in self._kept:
+            self._kept[name] = search()
+        kept: _T = self._kept[name]
+        return kept
 
     def attempt(
         self,
@@ -169,10 +169,10 @@ class Context:
     @cached_property
     def returns(self) -> list[Contact]:
         """Touches of the backstop after a single pulse."""
-        found = touches(self.single)
-        if not found:
+        contacts = touches(self.single)
+        if not contacts:
             raise NotMeasurableError("The armature does not return to the backstop after a single pulse")
-        return found
+        return contacts
 
     @cached_property
     def idle(self) -> Motion:
@@ -187,10 +187,10 @@ class Context:
     @cached_property
     def peak(self) -> float:
         """Largest displacement after a single pulse, m."""
-        found = self.single.peak_after(0)
-        if found is None:
+        highest = self.single.peak_after(0)
+        if highest is None:
             raise NotMeasurableError("The armature has no largest displacement after a single pulse")
-        return found[1]
+        return highest[1]
 
     @property
     def stroke(self) -> float:

@@ -62,16 +62,16 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
     }
     known = {name: (low, high) for name, (low, high) in bands.items() if low is not None and high is not None}
     grid, pulses = settings["rate_grid_Hz"], settings["pulses"]
-    found, coarse = (
+    changes, coarse = (
         {name: sensitivity(context, band, grid, step, pulses) for name, band in known.items()}
         for step in (settings["rate_step_Hz"], settings["coarse_step_Hz"])
     )
     value: dict[str, Any] = {
-        "erratic_over_low": _ratio(found, "low"),
-        "erratic_over_hung_up": _ratio(found, "hung_up"),
-        "low_m_per_Hz": found.get("low"),
-        "erratic_m_per_Hz": found.get("erratic"),
-        "hung_up_m_per_Hz": found.get("hung_up"),
+        "erratic_over_low": _ratio(changes, "low"),
+        "erratic_over_hung_up": _ratio(changes, "hung_up"),
+        "low_m_per_Hz": changes.get("low"),
+        "erratic_m_per_Hz": changes.get("erratic"),
+        "hung_up_m_per_Hz": changes.get("hung_up"),
         "erratic_over_low_coarse": _ratio(coarse, "low"),
         "erratic_over_hung_up_coarse": _ratio(coarse, "hung_up"),
         "erratic_from_Hz": first,
@@ -80,17 +80,17 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
     if first is None or hung is None:
         missing = "Flight times do not vary" if first is None else "The armature does not hang up"
         return Measured(value, f"{missing} at any rate looked at: the erratic band has no end.")
-    told = {name: f"{change * 1e6:.3g} um" for name, change in found.items()}
+    texts = {name: f"{change * 1e6:.3g} um" for name, change in changes.items()}
     fine, whole = settings["rate_step_Hz"], settings["coarse_step_Hz"]
     return Measured(
         value,
-        f"Per hertz, taken over {fine:g} Hz, the record changes by {told['low']} from"
+        f"Per hertz, taken over {fine:g} Hz, the record changes by {texts['low']} from"
         f" {bands['low'][0]:.0f} to"
-        f" {bands['low'][1]:.0f} Hz, {told['erratic']} from {first:.0f} to {hung:.0f} Hz, and"
-        f" {told['hung_up']} from there to {highest:.0f} Hz; taken over {whole:g} Hz, the ratios are"
+        f" {bands['low'][1]:.0f} Hz, {texts['erratic']} from {first:.0f} to {hung:.0f} Hz, and"
+        f" {texts['hung_up']} from there to {highest:.0f} Hz; taken over {whole:g} Hz, the ratios are"
         f" {value['erratic_over_low_coarse']:.2g} and {value['erratic_over_hung_up_coarse']:.2g}.",
     )
 
 
-def _ratio(found: dict[str, float], name: str) -> float | None:
-    return found["erratic"] / found[name] if "erratic" in found and found.get(name) else None
+def _ratio(changes: dict[str, float], name: str) -> float | None:
+    return changes["erratic"] / changes[name] if "erratic" in changes and changes.get(name) else None

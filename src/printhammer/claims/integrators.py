@@ -31,7 +31,7 @@ def integrator_comparison(context: Context, claim: Claim) -> Measured:
     trapezoid, runge_kutta = (_scheme(context, name, 1.0) for name in ("trapezoid", "runge-kutta-4"))
     errors = {motion: _error(motion, reference) for motion in (trapezoid, runge_kutta)}
     fails = {name: _failing_scale(context, reference, name) for name in ("trapezoid", "runge-kutta-4")}
-    still = min(equilibria(context.hammer), key=lambda found: abs(found.x - context.rest), default=None)
+    still = min(equilibria(context.hammer), key=lambda state: abs(state.x - context.rest), default=None)
     phase = None
     if still is not None and still.frequency is not None:
         phase = 2.0 * math.pi * still.frequency * claim.settings["late_settle_step_s"]
@@ -49,15 +49,15 @@ def integrator_comparison(context: Context, claim: Claim) -> Measured:
         "late_step_phase": phase,
         "late_step_stable_for_runge_kutta": None if phase is None else phase <= _RUNGE_KUTTA_LIMIT,
     }
-    told = ""
+    last = ""
     if phase is not None:
         state = "stable" if phase <= _RUNGE_KUTTA_LIMIT else "unstable"
-        told = f"; the last step size, {phase:.2f} rad of the oscillation at rest, is {state} for Runge-Kutta"
+        last = f"; the last step size, {phase:.2f} rad of the oscillation at rest, is {state} for Runge-Kutta"
     return Measured(
         value,
         f"Errors {errors[trapezoid] * 1e6:.2f} um (trapezoidal) and {errors[runge_kutta] * 1e6:.2f} um"
         f" (Runge-Kutta); with steps scaled up they fail at {fails['trapezoid']:.3g} and"
-        f" {fails['runge-kutta-4']:.3g} times the schedule{told}.",
+        f" {fails['runge-kutta-4']:.3g} times the schedule{last}.",
     )
 
 

@@ -31,7 +31,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Result:
+class JudgedClaim:
     """A claim, judged.
 
     Attributes
@@ -104,7 +104,7 @@ def judge_all(
     names: Iterable[str] | None = None,
     progress: Callable[[str], None] | None = None,
     context: Context | None = None,
-) -> list[Result]:
+) -> list[JudgedClaim]:
     """Judge the claims of the paper for one hammer.
 
     Parameters
@@ -120,7 +120,7 @@ def judge_all(
 
     Returns
     -------
-    list of Result
+    list of JudgedClaim
         In the order of the paper.
     """
     context = Context(hammer) if context is None else context
@@ -134,10 +134,10 @@ def judge_all(
     return results
 
 
-def judge(context: Context, claim: Claim) -> Result:
+def judge(context: Context, claim: Claim) -> JudgedClaim:
     """Judge one claim."""
     if claim.name in PENDING:
-        return Result(claim, None, "not yet", f"Not judged yet: it takes {PENDING[claim.name]}.")
+        return JudgedClaim(claim, None, "not yet", f"Not judged yet: it takes {PENDING[claim.name]}.")
     start = perf_counter()
     needs, function = JUDGES[claim.name]
     try:
@@ -146,6 +146,6 @@ def judge(context: Context, claim: Claim) -> Result:
         measured = function(context, claim)
     except (NotMeasurableError, InputError) as error:
         reason = str(error)
-        return Result(claim, None, "fails", f"{reason[:1].upper()}{reason[1:]}.", perf_counter() - start)
+        return JudgedClaim(claim, None, "fails", f"{reason[:1].upper()}{reason[1:]}.", perf_counter() - start)
     verdict: Verdict = "holds" if claim.holds(measured.value) else "fails"
-    return Result(claim, measured.value, verdict, measured.detail, perf_counter() - start)
+    return JudgedClaim(claim, measured.value, verdict, measured.detail, perf_counter() - start)

@@ -21,7 +21,7 @@ from printhammer.claims.verdicts import PANELS, printed_verdicts
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.claims.judging import Result
+    from printhammer.claims.judging import JudgedClaim
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.schemes_1983 import Scheme
@@ -62,7 +62,7 @@ class SchemeContext(Context):
 
 def judge_as_in_1983(
     hammer: Hammer, scheme: Scheme = "runge-kutta-4", progress: Callable[[str], None] | None = None
-) -> list[Result]:
+) -> list[JudgedClaim]:
     """Judge the claims in `COMPUTED` from what a scheme of 1983 computes.
 
     Parameters

@@ -75,11 +75,11 @@ def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
     def total(t: FloatArray) -> FloatArray:
         return np.abs(motion.forces_at(t)["total"])
 
-    found = context.returns
-    ends = [motion.end if c.t_out is None else c.t_out for c in found]
-    at_stop = max(largest(total, c.t_in, end) for c, end in zip(found, ends, strict=True))
+    contacts = context.returns
+    ends = [motion.end if c.t_out is None else c.t_out for c in contacts]
+    at_stop = max(largest(total, c.t_in, end) for c, end in zip(contacts, ends, strict=True))
     starts = [motion.start, *ends]
-    stops = [*(c.t_in for c in found), motion.end]
+    stops = [*(c.t_in for c in contacts), motion.end]
     elsewhere = max(largest(total, a, b) for a, b in zip(starts, stops, strict=True) if b > a)
     if not elsewhere:
         raise NotMeasurableError("No force acts on the armature outside the backstop")

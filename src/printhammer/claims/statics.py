@@ -40,15 +40,15 @@ def rest_state(context: Context, _claim: Claim) -> Measured:
     """Depth of the rest state in the backstop, force there, stability."""
     rest = context.rest
     force = float(context.idle.forces_at(0.0)["total"][0])
-    found = min(equilibria(context.hammer), key=lambda e: abs(e.x - rest), default=None)
-    here = found is not None and abs(found.x - rest) <= 1e-9 * abs(rest)
+    equilibrium = min(equilibria(context.hammer), key=lambda e: abs(e.x - rest), default=None)
+    here = equilibrium is not None and abs(equilibrium.x - rest) <= 1e-9 * abs(rest)
     depth = context.position - rest
     value = {
         "depth_m": depth,
         "total_force_N": abs(force),
-        "stable": bool(here and found is not None and found.stable),
+        "stable": bool(here and equilibrium is not None and equilibrium.stable),
         "rest_m": rest,
-        "natural_frequency_Hz": found.frequency if here and found is not None else None,
+        "natural_frequency_Hz": equilibrium.frequency if here and equilibrium is not None else None,
     }
     return Measured(value, f"At rest the backstop is compressed by {depth * 1e6:.3f} um.")
 
@@ -114,11 +114,11 @@ def current_range(context: Context, _claim: Claim) -> Measured:
         "Am_over_Bm_A": strong / coil if strong is not None and coil else None,
         "single_pulse_current_A": waveform.peak,
     }
-    told = (
+    law = (
         "the magnet's law has no Am and Bm"
         if strong is None or not coil
         else f"Am / Bm = {strong / coil:.3g} A"
     )
     return Measured(
-        value, f"The largest current of pulse, pairs and trains down to 0.80 ms is {largest:.3g} A; {told}."
+        value, f"The largest current of pulse, pairs and trains down to 0.80 ms is {largest:.3g} A; {law}."
     )

@@ -68,8 +68,10 @@ def poincare_window(context: Context, claim: Claim) -> Measured:
     }
     least = claim.band["least_share_inside"]["at_least"]
     low = [f"{name} ({share:.1%})" for name, share in shares.items() if share < least]
-    told = f"below {least:.0%} at {', '.join(low)}" if low else f"no panel is below {least:.0%}"
-    return Measured(value, f"Inside the window: {np.mean(list(shares.values())):.1%} of all points; {told}.")
+    remark = f"below {least:.0%} at {', '.join(low)}" if low else f"no panel is below {least:.0%}"
+    return Measured(
+        value, f"Inside the window: {np.mean(list(shares.values())):.1%} of all points; {remark}."
+    )
 
 
 @measures("low_rate_fixed_point", *WHOLE)

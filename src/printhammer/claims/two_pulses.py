@@ -30,10 +30,10 @@ def two_pulses_660us(context: Context, claim: Claim) -> Measured:
         "position_at_firing_m": float(x[1]),
         "velocity_at_firing_m_per_s": float(v[1]),
     }
-    told = "no peak follows" if peak is None else f"the peak after it is {peak[1] * 1e6:.1f} um"
+    after = "no peak follows" if peak is None else f"the peak after it is {peak[1] * 1e6:.1f} um"
     return Measured(
         value,
-        f"Fired again at {x[1] * 1e6:.1f} um with {v[1]:+.3f} m/s: {told}, the pack at"
+        f"Fired again at {x[1] * 1e6:.1f} um with {v[1]:+.3f} m/s: {after}, the pack at"
         f" {context.front * 1e6:.1f} um.",
     )
 

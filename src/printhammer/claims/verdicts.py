@@ -80,15 +80,15 @@ def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]
     fine = strobes(context.hammer, periods, tolerance=_TIGHTER * context.tolerance)
     # For the figure, which shows the same trains.
     context.once(PANELS, lambda: every[: len(periods)])
-    found = {}
+    by_variant = {}
     for number, name in enumerate((_PLAIN, *_CHANGED)):
-        found[name] = _verdicts(every[number * len(periods) : (number + 1) * len(periods)])
-    found[_FINE] = _verdicts(fine)
-    return found
+        by_variant[name] = _verdicts(every[number * len(periods) : (number + 1) * len(periods)])
+    by_variant[_FINE] = _verdicts(fine)
+    return by_variant
 
 
-def _verdicts(found: list[Strobe]) -> list[Verdict]:
-    return [strobe.verdict for strobe in found if strobe.verdict is not None]
+def _verdicts(judged: list[Strobe]) -> list[Verdict]:
+    return [strobe.verdict for strobe in judged if strobe.verdict is not None]
 
 
 @measures("poincare", *WHOLE)
@@ -126,11 +126,11 @@ def poincare(context: Context, claim: Claim) -> Measured:
         },
     }
     early = sum(verdict.name == band for verdict, band in zip(first, printed, strict=True))
-    told = f"; {', '.join(wrong)}" if wrong else ""
+    remark = f"; {', '.join(wrong)}" if wrong else ""
     return Measured(
         value,
-        f"{len(right)} of {len(names)} panels are as printed{told}. Judged on the first {count} firings, with"
-        f" the transient, {early} are.",
+        f"{len(right)} of {len(names)} panels are as printed{remark}. Judged on the first {count} firings,"
+        f" with the transient, {early} are.",
     )
 
 
@@ -146,18 +146,18 @@ class Stretch:
 
 def stretches(periods: Sequence[float], names: Sequence[str]) -> list[Stretch]:
     """Return the stretches of a scan from the longest strobe time, s, to the shortest."""
-    found = []
+    every = []
     for name, group in itertools.groupby(zip(periods, names, strict=True), key=lambda item: item[1]):
         times = [period for period, _ in group]
-        found.append(Stretch(name, times[0], times[-1], len(times)))
-    return found
+        every.append(Stretch(name, times[0], times[-1], len(times)))
+    return every
 
 
-def cascades(found: Sequence[Stretch]) -> list[Stretch]:
+def cascades(scanned: Sequence[Stretch]) -> list[Stretch]:
     """Return the first of each three stretches in a row whose periods are 2, 4 and 8."""
     return [
         three[0]
-        for three in zip(found, found[1:], found[2:], strict=False)
+        for three in zip(scanned, scanned[1:], scanned[2:], strict=False)
         if [stretch.name for stretch in three] == ["period-2", "period-4", "period-8"]
     ]
 
@@ -187,8 +187,8 @@ def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
         "first_strange_s": None if ends[0] is None else periods[ends[0]],
         "last_strange_s": None if ends[1] is None else periods[ends[1]],
         "windows_before_strange": [_window(stretch, step) for stretch in before],
-        **{f"period_{q}_windows": len(found) for q, found in windows.items()},
-        **{f"period_{q}": [_window(stretch, step) for stretch in found] for q, found in windows.items()},
+        **{f"period_{q}_windows": len(group) for q, group in windows.items()},
+        **{f"period_{q}": [_window(stretch, step) for stretch in group] for q, group in windows.items()},
         "doublings_with_falling_time_s": [stretch.longest for stretch in falling],
         "doublings_with_rising_time_s": [stretch.shortest for stretch in rising],
         "strobe_times": {name: names.count(name) for name in sorted(set(names))},
@@ -198,8 +198,8 @@ def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
         return Measured(value, f"No strobe time is strange; {short}.")
     way = ", ".join(stretch.name for stretch in before) or "nothing"
     wide = " and ".join(
-        f"{len(found)} windows of period {q}, {step * sum(s.count for s in found) * 1e6:.0f} us in all"
-        for q, found in windows.items()
+        f"{len(group)} windows of period {q}, {step * sum(s.count for s in group) * 1e6:.0f} us in all"
+        for q, group in windows.items()
     )
     return Measured(
         value,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import ALONG_Y, beside, note
+from printhammer.figures.elements.marks import ALONG_Y, beside, heading, note
 from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.units import from_si
 
@@ -39,7 +39,7 @@ def family(
     hammer: Hammer,
     constants: Sequence[Mapping[str, float]],
     conclusions: Sequence[Mapping[str, float | None]],
-    told: Mapping[str, Mapping[str, Any]],
+    drawn: Mapping[str, Mapping[str, Any]],
     *,
     order: str = "safe_rate_Hz",
 ) -> Figure:
@@ -47,7 +47,7 @@ def family(
 
     A dot for each member in each row. `constants` are those of the hammer and then of each member, by key of
     a hammer file, SI, at the common gauge; `conclusions` those of each member by name, SI, None where it has
-    none. `told` gives of each conclusion drawn `title`, `unit`, `robust`, `low` and `high`; members are
+    none. `drawn` gives of each conclusion `title`, `unit`, `robust`, `low` and `high`; members are
     coloured by the one that is the `order`, light to dark, in all panels.
     """
     from matplotlib.colors import LinearSegmentedColormap
@@ -56,19 +56,19 @@ def family(
     rows = [key for key in own if any(abs(row[key] - own[key]) > _EQUAL * abs(own[key]) for row in members)]
     ranks = _ranks([row.get(order) for row in conclusions])
     shades = LinearSegmentedColormap.from_list("family", style.FAMILY)(ranks)
-    deep = -(-len(told) // _COLUMNS)
+    deep = -(-len(drawn) // _COLUMNS)
     upper, lower = 0.55 + _ROW * len(rows), _STRIP * deep
     figure = new_figure(0.5 + upper + lower)
     top, bottom = figure.subfigures(2, 1, height_ratios=(upper, lower), squeeze=False)[:, 0]
     ax = top.add_subplot()
     _constants(ax, rows, own, members, ranks, shades)
-    key = f"A dot for each of {len(members)} hammers; darker: higher {told[order]['title']}"
-    ax.set_title(key, loc="left", fontsize=style.SMALL, color=style.MUTED)
+    key = f"A dot for each of {len(members)} hammers; darker: higher {drawn[order]['title']}"
+    heading(ax, key, color=style.MUTED)
     grid = bottom.add_gridspec(deep, _COLUMNS, wspace=0.06)
-    for number, (name, entry) in enumerate(told.items()):
+    for number, (name, entry) in enumerate(drawn.items()):
         column, row = divmod(number, deep)
         strip = bottom.add_subplot(grid[row, column])
-        _conclusion(strip, entry, [found.get(name) for found in conclusions], ranks, shades)
+        _conclusion(strip, entry, [member.get(name) for member in conclusions], ranks, shades)
     sign(figure, hammer)
     return figure
 
@@ -93,15 +93,15 @@ def _constants(
     ax.axvline(1.0, color=style.MUTED, lw=style.HAIR, zorder=1.0)
     fan = _FAN * (0.5 - ranks)
     for row, key in enumerate(rows):
-        found = ratios[:, row]
-        inside = found > 0.0
+        values = ratios[:, row]
+        inside = values > 0.0
         ax.axhline(row, color=style.FAINT, lw=style.HAIR, zorder=0.5)
-        ax.scatter(found[inside], row + fan[inside], s=11, c=shades[inside], lw=0.0, zorder=3.0, gid=key)
+        ax.scatter(values[inside], row + fan[inside], s=11, c=shades[inside], lw=0.0, zorder=3.0, gid=key)
         if not inside.all():
             signs = f"{int((~inside).sum())} of the other sign"
             beside(ax, signs, (0.0, row), (3, 0), "left center", xycoords=ALONG_Y, color=style.ORANGE)
-    seen = ratios[ratios > 0.0]
-    low, high = min(float(seen.min(initial=1.0)), 0.9) / 1.06, max(float(seen.max(initial=1.0)), 1.1) * 1.06
+    known = ratios[ratios > 0.0]
+    low, high = min(float(known.min(initial=1.0)), 0.9) / 1.06, max(float(known.max(initial=1.0)), 1.1) * 1.06
     ax.set(xlim=(low, high), ylim=(len(rows) - 0.4, -0.6))
     ax.set_yticks(range(len(rows)), list(rows))
     ax.set_xlabel("Constant over that of the shipped hammer")
@@ -129,25 +129,24 @@ def _conclusion(
     unit, written = _SHOWN.get(entry["unit"], (entry["unit"], entry["unit"]))
     factor = from_si(1.0, entry["unit"], unit)
     known = np.array([value is not None for value in values], dtype=np.bool_)
-    found = np.array([np.nan if value is None else value * factor for value in values])
+    shown = np.array([np.nan if value is None else value * factor for value in values])
     colour = style.BLUE if entry["robust"] else style.ORANGE
     if known.any():
-        low, high = float(np.nanmin(found)), float(np.nanmax(found))
+        low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
         room = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
         # Values that hardly differ should look so.
         room = max(room, 0.5 * (0.2 * abs(high) - (high - low)))
         ax.set_xlim(low - room, high + room)
         ax.plot([low, high], [0.0, 0.0], color=colour, lw=6.0, alpha=0.25, solid_capstyle="round", zorder=1.0)
         fan = 0.8 * (ranks - 0.5)
-        ax.scatter(found[known], fan[known], s=9, c=shades[known], lw=0.0, zorder=3.0, gid=entry["title"])
+        ax.scatter(shown[known], fan[known], s=9, c=shades[known], lw=0.0, zorder=3.0, gid=entry["title"])
     ax.set(ylim=(-0.75, 0.75), yticks=[])
     ax.locator_params(axis="x", nbins=5)
     ax.tick_params(axis="x", labelsize=style.TINY, pad=1.5)
     ax.spines[["left", "right", "top"]].set_visible(False)
     missing = int((~known).sum())
-    told = f"{entry['title'].replace(' us ', ' µs ')}  [{written}]" + (
-        f", {missing} without" if missing else ""
-    )
-    ax.set_title(told, loc="left", fontsize=style.SMALL, color=style.INK, pad=2.0)
+    text = f"{entry['title'].replace(' us ', ' µs ')}  [{written}]"
+    text += f", {missing} without" if missing else ""
+    heading(ax, text, color=style.INK, pad=2.0)
     word = "robust" if entry["robust"] else "depends"
     note(ax, word, (1.0, 1.02), ha="right", va="bottom", color=colour, fontsize=style.TINY)

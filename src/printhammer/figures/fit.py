@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.marks import beside, dots, heading, inside, note
 from printhammer.figures.elements.scales import Name, Scale, label, scale
 from printhammer.figures.elements.style import foot, new_figure, styled
 
@@ -67,8 +67,8 @@ def plot(fit: Fit) -> Figure:
         _quantiles(figure.add_subplot(grid[1, 1]), fit)
     else:
         _quantiles(figure.add_subplot(grid[:, 1]), fit)
-    told = f"{fit.kind} · {' and '.join(fit.source)}"
-    foot(figure, told, fill(f"The data reject the law: {fit.rejected}.", 118) if fit.rejected else "")
+    remark = fill(f"The data reject the law: {fit.rejected}.", 118) if fit.rejected else ""
+    foot(figure, f"{fit.kind} · {' and '.join(fit.source)}", remark)
     return figure
 
 
@@ -85,7 +85,7 @@ def _data(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
     for number, (name, colour) in enumerate(zip(fit.series_names, cycle(_COLOURS), strict=False)):
         mine = np.flatnonzero((fit.series == number) & ~fit.outliers)
         order = mine[np.argsort(x[mine], kind="stable")]
-        ax.plot(x[order], measured[order], ls="none", marker="o", ms=_size(fit), mew=0.0, color=colour)
+        dots(ax, x[order], measured[order], _size(fit), colour)
         if _is_curve(law[order]):
             ax.plot(x[order], law[order], lw=style.THIN, color=colour, label=name)
         else:
@@ -113,27 +113,19 @@ def _residuals(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
     if np.ptp(half) == 0.0:
         ax.axhspan(-half[0], half[0], color=style.FAINT, alpha=0.6, lw=0.0, zorder=0.5)
     else:
-        ax.vlines(
-            x[used][order], -half[used][order], half[used][order], color=style.FAINT, lw=2.4, zorder=0.5
-        )
+        reach = half[used][order]
+        ax.vlines(x[used][order], -reach, reach, color=style.FAINT, lw=2.4, zorder=0.5)
     for number, colour in zip(range(len(fit.series_names)), cycle(_COLOURS), strict=False):
         mine = used & (fit.series == number)
-        ax.plot(x[mine], residuals[mine], ls="none", marker="o", ms=_size(fit), mew=0.0, color=colour)
+        dots(ax, x[mine], residuals[mine], _size(fit), colour)
     top = 1.15 * max(float(np.abs(residuals[used]).max()), float(half[used].max())) or 1.0
     inside = fit.outliers & (np.abs(residuals) <= top)
     _ring(ax, fit, x, np.clip(residuals, -0.9 * top, 0.9 * top))
     ax.set_ylim(-top, top)
     beyond = int(fit.outliers.sum()) - int(inside.sum())
     if beyond:
-        note(
-            ax,
-            f"{beyond} beyond",
-            (0.98, 0.05),
-            ha="right",
-            va="bottom",
-            color=style.ORANGE,
-            fontsize=style.TINY,
-        )
+        corner = {"ha": "right", "va": "bottom", "color": style.ORANGE, "fontsize": style.TINY}
+        note(ax, f"{beyond} beyond", (0.98, 0.05), **corner)
     label(ax, "x", across, fit.axes[0][0].capitalize())
     label(ax, "y", up, "Data − law")
     ax.margins(x=0.03)
@@ -148,43 +140,29 @@ def _spread(fit: Fit) -> FloatArray:
 
 def _ring(ax: Axes, fit: Fit, x: FloatArray, y: FloatArray) -> None:
     rows = np.flatnonzero(fit.outliers)
-    ax.plot(
-        x[rows], y[rows], ls="none", marker="o", ms=5.0, mew=0.9, mfc="none", mec=style.ORANGE, zorder=4.0
-    )
+    dots(ax, x[rows], y[rows], 5.0, style.BLUE, mew=0.9, mfc="none", mec=style.ORANGE, zorder=4.0)
     if len(rows) <= _NAMED and len(fit.lines):
         for row in rows:
-            where = (float(x[row]), float(y[row]))
-            text = f"line {fit.lines[row]}"
-            ax.annotate(
-                text, where, (5, -2), textcoords="offset points", fontsize=style.TINY, color=style.ORANGE
-            )
+            beside(ax, f"line {fit.lines[row]}", (float(x[row]), float(y[row])), (5, -2), color=style.ORANGE)
 
 
 def _correlation(ax: Axes, fit: Fit) -> None:
     from matplotlib.colors import LinearSegmentedColormap
 
     colours = LinearSegmentedColormap.from_list("correlation", [style.BLUE, "white", style.ORANGE])
-    found = fit.correlation
+    correlation = fit.correlation
     n = len(fit.keys)
-    ax.imshow(found, vmin=-1.0, vmax=1.0, cmap=colours, aspect="equal")
+    ax.imshow(correlation, vmin=-1.0, vmax=1.0, cmap=colours, aspect="equal")
     for row in range(n):
         for column in range(n):
-            value = float(found[row, column])
+            value = float(correlation[row, column])
             shade = "white" if abs(value) > 0.7 else style.INK
-            ax.text(
-                column,
-                row,
-                f"{round(value, 2) + 0.0:.2f}",
-                ha="center",
-                va="center",
-                fontsize=style.TINY,
-                color=shade,
-            )
+            inside(ax, f"{round(value, 2) + 0.0:.2f}", column, row, shade)
     names = [_short(key) for key in fit.keys]
     ax.set_xticks(range(n), names, fontsize=style.TINY, rotation=30.0, ha="right", rotation_mode="anchor")
     ax.set_yticks(range(n), names, fontsize=style.TINY)
     ax.tick_params(length=0.0)
-    ax.set_title("Correlation", loc="left", fontsize=style.SMALL)
+    heading(ax, "Correlation")
 
 
 def _short(key: str) -> str:
@@ -205,9 +183,8 @@ def _quantiles(ax: Axes, fit: Fit) -> None:
     at = norm.ppf((np.arange(1, len(ordered) + 1) - 0.375) / (len(ordered) + 0.25))
     end = 1.1 * max(float(np.abs(ordered).max()), float(np.abs(at).max()))
     ax.plot([-end, end], [-end, end], color=style.MUTED, lw=style.HAIR)
-    ax.plot(at, ordered, ls="none", marker="o", ms=0.8 * _size(fit) + 0.4, mew=0.0, color=style.BLUE)
-    ax.set_xlim(-end, end)
-    ax.set_ylim(-end, end)
+    dots(ax, at, ordered, 0.8 * _size(fit) + 0.4, style.BLUE)
+    ax.set(xlim=(-end, end), ylim=(-end, end))
     ax.set_aspect("equal")
     ax.set_xlabel("Normal quantile")
     ax.set_ylabel("Residual / its deviation")

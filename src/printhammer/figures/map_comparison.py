@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.figures.elements import map_marks
-from printhammer.figures.elements.style import BLUE, SMALL, new_figure, styled
+from printhammer.figures.elements.marks import heading
+from printhammer.figures.elements.style import BLUE, new_figure, styled
 from printhammer.maps.frequency import rms_difference
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     for chart in (computed, measured):
         map_marks.drawable(chart)
     scales = map_marks.scales_of(computed, measured)
-    norm = map_marks.norm_of(scales, computed, measured)
     figure = new_figure(4.4, 8.6)
     grid = figure.add_gridspec(1, 4, width_ratios=(10.0, 10.0, 3.4, 0.7))
     left = figure.add_subplot(grid[0])
@@ -40,15 +40,14 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     beside = figure.add_subplot(grid[2], sharey=left)
     bar = figure.add_subplot(grid[3])
     for ax, chart, name in ((left, computed, "computed"), (right, measured, "measured")):
-        map_marks.picture(ax, chart, norm, scales)
-        map_marks.firing_lines(ax, chart, scales)
-        ax.set_title(name, loc="left", fontsize=SMALL)
+        map_marks.picture(ax, chart, scales)
+        heading(ax, name)
     for ax in (right, beside):
         ax.set_ylabel("")
         ax.tick_params(axis="y", labelleft=False)
     _limits(left, scales, computed, measured)
     remark = _difference(beside, scales, computed, measured)
-    map_marks.colour_bar(bar, computed, norm, scales)
+    map_marks.colour_bar(bar, computed, scales)
     map_marks.sign_map(figure, computed, map_marks.failures(computed), remark)
     return figure
 
@@ -65,7 +64,7 @@ def _difference(ax: Axes, scales: map_marks.Scales, computed: xr.Dataset, measur
     """Draw the root mean square of the difference against rate; say so where there is none."""
     way = scales.way
     rates, difference = rms_difference(computed, measured)
-    ax.set_title("difference", loc="left", fontsize=SMALL)
+    heading(ax, "difference")
     ax.set_xlabel(f"RMS  [{way.sign}]")
     ax.tick_params(axis="x", top=True)
     known = np.isfinite(difference)
@@ -73,7 +72,6 @@ def _difference(ax: Axes, scales: map_marks.Scales, computed: xr.Dataset, measur
         ax.set_xticks([])
         return "No rate is in both maps; nothing is known of their difference."
     style: dict[str, Any] = {"color": BLUE, "lw": 0.8, "marker": "o", "ms": 2.6 if known.sum() < 80 else 0.0}
-    (line,) = ax.plot(way.shown(difference[known]), scales.rate.shown(rates[known]), **style)
-    line.set_gid("difference")
+    ax.plot(way.shown(difference[known]), scales.rate.shown(rates[known]), gid="difference", **style)
     ax.set_xlim(0.0, 1.08 * max(float(way.shown(difference[known].max())), 1e-12))
     return ""

@@ -11,12 +11,13 @@ name                  what it is
 ===================== ====================================================================================
 
 What a constant is measured in, what it means and where it may lie is declared once, with its part or waveform
-(`printhammer.support.constants.quantity`); here it is looked up.
+(`printhammer.support.constants.quantity`); here it is looked up. The range in which a control moves it, and
+whether evenly or by factors, is that of `range_of`.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Final
 
@@ -47,6 +48,44 @@ FORCE: Final = {
     "phase": Quantity("rad", "phi", "phase of the force"),
 }
 """Constants of a sinusoidal force."""
+
+PLACES: Final = ("platen", "pack.front", "backstop.position")
+"""Constants that are places on the axis of the armature."""
+
+_ZERO: Final = {"m": 100e-6, "s": 500e-6, "kg": 1e-3, "N": 10.0}
+"""How far a constant that is zero may rise, by its SI unit: about what is met in impact print hammers."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Where a control moves a constant."""
+
+    low: float
+    high: float
+    """Its ends, SI."""
+    logarithmic: bool
+    """Whether equal steps are equal factors."""
+
+
+def range_of(hammer: Hammer, name: str, factor: float = 10.0) -> Range:
+    """Return the range of a constant of a hammer file about the value that it has in a hammer.
+
+    The ranges are ours, wide enough for every hammer of the paper and narrow enough to be met with a slider.
+    Places on the axis move by half the way from backstop to platen; other constants by a factor up and down,
+    a coefficient of restitution up to 1; what is zero has a range of its dimension.
+    """
+    constant = hammer.constants[name]
+    value = constant.si
+    if name in PLACES:
+        places = [place for place in (hammer.position, hammer.front, hammer.platen) if place is not None]
+        reach = 0.5 * (max(places) - min(places)) or _ZERO["m"]
+        return Range(value - reach, value + reach, logarithmic=False)
+    if value == 0.0:
+        return Range(0.0, _ZERO.get(constant.si_unit, 1.0), logarithmic=False)
+    low, high = sorted((value / factor, value * factor))
+    if name.rpartition(".")[2] == "restitution":
+        high = min(high, 1.0)
+    return Range(low, high, logarithmic=low > 0.0)
 
 
 def quantity_of(hammer: Hammer, name: str) -> Quantity | None:

@@ -13,7 +13,7 @@ from printhammer.units import from_si
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from printhammer.claims import Result
+    from printhammer.claims import JudgedClaim
     from printhammer.hammer.hammer import Hammer
 
 TITLE: Final = "The stored-energy print hammer of Hendriks (1983), reconstructed"
@@ -77,7 +77,7 @@ def search_json(
     }
 
 
-def _failing(result: Result, rows: Sequence[dict[str, Any]], held: set[str]) -> dict[str, Any]:
+def _failing(result: JudgedClaim, rows: Sequence[dict[str, Any]], held: set[str]) -> dict[str, Any]:
     name = result.claim.name
     there = [row for row in rows if row["verdicts"].get(name)]
     found: dict[str, Any] = {

@@ -22,7 +22,7 @@ from printhammer.support.outputs import write_file
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from printhammer.claims import Result
+    from printhammer.claims import JudgedClaim
     from printhammer.hammer.hammer import Hammer
     from printhammer.reconstruction.results import BaseRates, Results
 
@@ -83,7 +83,9 @@ def write_report(
         drawn = None if figures is None else set(figures)
         written: list[Path] = []
         drawings = []
-        for number, says in _sayings().items():
+        sayings = files("printhammer").joinpath("report", "figures.toml").read_text(encoding="utf-8")
+        for name, says in tomllib.loads(sayings).items():
+            number = int(name)
             if drawn is not None and number not in drawn:
                 continue
             tell(f"figure {number}")
@@ -106,7 +108,7 @@ def write_report(
     return report
 
 
-def claims_json(results: list[Result], rates: BaseRates | None = None) -> str:
+def claims_json(results: list[JudgedClaim], rates: BaseRates | None = None) -> str:
     """Return the claims as JSON: a list of objects with name, kind, value, band, verdict and more."""
     entries = []
     for result in results:
@@ -115,17 +117,11 @@ def claims_json(results: list[Result], rates: BaseRates | None = None) -> str:
     return json.dumps(entries, indent=2, allow_nan=False) + "\n"
 
 
-def _sayings() -> dict[int, dict[str, str]]:
-    """Return what the paper says of each figure."""
-    text = files("printhammer").joinpath("report", "figures.toml").read_text(encoding="utf-8")
-    return {int(number): entry for number, entry in tomllib.loads(text).items()}
-
-
 def _draw(
     context: Context,
     number: int,
     says: Mapping[str, str],
-    results: list[Result],
+    results: list[JudgedClaim],
     folder: Path,
     written: list[Path],
 ) -> Drawing | None:

@@ -27,7 +27,7 @@ def linked_source(source: str, drawn: set[int]) -> Any:
         return f'<a href="#figure-{number}">{number}</a>' if int(number) in drawn else number
 
     text = str(escape(source))
-    text = CITATION.sub(lambda found: re.sub(r"\d+", link, found[0]), text)
+    text = CITATION.sub(lambda citation: re.sub(r"\d+", link, citation[0]), text)
     number = SECTIONS.get(source)
     if number in drawn:
         text += f' (<a href="#figure-{number}">Fig. {number}</a>)'

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from printhammer.claims import Result
+    from printhammer.claims import JudgedClaim
     from printhammer.hammer.hammer import Hammer
     from printhammer.reconstruction.results import Family, Results, Search
 
@@ -31,7 +31,7 @@ class Drawing:
     """Its file as vectors, seen from the folder of the report."""
     reason: str
     """Why it could not be drawn; empty where it was."""
-    claims: tuple[Result, ...]
+    claims: tuple[JudgedClaim, ...]
     """Claims that cite the figure."""
     seconds: float
     """Time that it took."""
@@ -45,7 +45,7 @@ class Report:
     ----------
     hammer : Hammer
         The hammer.
-    results : list of Result
+    results : list of JudgedClaim
         The claims, judged.
     drawings : list of Drawing
         The figures.
@@ -60,7 +60,7 @@ class Report:
     """
 
     hammer: Hammer
-    results: list[Result]
+    results: list[JudgedClaim]
     drawings: list[Drawing]
     provenance: Mapping[str, Any]
     reconstruction: Results

@@ -10,7 +10,7 @@ from printhammer.report.quantities import band_text, split_name, value_text
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from printhammer.claims import Claim, Result
+    from printhammer.claims import Claim
 
 _LEAST: Final = {"above", "at_least"}
 
@@ -28,31 +28,27 @@ class Miss:
     """How far that is apart."""
 
 
-def misses(result: Result) -> list[Miss]:
-    """Return what of a result is not within its band; nothing where nothing could be measured."""
-    return [] if result.value is None else misses_of(result.claim, result.value)
-
-
-def misses_of(claim: Claim, value: Mapping[str, Any]) -> list[Miss]:
-    """Return what of measured values is not within the band of a claim."""
-    found = []
+def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
+    """Return what of measured values is not within the band of a claim; nothing where there are none."""
+    missed: list[Miss] = []
+    if value is None:
+        return missed
     for name in claim.missed(value):
         words, unit = split_name(name)
         measured, band = value.get(name), claim.band[name]
         if isinstance(band, list) and isinstance(band[0], str):
             # One by one they are told elsewhere.
-            found.append(Miss(words, agreement(measured, band), "", ""))
+            missed.append(Miss(words, agreement(measured, band), "", ""))
         else:
-            found.append(
-                Miss(words, value_text(measured, unit), band_text(band, unit), distance(measured, band, unit))
-            )
-    return found
+            shown = value_text(measured, unit), band_text(band, unit)
+            missed.append(Miss(words, *shown, distance(measured, band, unit)))
+    return missed
 
 
 def agreement(value: Any, band: list[str]) -> str:
     """Return how many words of a list are those that are wanted."""
-    given = value if isinstance(value, (list, tuple)) else []
-    same = sum(one == other for one, other in zip(given, band, strict=False))
+    words = value if isinstance(value, (list, tuple)) else []
+    same = sum(one == other for one, other in zip(words, band, strict=False))
     return f"{same} of {len(band)} as printed"
 
 

@@ -21,7 +21,7 @@ from printhammer.report.views import (
 )
 
 if TYPE_CHECKING:
-    from printhammer.claims import Result
+    from printhammer.claims import JudgedClaim
     from printhammer.hammer.hammer import Hammer
     from printhammer.report.contents import Report
 
@@ -96,7 +96,7 @@ def _parts(hammer: Hammer) -> list[dict[str, Any]]:
     ]
 
 
-def _by_kind(results: list[Result]) -> dict[str, dict[str, int]]:
+def _by_kind(results: list[JudgedClaim]) -> dict[str, dict[str, int]]:
     """Return how many claims of each kind have each verdict."""
     counts = {kind: dict.fromkeys(VERDICTS, 0) for kind in KINDS}
     for result in results:
@@ -104,7 +104,7 @@ def _by_kind(results: list[Result]) -> dict[str, dict[str, int]]:
     return counts
 
 
-def _judged_lines(result: Result) -> list[dict[str, Any]]:
+def _judged_lines(result: JudgedClaim) -> list[dict[str, Any]]:
     """Return the measured values of a claim that are banded, as text."""
     value, missed = result.value or {}, set(result.missed)
     lines = []
@@ -117,7 +117,7 @@ def _judged_lines(result: Result) -> list[dict[str, Any]]:
     return lines
 
 
-def _claim(result: Result, report: Report, drawn: set[int]) -> dict[str, Any]:
+def _claim(result: JudgedClaim, report: Report, drawn: set[int]) -> dict[str, Any]:
     """Return a claim with its values as text: those that are banded, and the others."""
     value, band = result.value or {}, result.claim.band
     rest = {name: entry for name, entry in value.items() if name not in band}

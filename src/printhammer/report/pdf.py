@@ -11,7 +11,7 @@ from importlib.resources import files
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from printhammer.claims import Result
+from printhammer.claims import JudgedClaim
 from printhammer.errors import InputError
 from printhammer.reconstruction.judging.shares import Share
 from printhammer.report.page import view
@@ -95,7 +95,7 @@ def _contents(report: Report) -> dict[str, Any]:
 
 def _plain(entry: Any) -> Any:
     """Return an object of a view as JSON has it."""
-    if isinstance(entry, Result):
+    if isinstance(entry, JudgedClaim):
         claim = {
             name: getattr(entry.claim, name) for name in ("name", "kind", "source", "says", "reading", "note")
         }

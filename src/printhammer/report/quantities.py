@@ -77,16 +77,13 @@ def band_text(band: Any, unit: str) -> str:
         return ", ".join(band)
     if isinstance(band, list):
         low, high = (_limit(end, unit) for end in band)
-        return f"{low.removesuffix(_sign(unit)).strip()} to {high}"
+        sign = _SHOWN[unit][1] if unit else ""
+        return f"{low.removesuffix(sign).strip()} to {high}"
     return f"must be {value_text(band, '')}" if isinstance(band, (bool, str)) else f"= {_limit(band, unit)}"
 
 
 def _limit(value: float, unit: str) -> str:
     return _both(value, unit, ".6g", other=False) if unit else _number(value, "g")
-
-
-def _sign(unit: str) -> str:
-    return _SHOWN[unit][1] if unit else ""
 
 
 def typeset(text: str) -> str:
@@ -102,12 +99,8 @@ def percent(part: float) -> str:
     shown = 100.0 * part
     # The digits that tell it from all or none.
     text = f"{shown:.2g}" if shown < 10.0 else f"{shown:.{max(0, math.ceil(-math.log10(100.0 - shown)))}f}"
-    return f"{_plain(text)}\N{NO-BREAK SPACE}%"
-
-
-def _plain(text: str) -> str:
-    """Return a number without exponent."""
-    return f"{Decimal(text):f}"
+    # Without an exponent.
+    return f"{Decimal(text):f}\N{NO-BREAK SPACE}%"
 
 
 def _both(value: float, unit: str, digits: str, *, other: bool = True) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import panel_name, printed_verdicts
-from printhammer.report.misses import Miss, misses, misses_of
+from printhammer.report.misses import Miss, misses
 from printhammer.report.quantities import band_text, percent, split_name, value_text, words_of
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ def rates_view(report: Report) -> dict[str, Any] | None:
     rates = report.reconstruction.base_rates
     if rates is None:
         return None
-    found = [(result, rates.share(result.claim.name)) for result in report.results]
-    known = [(result, share) for result, share in found if share is not None]
+    shares = [(result, rates.share(result.claim.name)) for result in report.results]
+    known = [(result, share) for result, share in shares if share is not None]
     # A rate of none is drawn at the left end.
     positive = [share.rate or share.interval[1] for _, share in known]
     decades = max(1, math.ceil(-math.log10(min(positive)) - 1e-12)) if positive else 1
@@ -55,7 +55,7 @@ def rates_view(report: Report) -> dict[str, Any] | None:
     return {
         "rates": rates,
         "rows": [{"result": result, **share_view(share, floor)} for result, share in known],
-        "unknown": [result for result, share in found if share is None],
+        "unknown": [result for result, share in shares if share is None],
         "ticks": [
             {"text": percent(10.0**-k), "place": f"{100.0 * (1.0 - k / decades):.2f}"}
             for k in range(decades, -1, -1)
@@ -74,14 +74,14 @@ def panels_view(report: Report) -> list[dict[str, Any]]:
     if not verdicts:
         return []
     rows = []
-    for (period, printed), found in zip(printed_verdicts().items(), verdicts, strict=True):
+    for (period, printed), verdict in zip(printed_verdicts().items(), verdicts, strict=True):
         share = shares.get(panel_name(period))
         rows.append(
             {
                 "name": panel_name(period),
                 "printed": printed.replace("-", " "),
-                "found": found.replace("-", " "),
-                "same": found == printed,
+                "found": verdict.replace("-", " "),
+                "same": verdict == printed,
                 "base": None if share is None else share_view(share),
             }
         )
@@ -125,27 +125,27 @@ def schemes_view(report: Report) -> dict[str, Any] | None:
 
 def predictions_view(report: Report) -> dict[str, Any] | None:
     """Return what the search on the stated claims alone predicts; None where there is nothing."""
-    found = report.reconstruction.predictions
-    if found is None or not report.reconstructed:
+    predictions = report.reconstruction.predictions
+    if predictions is None or not report.reconstructed:
         return None
     rates = report.reconstruction.base_rates
     verdicts = {result.claim.name: result for result in report.results}
     rows = []
     for name in every_claim():
-        share = found.share(name)
-        if share is None or found.claims[name].kind == "stated":
+        share = predictions.share(name)
+        if share is None or predictions.claims[name].kind == "stated":
             continue
         base = None if rates is None else rates.share(name)
         rows.append(
             {
                 "name": name,
-                "kind": found.claims[name].kind,
+                "kind": predictions.claims[name].kind,
                 "result": verdicts.get(name),
                 "base": None if base is None else share_view(base),
                 **share_view(share),
             }
         )
-    return {"found": found, "rows": rows}
+    return {"found": predictions, "rows": rows}
 
 
 def failing_view(report: Report) -> list[dict[str, Any]]:
@@ -159,7 +159,7 @@ def failing_view(report: Report) -> list[dict[str, Any]]:
             rows.append(
                 {
                     "result": result,
-                    "misses": misses(result),
+                    "misses": misses(result.claim, result.value),
                     "why": "" if known is None else known.why,
                     "best": None if best is None else _best_view(best, result.claim, report.hammer),
                 }
@@ -168,7 +168,7 @@ def failing_view(report: Report) -> list[dict[str, Any]]:
 
 
 def _best_view(best: BestFor, claim: Claim, hammer: Hammer) -> dict[str, Any]:
-    missed = {miss.words: miss for miss in misses_of(claim, best.value)}
+    missed = {miss.words: miss for miss in misses(claim, best.value)}
     lines = []
     for name, wanted in claim.band.items():
         words, unit = split_name(name)

@@ -11,7 +11,7 @@ import re
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from inspect import cleandoc
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Literal, TypedDict, TypeVar, Unpack
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -91,19 +91,18 @@ def heading(name: str, unit: str) -> str:
     return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
-def column(
-    unit: str,
-    meaning: str,
-    dims: str,
-    *,
-    more: str = "",
-    name: str = "",
-    dtype: Any = None,
-    codes: Sequence[str] = (),
-    head: str = "",
-    attrs: Mapping[str, str] | None = None,
-    default: Any = MISSING,
-) -> Any:
+class More(TypedDict, total=False):
+    """What a declaration may say beyond unit, meaning and dimensions, as `Column` has it."""
+
+    more: str
+    name: str
+    dtype: Any
+    codes: Sequence[str]
+    head: str
+    attrs: Mapping[str, str] | None
+
+
+def column(unit: str, meaning: str, dims: str, *, default: Any = MISSING, **more: Unpack[More]) -> Any:
     """Declare an array of the Dataset.
 
     Parameters
@@ -112,82 +111,47 @@ def column(
         SI unit ("1" for a pure number, empty for words) and one phrase.
     dims : str
         Names of the dimensions, with spaces between them.
-    more : str, optional
-        What the docstring says beyond meaning and unit.
-    name, head : str, optional
-        Name in the Dataset and heading in the table, where they are not that of the field.
-    dtype, codes, attrs
-        As `Column` has them.
     default : object, optional
         Value of the field where none is given.
+    **more
+        `more`, what the docstring says beyond meaning and unit; `name` and `head`, name in the Dataset and
+        heading in the table, where they are not that of the field; `dtype`, `codes`, `attrs`; see `Column`.
     """
-    note = Column(unit, meaning, tuple(dims.split()), "column", more, name, dtype, codes, head, attrs)
+    note = Column(unit, meaning, tuple(dims.split()), "column", **more)
     return field(default=default, repr=False, metadata={_KEY: note})
 
 
-def coordinate(
-    unit: str,
-    meaning: str,
-    dims: str,
-    *,
-    more: str = "",
-    name: str = "",
-    dtype: Any = None,
-    codes: Sequence[str] = (),
-    head: str = "",
-    attrs: Mapping[str, str] | None = None,
-    default: Any = MISSING,
-) -> Any:
+def coordinate(unit: str, meaning: str, dims: str, *, default: Any = MISSING, **more: Unpack[More]) -> Any:
     """Declare a coordinate of the Dataset; arguments as for `column`."""
-    note = Column(unit, meaning, tuple(dims.split()), "coordinate", more, name, dtype, codes, head, attrs)
+    note = Column(unit, meaning, tuple(dims.split()), "coordinate", **more)
     return field(default=default, repr=False, metadata={_KEY: note})
 
 
-def scalar(
-    unit: str,
-    meaning: str,
-    *,
-    more: str = "",
-    name: str = "",
-    default: Any = MISSING,
-    default_factory: Any = MISSING,
-) -> Any:
-    """Declare a number, text or short list that is an attribute of the Dataset; arguments as for `column`."""
-    note = Column(unit, meaning, (), "scalar", more, name)
-    return field(default=default, default_factory=default_factory, metadata={_KEY: note})
+def scalar(unit: str, meaning: str, *, more: str = "", name: str = "", **default: Any) -> Any:
+    """Declare a number, text or short list that is an attribute of the Dataset; arguments as for `column`.
+
+    A default, or a `default_factory`, is that of `dataclasses.field`.
+    """
+    return field(**default, metadata={_KEY: Column(unit, meaning, (), "scalar", more, name)})
 
 
-def part(
-    meaning: str,
-    *,
-    more: str = "",
-    repr: bool = True,
-    default: Any = MISSING,
-    default_factory: Any = MISSING,
-) -> Any:
-    """Declare a field that is no part of the Dataset, such as the hammer; provenance may speak of it."""
-    note = Column("", meaning, (), "part", more)
-    return field(default=default, default_factory=default_factory, repr=repr, metadata={_KEY: note})
+def part(meaning: str, *, more: str = "", repr: bool = True, **default: Any) -> Any:
+    """Declare a field that is no part of the Dataset, such as the hammer; provenance may speak of it.
+
+    A default, or a `default_factory`, is that of `dataclasses.field`.
+    """
+    return field(**default, repr=repr, metadata={_KEY: Column("", meaning, (), "part", more)})
 
 
 def derived(
-    unit: str,
-    meaning: str,
-    dims: str = "",
-    *,
-    kind: Kind | None = None,
-    name: str = "",
-    dtype: Any = None,
-    codes: Sequence[str] = (),
-    head: str = "",
-    attrs: Mapping[str, str] | None = None,
+    unit: str, meaning: str, dims: str = "", *, kind: Kind | None = None, **more: Unpack[More]
 ) -> Callable[[_F], _F]:
     """Make a property part of the Dataset: to stand below `@property` or `@cached_property`.
 
     Arguments as for `column`; without dimensions it is an attribute of the Dataset.
     """
     sort: Kind = kind or ("column" if dims.split() else "scalar")
-    note = Column(unit, meaning, tuple(dims.split()), sort, "", name, dtype, codes, head, attrs)
+    note = Column(unit, meaning, tuple(dims.split()), sort, **more)
 
     def mark(function: _F) -> _F:
         setattr(function, _KEY, note)
@@ -198,15 +162,15 @@ def derived(
 
 def columns_of(result: type[Any]) -> dict[str, Column]:
     """List what a class declares, attribute to `Column`: fields in their order, then derived properties."""
-    found: dict[str, Column] = {}
+    declared: dict[str, Column] = {}
     if is_dataclass(result):
-        found = {entry.name: entry.metadata[_KEY] for entry in fields(result) if _KEY in entry.metadata}
+        declared = {entry.name: entry.metadata[_KEY] for entry in fields(result) if _KEY in entry.metadata}
     for owner in reversed(result.__mro__):
         for name, value in vars(owner).items():
             function = getattr(value, "fget", None) or getattr(value, "func", None)
             if isinstance(value, property | cached_property) and hasattr(function, _KEY):
-                found[name] = getattr(function, _KEY)
-    return {key: note if note.name else replace(note, name=key) for key, note in found.items()}
+                declared[name] = getattr(function, _KEY)
+    return {key: note if note.name else replace(note, name=key) for key, note in declared.items()}
 
 
 def with_attributes(doc: str, result: type[Any], columns: Mapping[str, Column]) -> str:

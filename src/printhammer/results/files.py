@@ -134,6 +134,8 @@ def reopen(path: str | Path) -> Reopened:
     InputError
         The name ends in none of `ENDINGS`, the file cannot be read, or holds something else.
     """
+    import pandas as pd
+
     source = Path(path)
     kind = source.suffix.lower()
     if kind not in ENDINGS:
@@ -141,8 +143,8 @@ def reopen(path: str | Path) -> Reopened:
     need_for(source)
     try:
         if kind in (".csv", ".parquet"):
-            frame = _read_csv(source) if kind == ".csv" else _read_parquet(source)
-            return Reopened(source, _dataset_of(frame), frame)
+            table = _read_csv(source) if kind == ".csv" else pd.read_parquet(source)
+            return Reopened(source, _dataset_of(table), table)
         dataset = _read_json(source) if kind == ".json" else _read_arrays(source)
     except InputError:
         raise
@@ -223,12 +225,12 @@ def frame(
         dim: length for own, values in arrays.values() for dim, length in zip(own, values.shape, strict=True)
     }
     shape = [sizes.get(dim, 0) for dim in dims]
-    found = {}
+    flat = {}
     for head, (own, values) in arrays.items():
         ordered = values.transpose([own.index(dim) for dim in dims if dim in own])
         spread = ordered.reshape([sizes[dim] if dim in own else 1 for dim in dims])
-        found[head] = np.broadcast_to(spread, shape).reshape(-1)
-    table = pd.DataFrame(found)
+        flat[head] = np.broadcast_to(spread, shape).reshape(-1)
+    table = pd.DataFrame(flat)
     table.attrs.update(attributes)
     return table
 
@@ -275,8 +277,8 @@ def _decoded(value: str, starts: str = '[{"-0123456789n') -> Any:
     """Return what an attribute was before it had to be text."""
     if value[:1] and value[0] in starts:
         with suppress(ValueError):
-            found = json.loads(value)
-            return math.nan if found is None else found
+            decoded = json.loads(value)
+            return math.nan if decoded is None else decoded
     return value
 
 
@@ -289,7 +291,7 @@ def _netcdf(dataset: xr.Dataset) -> bytes:
 
 def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     """Return attributes as arrays, numbers and texts; whatever else there is as JSON."""
-    found = {}
+    flat = {}
     for key, value in attributes.items():
         kept = plain(value)
         # An array of one number would come back as a number.
@@ -298,8 +300,8 @@ def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
             isinstance(entry, float) or (isinstance(entry, int) and abs(entry) < _MOST_INT)
             for entry in entries
         )
-        found[str(key)] = kept if numbers or isinstance(kept, str) else json.dumps(_strict(kept))
-    return found
+        flat[str(key)] = kept if numbers or isinstance(kept, str) else json.dumps(_strict(kept))
+    return flat
 
 
 def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
@@ -382,8 +384,8 @@ def _read_arrays(source: Path) -> xr.Dataset:
     options: dict[str, Any] = {"engine": "scipy"}
     if source.suffix.lower() == ".zarr":
         options = {"engine": "zarr", "consolidated": False}
-    with xr.open_dataset(source, decode_times=False, **options) as found:
-        dataset = found.load()
+    with xr.open_dataset(source, decode_times=False, **options) as opened:
+        dataset = opened.load()
     for key, value in dataset.attrs.items():
         dataset.attrs[key] = _decoded(value, "[{") if isinstance(value, str) else plain(value)
     return dataset
@@ -413,16 +415,6 @@ def _typed(cells: list[str]) -> Any:
     return cells
 
 
-def _read_parquet(source: Path) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.read_parquet(source)
-
-
-def _words(values: Any) -> Any:
-    return np.array([value if isinstance(value, str) else "" for value in values], dtype=np.str_)
-
-
 def _dataset_of(table: pd.DataFrame) -> xr.Dataset:
     import xarray as xr
 
@@ -430,6 +422,7 @@ def _dataset_of(table: pd.DataFrame) -> xr.Dataset:
     for head in table:
         name, _, unit = str(head).partition(" [")
         values = table[head].to_numpy()
-        kept = values if values.dtype.kind != "O" else _words(values)
-        data[name] = ("row", kept, {"units": unit.removesuffix("]")} if unit else {})
+        if values.dtype.kind == "O":
+            values = np.array([value if isinstance(value, str) else "" for value in values], dtype=np.str_)
+        data[name] = ("row", values, {"units": unit.removesuffix("]")} if unit else {})
     return xr.Dataset(data, attrs=table.attrs)

@@ -62,7 +62,7 @@ def provenance(
         # A sequence has many waveforms, and none that speaks for all.
         waveform = drive.waveform if waveform is None and drive.uniform else waveform
         overlap = drive.overlap if overlap is None else overlap
-    told = {
+    known = {
         "hammer": None if hammer is None else hammer.name,
         "hammer_fingerprint": None if hammer is None else hammer.fingerprint,
         "drive": None if drive is None else repr(drive),
@@ -75,7 +75,7 @@ def provenance(
         "status": status,
         **versions(),
     }
-    return {key: value for key, value in told.items() if value is not None}
+    return {key: value for key, value in known.items() if value is not None}
 
 
 def versions() -> dict[str, str]:

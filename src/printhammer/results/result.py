@@ -94,16 +94,16 @@ class Result:
         From the attributes `hammer`, `drive`, `regime` and so on, where the result has them.
         """
         regime = getattr(self, "regime", None)
-        told: dict[str, Any] = {}
+        known: dict[str, Any] = {}
         if regime is not None:
-            told = {name: getattr(regime, name) for name in ("hammer", "overlap", "period")}
-            told["waveform"] = regime.fired
+            known = {name: getattr(regime, name) for name in ("hammer", "overlap", "period")}
+            known["waveform"] = regime.fired
         for name in ("hammer", "drive", "waveform", "overlap", "period", "scheme", "tolerance", "status"):
             value = getattr(self, name, None)
             # Of many runs, such as those of a chart, each has its own.
             if value is not None and np.ndim(value) == 0:
-                told[name] = value
-        return provenance(**told)
+                known[name] = value
+        return provenance(**known)
 
     def entries(self) -> Entries:
         """Return the columns and coordinates with their values, by their names in the Dataset.

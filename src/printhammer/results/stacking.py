@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries, Result
 
 
-def stacked(found: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
+def stacked(results: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
     """Return the arrays of results, stacked; ragged ones are filled up with NaN, -1 or no text.
 
     Parameters
     ----------
-    found : sequence of Result
+    results : sequence of Result
         The results, all of one class; possibly none.
     dim : str
         Name of the new dimension, the first one of every array.
@@ -32,7 +32,7 @@ def stacked(found: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
     """
     declared = (note for note in kind.COLUMNS.values() if note.kind in ("column", "coordinate"))
     none: Entries = {note.name: (note, np.zeros((0,) * len(note.dims))) for note in declared}
-    every = [one.entries() for one in found]
+    every = [result.entries() for result in results]
     entries: Entries = {}
     for name, (note, nothing) in (every[0] if every else none).items():
         arrays = [np.asarray(entry[name][1], dtype=note.dtype) for entry in every]

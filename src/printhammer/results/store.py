@@ -249,8 +249,8 @@ def open_store(path: str | Path) -> xr.Dataset:
 
     arrays = _root(Path(path))["attributes"][_ARRAYS]
     whole: Any = xr.open_zarr(path, chunks=None, consolidated=False)
-    found: xr.Dataset = whole[arrays]
-    return found
+    results: xr.Dataset = whole[arrays]
+    return results
 
 
 def _require_zarr() -> None:
@@ -274,13 +274,13 @@ def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:
     arrays = [variable.name for variable in layout.variables if variable.values is None]
     attrs = {**layout.attrs, _ARRAYS: arrays, **layout.identity}
     group = zarr.create_group(MemoryStore(store_dict=files), zarr_format=3, attributes=attrs)
-    found: dict[str, Any] = {}
+    by_name: dict[str, Any] = {}
     members = len(layout.chunks)
     for variable in layout.variables:
         chunks = (
             variable.shape if variable.values is not None else (*layout.chunks, *variable.shape[members:])
         )
-        found[variable.name] = array = group.create_array(
+        by_name[variable.name] = array = group.create_array(
             variable.name,
             shape=variable.shape,
             # A chunk has at least one element, also along a dimension of length 0.
@@ -295,7 +295,7 @@ def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:
         )
         if variable.values is not None:
             array[...] = variable.values
-    return files, found
+    return files, by_name
 
 
 def _root(path: Path) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def module() -> str:
     ordered: list[tuple[str, str]] = []
 
     def add(name: str) -> None:
-        if name in (found for found, _ in ordered):
+        if name in (done for done, _ in ordered):
             return
         for part in _IMPORT.findall(texts[name]):
             add(part)
@@ -59,5 +59,5 @@ def module() -> str:
 @lru_cache
 def style() -> str:
     """Return the one style sheet."""
-    found = page_files()
-    return "\n".join(found[name].decode() for name in ("vendor/uPlot.min.css", "studio.css"))
+    sheets = page_files()
+    return "\n".join(sheets[name].decode() for name in ("vendor/uPlot.min.css", "studio.css"))

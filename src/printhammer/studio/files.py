@@ -13,12 +13,12 @@ KINDS: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/htm
 @lru_cache
 def page_files() -> dict[str, bytes]:
     """Return the files of the page by the path under which they are asked for."""
-    found: dict[str, bytes] = {}
+    contents: dict[str, bytes] = {}
     root = files("printhammer.studio").joinpath("web")
     for folder, place in ((root, ""), (root.joinpath("vendor"), "vendor/")):
         for entry in folder.iterdir():
             if any(entry.name.endswith(kind) for kind in KINDS):
-                found[place + entry.name] = entry.read_bytes()
+                contents[place + entry.name] = entry.read_bytes()
     # The vendored file stays as its authors built it; what it defines becomes a module here.
-    found["vendor/uPlot.js"] = found["vendor/uPlot.iife.min.js"] + b"\nexport default uPlot;\n"
-    return found
+    contents["vendor/uPlot.js"] = contents["vendor/uPlot.iife.min.js"] + b"\nexport default uPlot;\n"
+    return contents

@@ -20,7 +20,7 @@ _ALIGN: Final = 8
 _DTYPES: Final = {"f4": "<f4", "f8": "<f8", "u2": "<u2", "i4": "<i4", "u1": "|u1"}
 
 
-def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **told: Any) -> bytes:
+def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **entries: Any) -> bytes:
     """Return one frame.
 
     Parameters
@@ -31,19 +31,14 @@ def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **tol
         Number of the state that it answers.
     arrays : mapping, optional
         Arrays by name: float32, float64, uint16, int32 or uint8; others are turned into float32.
-    **told
+    **entries
         The rest of the heading; NaN and infinity become null.
-
-    Returns
-    -------
-    bytes
-        The frame.
     """
     parts: list[bytes] = []
     listed: list[dict[str, Any]] = []
     offset = 0
-    for name, given in (arrays or {}).items():
-        array = np.asarray(given)
+    for name, values in (arrays or {}).items():
+        array = np.asarray(values)
         code = f"{array.dtype.kind}{array.dtype.itemsize}"
         if code not in _DTYPES:
             code = "f4"
@@ -52,7 +47,7 @@ def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **tol
         data += bytes(-len(data) % _ALIGN)
         parts.append(data)
         offset += len(data)
-    heading = {"kind": kind, "serial": serial, **told, "arrays": listed}
+    heading = {"kind": kind, "serial": serial, **entries, "arrays": listed}
     text = json.dumps(plain(heading), allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-(4 + len(text)) % _ALIGN)
     return b"".join((struct.pack("<I", len(text)), text, *parts))
@@ -65,8 +60,8 @@ def unframe(data: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray[Any, Any]
     arrays = {}
     for entry in heading["arrays"]:
         count = math.prod(entry["shape"])
-        found = np.frombuffer(data, _DTYPES[entry["dtype"]], count, 4 + length + entry["offset"])
-        arrays[entry["name"]] = found.reshape(entry["shape"])
+        values = np.frombuffer(data, _DTYPES[entry["dtype"]], count, 4 + length + entry["offset"])
+        arrays[entry["name"]] = values.reshape(entry["shape"])
     return heading, arrays
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.errors import InputError
 from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE, LONGEST_REASON
 from printhammer.studio.frames import frame
-from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, map_key, no_map, try_map
+from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, map_key, try_map
 from printhammer.studio.pictures.engine import dots_frame, motion_frame
 from printhammer.studio.pictures.printed import line_frame, line_key
 from printhammer.studio.pictures.section import (
@@ -23,7 +23,6 @@ from printhammer.studio.pictures.section import (
     LATER,
     VERDICT_WORK,
     check_strobe,
-    no_section,
     strobe_frame,
     strobe_key,
 )
@@ -37,6 +36,9 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
 
 logger = logging.getLogger(__name__)
+
+_KEYS: Final[dict[str, Callable[[State], Any]]] = {"map": map_key, "line": line_key, "strobe": strobe_key}
+_NOTHING: Final[dict[str, dict[str, Any]]] = {"map": {"detail": "none"}, "strobe": {"verdict": None}}
 
 REST: Final = 0.3
 """Seconds without a newer state after which more strobe points and the verdict on a train follow."""
@@ -126,10 +128,10 @@ class Session:
         if taken is not None:
             self._sure(self._first, *taken)
 
-    def _sure(self, work: Callable[..., None], serial: int, *given: Any) -> None:
+    def _sure(self, work: Callable[..., None], serial: int, *content: Any) -> None:
         """Do some work; where it fails in a way nobody thought of, that is told, and the page lives on."""
         try:
-            work(serial, *given)
+            work(serial, *content)
         except OSError:
             raise
         except GivenUp:
@@ -169,7 +171,7 @@ class Session:
             # draws meanwhile, and has another core for that.
             self._tell(map_frame(state, serial, PREVIEW, lambda: self._closed, 1))
         except InputError as error:
-            self._tell(no_map(serial, str(error)))
+            self._tell(nothing("map", serial, error))
             self._sent["map"] = map_key(state)
         self._sent["preview"] = map_key(state)
 
@@ -185,48 +187,44 @@ class Session:
         def newer() -> bool:
             return self._closed or self._latest is None or self._latest[0] != serial
 
-        self._map(serial, state, newer)
+        self._follow("map", serial, state, lambda: self._tell(map_frame(state, serial, FULL, newer)))
         if motion is not None:
             self._tell(dots_frame(serial, motion))
-        self._line(serial, state, newer)
-        self._section(serial, state, newer)
+        if state.line.strip():
+            self._follow("line", serial, state, lambda: self._tell(line_frame(state, serial, newer)))
+        self._follow("strobe", serial, state, lambda: self._section(serial, state, newer))
 
-    def _map(self, serial: int, state: State, newer: Callable[[], bool]) -> None:
-        if "map" not in state.views or self._sent.get("map") == map_key(state):
+    def _follow(self, view: str, serial: int, state: State, work: Callable[[], None]) -> None:
+        """Do the work for a view that is shown and not yet sent as it is, or tell why it cannot be done."""
+        key = _KEYS[view](state)
+        if view not in state.views or self._sent.get(view) == key:
             return
         try:
-            self._tell(map_frame(state, serial, FULL, newer))
+            work()
         except InputError as error:
-            self._tell(no_map(serial, str(error)))
-        self._sent["map"] = map_key(state)
-
-    def _line(self, serial: int, state: State, newer: Callable[[], bool]) -> None:
-        if "line" not in state.views or not state.line.strip() or self._sent.get("line") == line_key(state):
-            return
-        self._tell(line_frame(state, serial, newer))
-        self._sent["line"] = line_key(state)
+            self._tell(nothing(view, serial, error))
+        self._sent[view] = key
 
     def _section(self, serial: int, state: State, newer: Callable[[], bool]) -> None:
-        if "strobe" not in state.views or self._sent.get("strobe") == strobe_key(state):
-            return
         patience = Patience(newer, "the strobe section")
-        try:
-            check_strobe(state)
-            for points in AT_ONCE:
-                patience.check()
-                self._tell(strobe_frame(state, serial, points))
-            with self._change:
-                if self._change.wait_for(newer, REST):
-                    raise GivenUp
-            for points in LATER:
-                patience.check()
-                begun = patience.spent
-                self._tell(strobe_frame(state, serial, points, exponent=True))
-            patience.check(VERDICT_WORK * (patience.spent - begun))
-            self._tell(strobe_frame(state, serial, LATER[-1], judged=True))
-        except InputError as error:
-            self._tell(no_section(serial, str(error)))
-        self._sent["strobe"] = strobe_key(state)
+        check_strobe(state)
+        for points in AT_ONCE:
+            patience.check()
+            self._tell(strobe_frame(state, serial, points))
+        with self._change:
+            if self._change.wait_for(newer, REST):
+                raise GivenUp
+        for points in LATER:
+            patience.check()
+            begun = patience.spent
+            self._tell(strobe_frame(state, serial, points, exponent=True))
+        patience.check(VERDICT_WORK * (patience.spent - begun))
+        self._tell(strobe_frame(state, serial, LATER[-1], judged=True))
+
+
+def nothing(view: str, serial: int, reason: object) -> bytes:
+    """Return that there is nothing to show in a view, and why."""
+    return frame(view, serial, reason=str(reason), **_NOTHING.get(view, {}))
 
 
 def refusal(serial: int, reason: str) -> bytes:
@@ -279,8 +277,8 @@ def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
         if kind == "hammer":
             name, text = content
             hammer = dropped_hammer(text) if text else shelf.hammer(name or shelf.names[0])
-            told = {"offered": shelf.names, "asked": name or shelf.names[0], "text": text, **vocabulary()}
-            return frame("hammer", serial, hammer=describe(hammer), **told)
+            heading = {"offered": shelf.names, "asked": name or shelf.names[0], "text": text, **vocabulary()}
+            return frame("hammer", serial, hammer=describe(hammer), **heading)
         if kind == "drop":
             return dropped(serial, *content)
         return frame("texts", serial, texts=texts_of(content))

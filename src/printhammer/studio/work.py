@@ -75,36 +75,28 @@ class Patience:
 
 
 def try_out(
-    state: State, drive: Drive, end: float, what: str, tolerance: float = DISPLAY_TOLERANCE
+    state: State,
+    drive: Drive,
+    end: float,
+    what: str,
+    tolerance: float = DISPLAY_TOLERANCE,
+    *,
+    through: bool = False,
 ) -> Motion:
     """Run a drive once; where it takes more than `bounds.MOST_MAP_STEPS`, refuse what needs many such runs.
 
     Raises
     ------
     InputError
-        It does.
+        It does, or is to go `through` and does not come to its end.
     """
-    found = limited_run(state.changed, drive, end, bounds.MOST_MAP_STEPS, tolerance)
-    if found.status == STEP_LIMIT:
-        most = bounds.MOST_MAP_STEPS
+    most = bounds.MOST_MAP_STEPS
+    motion = limited_run(state.changed, drive, end, most, tolerance)
+    if motion.status == STEP_LIMIT:
         raise InputError(f"{what} would take more than {most} steps for this hammer, expected fewer")
-    return found
-
-
-def try_through(
-    state: State, drive: Drive, end: float, what: str, tolerance: float = DISPLAY_TOLERANCE
-) -> Motion:
-    """Do as `try_out`, and refuse a run that does not come to its end as well.
-
-    Raises
-    ------
-    InputError
-        It does not, or takes too many steps.
-    """
-    found = try_out(state, drive, end, what, tolerance)
-    if found.status != "ok":
-        raise InputError(f"{what}: {found.message}")
-    return found
+    if through and motion.status != "ok":
+        raise InputError(f"{what}: {motion.message}")
+    return motion
 
 
 def alike(one: State, other: State) -> bool:

@@ -130,28 +130,20 @@ def quantity(
         For the right-hand side of a `float` (or `float | None`) annotation.
     """
     note = Quantity(si, symbol, meaning, also, gt, ge, lt, le, default is PydanticUndefined)
-    return Field(
-        default,
-        gt=gt,
-        ge=ge,
-        lt=lt,
-        le=le,
-        allow_inf_nan=False,
-        description=meaning,
-        json_schema_extra={_KEY: asdict(note)},
-    )
+    limits: dict[str, Any] = {"gt": gt, "ge": ge, "lt": lt, "le": le, "allow_inf_nan": False}
+    return Field(default, description=meaning, json_schema_extra={_KEY: asdict(note)}, **limits)
 
 
 @cache
 def quantities(model: type[BaseModel]) -> dict[str, Quantity]:
     """List the physical constants of a model class, field name to `Quantity`, in order of declaration."""
-    found: dict[str, Quantity] = {}
+    notes: dict[str, Quantity] = {}
     for name, field in model.model_fields.items():
         extra = field.json_schema_extra
         note = extra.get(_KEY) if isinstance(extra, dict) else None
         if isinstance(note, dict):
-            found[name] = Quantity(**cast("dict[str, Any]", note))
-    return found
+            notes[name] = Quantity(**cast("dict[str, Any]", note))
+    return notes
 
 
 def options(model: type[BaseModel]) -> dict[str, Any]:

@@ -70,14 +70,14 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
         A file lies in no folder that can be written to, is a folder, is read as well, or is named twice.
     """
     read = {path.resolve() for path in inputs}
-    seen: set[Path] = set()
+    named: set[Path] = set()
     for path in outputs:
         place = path.resolve()
         if place in read:
             raise InputError(f"{path}: expected another file to write, this one is read")
-        if place in seen:
+        if place in named:
             raise InputError(f"{path}: expected a file of its own, this one is written twice")
-        seen.add(place)
+        named.add(place)
         store = place.suffix.lower() == ".zarr"
         # A Zarr store is a folder, and written over as a whole.
         if place.is_dir() and not (store and (place / "zarr.json").is_file()):

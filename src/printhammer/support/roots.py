@@ -61,11 +61,11 @@ def roots(function: Callable[[float], float], grid: Sequence[float]) -> list[Roo
     one, and two that lie closer together than about 1e-8 of the distance of the grid points may be missed
     or given as one.
     """
-    found: list[Root] = []
+    isolated: list[Root] = []
     points = _with_probes(function, grid)
     for first, last in _stretches([value for _, value in points]):
-        found += _in_stretch(function, points[first : last + 1])
-    return sorted(found, key=lambda root: root.x)
+        isolated += _in_stretch(function, points[first : last + 1])
+    return sorted(isolated, key=lambda root: root.x)
 
 
 def _with_probes(function: Callable[[float], float], grid: Sequence[float]) -> list[tuple[float, float]]:
@@ -96,7 +96,7 @@ def _stretches(values: Sequence[float]) -> Iterator[tuple[int, int]]:
 
 
 def _in_stretch(function: Callable[[float], float], points: Sequence[tuple[float, float]]) -> list[Root]:
-    found = []
+    isolated = []
     last = len(points) - 1
     k = 0
     while k <= last:
@@ -109,15 +109,15 @@ def _in_stretch(function: Callable[[float], float], points: Sequence[tuple[float
             if alone:
                 before = points[first - 1][1] if first > 0 else 0.0
                 after = points[k + 1][1] if k < last else 0.0
-                found.append(Root(points[(first + k) // 2][0], _sign(before), _sign(after)))
+                isolated.append(Root(points[(first + k) // 2][0], _sign(before), _sign(after)))
         elif k < last:
             end, after = points[k + 1]
             if value * after < 0.0:
-                found.append(Root(bisect(function, x, end), _sign(value), _sign(after)))
+                isolated.append(Root(bisect(function, x, end), _sign(value), _sign(after)))
             elif after != 0.0:
-                found += _pair(function, points[k], points[k + 1])
+                isolated += _pair(function, points[k], points[k + 1])
         k += 1
-    return found
+    return isolated
 
 
 def _pair(

@@ -53,14 +53,14 @@ def mapped(
 
     Arguments as for `in_threads`, `threads` by default as many as there are cores.
     """
-    found: dict[int, B] = {}
+    values: dict[int, B] = {}
 
     def work(begin: int, end: int) -> None:
         for i in range(begin, end):
-            found[i] = function(items[i])
+            values[i] = function(items[i])
 
     in_threads([work], [len(items)], thread_count(threads), progress, None if length is None else [length])
-    return [found[i] for i in range(len(items))]
+    return [values[i] for i in range(len(items))]
 
 
 def in_threads(

@@ -8,9 +8,9 @@ import numpy as np
 
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements.map_marks import edges
-from printhammer.figures.elements.marks import place_lines
+from printhammer.figures.elements.marks import heading, legend_below, place_lines
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import INK, SMALL, new_figure, sign, styled
+from printhammer.figures.elements.style import INK, new_panel, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,8 +45,7 @@ def plot(basins: Basins, *, attractors: bool = True) -> Figure:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    figure = new_figure(5.0)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(5.0)
     way = scale("displacement", float(np.abs(basins.x).max()))
     speed = scale("velocity")
     count = len(basins.attractors)
@@ -80,26 +79,19 @@ def plot(basins: Basins, *, attractors: bool = True) -> Figure:
             x, v = way.shown(attractor.states[:, 0]), speed.shown(attractor.states[:, 1])
             ax.plot(x, v, **style, zorder=4.0, gid=f"attractor {number}", scalex=False, scaley=False)
         if number <= _MOST:
-            told = (
+            name = (
                 f"{number}: {attractor.name.replace('-', ' ')},"
                 f" {100.0 * share[number - 1]:.1f} ± {100.0 * error[number - 1]:.1f} %"
             )
-            handles.append((Patch(color=shade(number)), Line2D([], [], **{**style, "ms": 4.0}), told))
+            handles.append((Patch(color=shade(number)), Line2D([], [], **{**style, "ms": 4.0}), name))
     for number, (name, colour) in OTHERS.items():
         cells = basins.counts[number]
         if cells:
             patch = Patch(facecolor=colour, edgecolor=INK, lw=0.5)
             handles.append((patch, patch, f"{name}: {cells} cells"))
-    figure.legend(
-        [pair[:2] for pair in handles],
-        [pair[2] for pair in handles],
-        loc="outside lower left",
-        fontsize=SMALL,
-        frameon=False,
-        ncols=1 + (len(handles) > _FEW),
-        handlelength=1.2,
-    )
-    ax.set_title(f"Every {shown_period(basins.regime.period)}", loc="left", fontsize=SMALL)
+    signs, names = [entry[:2] for entry in handles], [entry[2] for entry in handles]
+    legend_below(figure, signs, names, ncols=1 + (len(handles) > _FEW), handlelength=1.2)
+    heading(ax, f"Every {shown_period(basins.regime.period)}")
     label(ax, "x", way, "Displacement at the first firing")
     label(ax, "y", speed, "Velocity at the first firing")
     more = count - _MOST

@@ -10,7 +10,7 @@ from printhammer.chaos.bifurcation.diagram import hysteresis
 from printhammer.chaos.bifurcation.windows import cells
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.marks import dots, legend_below, note
 from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.hammer.names import PERIOD
@@ -102,9 +102,8 @@ def plot(
     if show == "x" and diagram.regime.hammer.position is not None:
         position = diagram.regime.hammer.position
         if low < position < high:
-            ax.axhline(
-                float(up.shown(position)), color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="backstop"
-            )
+            level = float(up.shown(position))
+            ax.axhline(level, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="backstop")
     values = across.shown(diagram.values)
     ax.set_xlim(float(values[0]), float(values[-1]) if len(values) > 1 else float(values[0]) * 1.02 + 1e-9)
     label(ax, "y", up, f"{up.label} at the firing" if not diagram.phase else up.label)
@@ -122,8 +121,8 @@ def parameter_scale(diagram: Bifurcation) -> Scale:
     note = diagram.regime.quantity(diagram.parameter)
     unit, meaning = note.si, note.meaning
     if diagram.parameter == PERIOD:
-        found = scale("time", float(np.abs(diagram.values).max()))
-        return Scale(meaning.capitalize(), found.si, found.unit)
+        time = scale("time", float(np.abs(diagram.values).max()))
+        return Scale(meaning.capitalize(), time.si, time.unit)
     name = meaning.capitalize() if diagram.parameter == "rate" else f"{diagram.parameter}: {meaning}"
     return Scale(name, unit, unit)
 
@@ -147,20 +146,10 @@ def _points(ax: Axes, diagram: Bifurcation, states: FloatArray, across: Scale, u
             kinds.append((~apart, style.INK, 2.0))
         for chosen, color, zorder in kinds:
             y = up.shown(states[way][chosen])
-            ax.plot(
-                np.repeat(values[chosen], y.shape[1]),
-                y.reshape(-1),
-                ls="none",
-                marker="o",
-                ms=size,
-                mew=0.0,
-                color=color,
-                alpha=0.6,
-                # Hundreds of thousands of points would make a vector picture useless.
-                rasterized=True,
-                zorder=zorder,
-                gid=f"points {name}" if chosen is apart else "points",
-            )
+            gid = f"points {name}" if chosen is apart else "points"
+            # Hundreds of thousands of points would make a vector picture useless.
+            how = {"alpha": 0.6, "rasterized": True, "zorder": zorder, "gid": gid}
+            dots(ax, np.repeat(values[chosen], y.shape[1]), y.reshape(-1), size, color, **how)
 
 
 def _each(orbits: Iterable[Any]) -> Iterable[Any]:
@@ -191,19 +180,10 @@ def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale,
         raise InputError(
             f"orbits: their states are at the firings, expected a diagram of phase 0 for {orbit!r}"
         )
-    stable = orbit.kind == "stable"
-    ax.plot(
-        np.full(len(states), float(across.shown(orbit.regime.value(diagram.parameter)))),
-        states,
-        ls="none",
-        marker="o",
-        ms=3.2,
-        mew=0.8,
-        mec=style.GREEN,
-        mfc=style.GREEN if stable else "white",
-        zorder=6.0,
-        gid="stable orbit" if stable else "unstable orbit",
-    )
+    kind, inside = ("stable", style.GREEN) if orbit.kind == "stable" else ("unstable", "white")
+    at = np.full(len(states), float(across.shown(orbit.regime.value(diagram.parameter))))
+    rim = {"mew": 0.8, "mec": style.GREEN, "mfc": inside}
+    dots(ax, at, states, 3.2, style.GREEN, **rim, zorder=6.0, gid=f"{kind} orbit")
 
 
 def _crossed(
@@ -263,13 +243,5 @@ def _key(figure: Figure, diagram: Bifurcation) -> None:
             Line2D([], [], ls="none", marker="o", ms=3.0, mew=0.0, color=WAYS[name], label=f"{name} only")
             for name in diagram.directions
         ]
-    figure.legend(
-        handles=handles,
-        loc="outside lower left",
-        fontsize=style.SMALL,
-        frameon=False,
-        ncols=5,
-        handlelength=1.0,
-        handletextpad=0.4,
-        columnspacing=1.2,
-    )
+    apart = {"handlelength": 1.0, "handletextpad": 0.4, "columnspacing": 1.2}
+    legend_below(figure, handles=handles, ncols=5, **apart)

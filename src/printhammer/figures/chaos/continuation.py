@@ -9,7 +9,8 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
-from printhammer.figures.elements.style import new_figure, sign, styled
+from printhammer.figures.elements.marks import legend_in_columns
+from printhammer.figures.elements.style import new_panel, sign, styled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,27 +69,26 @@ def plot(
     InputError
         There is nothing to draw, or no such quantity.
     """
-    found: list[Branch] = list(getattr(branches, "found", [branches]))
-    if not found:
+    drawn: list[Branch] = list(getattr(branches, "found", [branches]))
+    if not drawn:
         raise InputError("branches: expected at least one to draw")
     if show not in _SHOWN:
         raise InputError(f"show = {show!r}, expected one of {', '.join(_SHOWN)}")
-    figure = new_figure(4.4)
-    ax = figure.add_subplot()
-    heading, factor = axis_of(found[0].parameter, found[0].unit)
+    figure, ax = new_panel(4.4)
+    heading, factor = axis_of(drawn[0].parameter, drawn[0].unit)
     name, _, shown, times = _SHOWN[show]
-    for branch in found:
+    for branch in drawn:
         draw(ax, branch, show, (factor, times))
-    marked = _mark(ax, found, show, (factor, times), grazings)
-    ax.set_xlim(*(factor * end for end in found[0].bounds))
+    marked = _mark(ax, drawn, show, (factor, times), grazings)
+    ax.set_xlim(*(factor * end for end in drawn[0].bounds))
     if limits is not None:
         ax.set_ylim(*(times * end for end in limits))
     else:
         ax.margins(y=0.04)
     ax.set_xlabel(heading)
     ax.set_ylabel(f"{name}  [{shown}]")
-    _legend(ax, found, marked)
-    sign(figure, found[0].regime.hammer, *_remarks(found))
+    _legend(ax, drawn, marked)
+    sign(figure, drawn[0].regime.hammer, *_remarks(drawn))
     return figure
 
 
@@ -126,16 +126,22 @@ def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, lis
         if event.kind != "grazing":
             inside.setdefault(event.after, []).append(event)
     for i in range(len(branch) - 1):
-        here, ahead = branch.curve.nodes[i].arc, branch.curve.nodes[i + 1].arc
         for event in inside.get(i, []):
-            share = (event.point.node.arc - here) / (ahead - here) if ahead > here else 0.5
             values.append(event.value)
-            rows.append(table[i] + min(max(share, 0.0), 1.0) * (table[i + 1] - table[i]))
+            rows.append(_at_event(branch, event, table))
             stable.append(bool(branch.stable[i]))
         values.append(branch.values[i + 1])
         rows.append(table[i + 1])
         stable.append(bool(branch.stable[i + 1]) if i in inside else bool(branch.stable[i]))
     return np.array(values), np.array(rows), stable
+
+
+def _at_event(branch: Branch, event: Any, table: FloatArray) -> FloatArray:
+    """Return a quantity where something happens on a branch, by the arc length between two of its points."""
+    i, nodes = event.after, branch.curve.nodes
+    span = nodes[i + 1].arc - nodes[i].arc
+    share = min(max((event.point.node.arc - nodes[i].arc) / span, 0.0), 1.0) if span > 0.0 else 0.5
+    return np.asarray(table[i] + share * (table[i + 1] - table[i]))
 
 
 def _mark(
@@ -148,10 +154,7 @@ def _mark(
         for event in branch.events:
             if event.kind == "grazing" and not grazings:
                 continue
-            i, nodes = event.after, branch.curve.nodes
-            span = nodes[i + 1].arc - nodes[i].arc
-            share = min(max((event.point.node.arc - nodes[i].arc) / span, 0.0), 1.0) if span > 0.0 else 0.5
-            row = table[i] + share * (table[i + 1] - table[i])
+            row = _at_event(branch, event, table)
             colour = style.MUTED if event.kind == "grazing" else colour_of(branch.firings)
             places = np.full(branch.firings, factors[0] * event.value)
             look = {"ls": "none", "mec": colour, "mew": style.THIN, "zorder": 4.0, **_MARKS[event.kind]}
@@ -178,27 +181,20 @@ def _legend(ax: Axes, branches: Sequence[Branch], kinds: Sequence[str]) -> None:
         if kind in kinds:
             colour = style.MUTED if kind == "grazing" else style.INK
             handles.append(Line2D([], [], ls="none", mec=colour, mew=style.THIN, label=kind, **look))
-    columns = 3 if len(handles) > 4 else len(handles)
-    ax.legend(
-        handles=handles,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=columns,
-        fontsize=style.TINY + 0.5 if len(handles) > 6 else style.SMALL,
-        frameon=False,
-    )
+    size = style.TINY + 0.5 if len(handles) > 6 else style.SMALL
+    legend_in_columns(ax, handles, 3 if len(handles) > 4 else len(handles), size)
 
 
 def _remarks(branches: Sequence[Branch]) -> list[str]:
     """Return what a reader must know of ends that are none of the bounds."""
-    told = {
+    reasons = {
         "length": "where the number of steps was used up",
         "lost": "where Newton's method does not converge",
         "no value": "where there is no strobe map",
         "grazing": "in a grazing of the rigid backstop",
     }
-    counts = Counter(stop.reason for branch in branches for stop in branch.stops if stop.reason in told)
+    counts = Counter(stop.reason for branch in branches for stop in branch.stops if stop.reason in reasons)
     if not counts:
         return []
-    ends = ", ".join(f"{number} {told[reason]}" for reason, number in sorted(counts.items()))
+    ends = ", ".join(f"{number} {reasons[reason]}" for reason, number in sorted(counts.items()))
     return [f"Branches end before the bounds: {ends}."]

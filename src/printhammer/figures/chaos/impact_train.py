@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.marks import dashed, dots, note
 from printhammer.figures.elements.scales import scale
 from printhammer.figures.elements.style import BLUE, FAINT, HAIR, MUTED, SMALL, THIN, new_figure, sign, styled
 
@@ -35,14 +35,14 @@ def plot(train: ImpactTrain) -> Figure:
     for ax in (bars, returns, lags):
         ax.tick_params(axis="both", top=True, right=True)
         ax.locator_params(axis="both", nbins=5)
-    told = [
+    statistics = [
         f"{len(train.times)} impacts",
         f"mean interval {time.shown(train.mean):.4g} {time.sign}",
         f"coefficient of variation {train.variation:.3g}",
     ]
     if not np.isnan(train.fano):
-        told.append(f"Fano factor {train.fano:.3g} in {time.shown(train.window):.4g} {time.sign}")
-    figure.suptitle(", ".join(told), x=0.01, ha="left", fontsize=SMALL)
+        statistics.append(f"Fano factor {train.fano:.3g} in {time.shown(train.window):.4g} {time.sign}")
+    figure.suptitle(", ".join(statistics), x=0.01, ha="left", fontsize=SMALL)
     if train.hammer is not None:
         sign(figure, train.hammer)
     return figure
@@ -50,9 +50,7 @@ def plot(train: ImpactTrain) -> Figure:
 
 def _returns(ax: Axes, train: ImpactTrain, time: Scale) -> None:
     shown = time.shown(train.intervals)
-    ax.plot(
-        shown[:-1], shown[1:], ls="none", marker="o", ms=1.8, mew=0.0, color=BLUE, gid="returns", zorder=3.0
-    )
+    dots(ax, shown[:-1], shown[1:], 1.8, BLUE, gid="returns", zorder=3.0)
     low, high = (float(end) for end in time.shown(train.edges[[0, -1]]))
     room = 0.06 * (high - low)
     ends = (low - room, high + room)
@@ -64,9 +62,8 @@ def _lags(ax: Axes, train: ImpactTrain) -> None:
     if np.isfinite(train.autocorrelation).all():
         at = np.arange(len(train.autocorrelation))
         ax.vlines(at, 0.0, train.autocorrelation, color=BLUE, lw=THIN, gid="autocorrelation")
-        ax.plot(at, train.autocorrelation, ls="none", marker="o", ms=2.2, mew=0.0, color=BLUE)
-        for level in (-train.significant, train.significant):
-            ax.axhline(level, color=MUTED, lw=HAIR, ls=(0, (4, 3)))
+        dots(ax, at, train.autocorrelation, 2.2, BLUE)
+        dashed(ax.axhline, -train.significant, train.significant)
     else:
         note(ax, "all intervals are the same", (0.5, 0.6), ha="center", va="center")
     ax.set_xlim(-0.5, len(train.autocorrelation) - 0.5)

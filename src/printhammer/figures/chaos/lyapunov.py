@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.chaos.exponents.zero_one import CHAOTIC, REGULAR
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import HALO, note
+from printhammer.figures.elements.marks import HALO, dashed, dots, heading, note
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled
 
@@ -39,14 +39,15 @@ def plot(spectrum: Lyapunov) -> Figure:
         _running(ax, counts, means[:, k], errors[:, k], colour)
         ax.set_ylabel(f"$\\lambda_{k + 1}$  [1/firing]")
         value, error = float(spectrum.exponents[k]), float(spectrum.standard_errors[k])
-        at, side = ((0.98, 0.96), "top") if value < _middle(ax) else ((0.98, 0.05), "bottom")
+        low, high = ax.get_ylim()
+        at, side = ((0.98, 0.96), "top") if value < 0.5 * (low + high) else ((0.98, 0.05), "bottom")
         note(ax, f"{value:+.4g} ± {error:.2g}", at, ha="right", va=side, color=colour, bbox=HALO)
     upper.axhline(0.0, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="zero")
     lower.set_xlabel("Number of firings averaged over")
     lower.set_xscale("log")
     # Also where no estimate is finite.
     lower.set_xlim(max(0.9 * float(counts[0]), 0.5), 1.1 * float(counts[-1]))
-    upper.set_title(_title(spectrum), loc="left", fontsize=style.SMALL)
+    heading(upper, _title(spectrum))
     remarks = [] if spectrum.ok else [f"The run ended early: {spectrum.status}."]
     if not spectrum.smooth:
         remarks.append("The motion passes a touch without velocity, where it has no derivative.")
@@ -55,13 +56,13 @@ def plot(spectrum: Lyapunov) -> Figure:
 
 
 def _title(spectrum: Lyapunov) -> str:
-    told = [shown_period(spectrum.period), spectrum.verdict.name.replace("-", " ")]
+    parts = [shown_period(spectrum.period), spectrum.verdict.name.replace("-", " ")]
     if not math.isnan(spectrum.dimension):
         error = f" ± {spectrum.dimension_error:.1g}" if spectrum.dimension_error else ""
-        told.append(f"dimension {spectrum.dimension:.4g}{error}")
+        parts.append(f"dimension {spectrum.dimension:.4g}{error}")
     if spectrum.zero_one is not None:
-        told.append(f"0-1 test: {spectrum.zero_one.verdict}")
-    return ", ".join(told)
+        parts.append(f"0-1 test: {spectrum.zero_one.verdict}")
+    return ", ".join(parts)
 
 
 def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colour: str) -> None:
@@ -79,11 +80,6 @@ def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colou
         room = max(0.25 * (high - low), 0.02 * max(abs(low), abs(high)), 1e-6)
         ax.set_ylim(low - room, high + room)
     ax.tick_params(axis="both", which="both", top=True, right=True)
-
-
-def _middle(ax: Axes) -> float:
-    low, high = ax.get_ylim()
-    return 0.5 * (low + high)
 
 
 @styled
@@ -106,8 +102,7 @@ def plot_chart(chart: LyapunovChart) -> Figure:
         ax.set_ylabel(f"$\\lambda_{k + 1}$  [1/firing]")
     axes[0].axhline(0.0, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="zero")
     _bars(axes[2], at, chart.k, np.zeros(len(at)), style.INK, agree, order)
-    for level in (REGULAR, CHAOTIC):
-        axes[2].axhline(level, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)), zorder=1.0)
+    dashed(axes[2].axhline, REGULAR, CHAOTIC, zorder=1.0)
     axes[2].set_ylim(-0.25, 1.15)
     axes[2].set_ylabel("K of the 0-1 test")
     label(axes[2], "x", time, "Time between firings")
@@ -130,35 +125,27 @@ def _bars(
     reach = _SIGMAS * np.where(np.isfinite(errors), errors, 0.0)
     for filled in (True, False):
         some = finite & (agree == filled)
-        ax.errorbar(
-            at[some],
-            values[some],
-            yerr=reach[some],
-            fmt="o",
-            ms=3.5,
-            mew=0.9,
-            mec=colour,
-            mfc=colour if filled else "white",
-            ecolor=colour,
-            elinewidth=style.THIN,
-            zorder=3.0,
-        )
+        mark: dict[str, Any] = {"ms": 3.5, "mew": 0.9, "mec": colour, "mfc": colour if filled else "white"}
+        bar: dict[str, Any] = {"yerr": reach[some], "ecolor": colour, "elinewidth": style.THIN}
+        ax.errorbar(at[some], values[some], fmt="o", zorder=3.0, **mark, **bar)
 
 
 def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
-    told = []
+    remarks = []
     other = int(np.count_nonzero(~agree))
     if other:
-        told.append(
+        remarks.append(
             f"{other} of {len(agree)} trains (open marks): exponent and 0-1 test differ, or one is undecided."
         )
     infinite = int(np.count_nonzero(np.isneginf(chart.exponents[:, 0])))
     if infinite:
-        told.append(f"{infinite} trains forget their past altogether: exponents minus infinity, not drawn.")
+        remarks.append(
+            f"{infinite} trains forget their past altogether: exponents minus infinity, not drawn."
+        )
     stopped = sum(status != "ok" for status in chart.status)
     if stopped:
-        told.append(f"{stopped} runs ended early.")
-    return told
+        remarks.append(f"{stopped} runs ended early.")
+    return remarks
 
 
 @styled
@@ -176,15 +163,10 @@ def plot_zero_one(test: ZeroOne) -> Figure:
     steps = np.arange(1, len(test.displacement) + 1)
     growth.plot(steps, test.displacement, color=style.BLUE, lw=style.THIN, gid="displacement")
     growth.set(xlabel="Steps n", ylabel="Mean square displacement")
-    angles.plot(
-        test.angles, test.correlations, ls="none", marker="o", ms=2.4, mew=0.0, color=style.BLUE, gid="k"
-    )
-    shown = test.shown
-    angles.plot(
-        test.angles[shown], test.correlations[shown], marker="o", ms=7.0, mfc="none", mec=style.ORANGE
-    )
-    for level in (REGULAR, CHAOTIC):
-        angles.axhline(level, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)))
+    dots(angles, test.angles, test.correlations, 2.4, style.BLUE, gid="k")
+    ringed = test.angles[test.shown], test.correlations[test.shown]
+    angles.plot(*ringed, marker="o", ms=7.0, mfc="none", mec=style.ORANGE)
+    dashed(angles.axhline, REGULAR, CHAOTIC)
     angles.set(xlabel="Angle c  [rad]", ylabel="Correlation $K_c$", ylim=(-1.1, 1.1))
     for ax in (path, growth, angles):
         ax.tick_params(axis="both", top=True, right=True)

@@ -10,7 +10,16 @@ from printhammer.chaos.strobe.points import strobe as strobed
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import ALONG_X, HALO, beside, name_lines, note, place_lines
+from printhammer.figures.elements.marks import (
+    ALONG_X,
+    HALO,
+    beside,
+    dots,
+    heading,
+    name_lines,
+    note,
+    place_lines,
+)
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled
 
@@ -33,6 +42,7 @@ _MARKS: Final = (("o", style.BLUE), ("s", style.ORANGE), ("^", style.GREEN), ("D
 _LONGER: Final = ("x", style.MUTED)
 _TRACES: Final = 4
 _ROOM: Final = 0.07
+_SIZE: Final = 5.0
 _LINES: Final = ("-", "--", "-.", ":")
 
 
@@ -51,8 +61,7 @@ def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) ->
     under = _strobe_points(orbits.regime, points)
     _plane(ax, orbits.regime, shown, under)
     counts = ", ".join(f"{count} {kind}" for kind, count in orbits.counts.items())
-    heading = f"{shown_period(orbits.regime.period)}: {counts or 'no orbit found'}"
-    ax.set_title(heading, loc="left", fontsize=style.SMALL)
+    heading(ax, f"{shown_period(orbits.regime.period)}: {counts or 'no orbit found'}")
     if traced:
         _traces(figure.add_subplot(rows[1]), traced)
     sign(figure, orbits.regime.hammer)
@@ -76,18 +85,17 @@ def plot_orbit(orbit: Orbit) -> Figure:
     left, right = figure.subplots(1, 2)
     motion = orbit.motion()
     way, speed = scale("displacement", float(np.abs(motion.x).max())), scale("velocity")
-    left.plot(
-        way.shown(motion.x), speed.shown(motion.v), color=style.INK, lw=style.THIN, gid="curve", zorder=2.0
-    )
-    _mark(left, orbit, way, speed, 5.0)
-    _room(left, way.shown(motion.x), speed.shown(motion.v))
+    curve = way.shown(motion.x), speed.shown(motion.v)
+    left.plot(*curve, color=style.INK, lw=style.THIN, gid="curve", zorder=2.0)
+    _mark(left, orbit, way, speed)
+    _room(left, *curve)
     place_lines(left, orbit.regime.hammer, way, side="x")
     label(left, "x", way)
     label(left, "y", speed)
-    left.set_title(f"{shown_period(orbit.regime.period)}: {orbit.name}", loc="left", fontsize=style.SMALL)
+    heading(left, f"{shown_period(orbit.regime.period)}: {orbit.name}")
     _traces(right, [orbit])
-    told = ", ".join(_number(multiplier) for multiplier in orbit.multipliers)
-    note(right, f"multipliers {told}", (0.03, 0.97), fontsize=style.TINY, bbox=HALO)
+    multipliers = ", ".join(_number(multiplier) for multiplier in orbit.multipliers)
+    note(right, f"multipliers {multipliers}", (0.03, 0.97), fontsize=style.TINY, bbox=HALO)
     sign(figure, orbit.regime.hammer)
     return figure
 
@@ -102,34 +110,25 @@ def _strobe_points(regime: Regime, points: int) -> FloatArray:
         else {"period": regime.period, "waveform": regime.waveform, "overlap": regime.overlap}
     )
     try:
-        found = strobed(regime.hammer, points=points, transient=points // 3, verdict=False, **own)
+        strobe = strobed(regime.hammer, points=points, transient=points // 3, verdict=False, **own)
     except InputError:
         return np.zeros((0, 2))
-    known = np.isfinite(found.x)
-    return np.column_stack([found.x[known], found.v[known]])
+    known = np.isfinite(strobe.x)
+    return np.column_stack([strobe.x[known], strobe.v[known]])
 
 
 def _plane(ax: Axes, regime: Regime, orbits: list[Orbit], under: FloatArray) -> None:
     every = np.concatenate([under, *(np.column_stack([orbit.x, orbit.v]) for orbit in orbits)])
     way, speed = scale("displacement", float(np.abs(every[:, 0]).max(initial=0.0))), scale("velocity")
-    ax.plot(
-        way.shown(under[:, 0]),
-        speed.shown(under[:, 1]),
-        ls="none",
-        marker=".",
-        ms=3.0,
-        mew=0.0,
-        color="#9a9a9a",
-        gid="points",
-        zorder=1.5,
-        label="train from rest" if len(under) else None,
-    )
+    name = "train from rest" if len(under) else None
+    how = {"marker": ".", "gid": "points", "zorder": 1.5, "label": name}
+    dots(ax, way.shown(under[:, 0]), speed.shown(under[:, 1]), 3.0, "#9a9a9a", **how)
     named: set[str] = set()
     for orbit in orbits:
         kind = "stable" if orbit.stable else "not stable"
         firings = str(orbit.firings) if orbit.firings <= len(_MARKS) else f"{len(_MARKS) + 1} or more"
         name = f"period {firings}, {kind}"
-        _mark(ax, orbit, way, speed, 5.0, None if name in named else name)
+        _mark(ax, orbit, way, speed, None if name in named else name)
         named.add(name)
     if len(every):
         _room(ax, way.shown(every[:, 0]), speed.shown(every[:, 1]))
@@ -148,7 +147,7 @@ def _plane(ax: Axes, regime: Regime, orbits: list[Orbit], under: FloatArray) -> 
         ax.legend(fontsize=style.TINY, loc="best", framealpha=0.85, edgecolor=style.FAINT, ncols=1)
 
 
-def _mark(ax: Axes, orbit: Orbit, way: Scale, speed: Scale, size: float, name: str | None = None) -> None:
+def _mark(ax: Axes, orbit: Orbit, way: Scale, speed: Scale, name: str | None = None) -> None:
     """Draw the states of an orbit at its firings: filled if it is stable, open if not."""
     marker, colour = _style(orbit)
     longer = marker == _LONGER[0]
@@ -157,7 +156,7 @@ def _mark(ax: Axes, orbit: Orbit, way: Scale, speed: Scale, size: float, name: s
         speed.shown(orbit.v),
         ls="none",
         marker="P" if longer and orbit.stable else marker,
-        ms=0.6 * size if longer else size,
+        ms=0.6 * _SIZE if longer else _SIZE,
         mew=0.6 if longer else style.THIN,
         mec=colour,
         mfc=colour if orbit.stable else "white" if orbit.firings == 1 else "none",

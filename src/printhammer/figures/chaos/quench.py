@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.figures.elements.map_marks import edges
+from printhammer.figures.elements.marks import dashed, dots
 from printhammer.figures.elements.scales import Scale, label
-from printhammer.figures.elements.style import HAIR, INK, MUTED, SMALL, new_figure, sign, styled
+from printhammer.figures.elements.style import INK, MUTED, SMALL, new_panel, sign, styled
 from printhammer.figures.paper.two_pulses import DELAYS
 
 if TYPE_CHECKING:
@@ -30,8 +31,7 @@ def plot(quenches: QuenchMap) -> Figure:
 
     Crosses: the two cases of Fig. 6 of the paper, where they lie in the plane.
     """
-    figure = new_figure(4.6)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(4.6)
     across = Scale("Second firing after the first", "s", "ms")
     up = Scale("Width of the second pulse", "s", "ms")
     x, y = edges(across.shown(quenches.gaps)), edges(up.shown(quenches.widths))
@@ -52,18 +52,10 @@ def plot(quenches: QuenchMap) -> Figure:
         bar.set_label("Lost: second peak, parts of the way to the pack", fontsize=SMALL)
     width = getattr(quenches.waveform, "width", None)
     if width is not None and y[0] < up.shown(width) < y[-1]:
-        ax.axhline(float(up.shown(width)), color="white", lw=HAIR, ls=(0, (4, 3)), gid="first width")
+        dashed(ax.axhline, float(up.shown(width)), color="white", gid="first width")
         shown = [delay for delay in DELAYS if quenches.gaps[0] <= delay <= quenches.gaps[-1]]
-        ax.plot(
-            across.shown(shown),
-            np.full(len(shown), float(up.shown(width))),
-            ls="none",
-            marker="x",
-            ms=6.0,
-            mew=1.4,
-            color="white",
-            gid="Fig. 6",
-        )
+        level = np.full(len(shown), float(up.shown(width)))
+        dots(ax, across.shown(shown), level, 6.0, "white", marker="x", mew=1.4, gid="Fig. 6")
     ax.set_xlim(float(x[0]), float(x[-1]))
     ax.set_ylim(float(y[0]), float(y[-1]))
     label(ax, "x", across)

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from printhammer.figures.elements.marks import beside
-from printhammer.figures.elements.style import INK, SMALL, new_figure, styled
+from printhammer.figures.elements.style import INK, SMALL, new_panel, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,8 +33,7 @@ def plot(recurrence: Recurrence) -> Figure:
     """
     from matplotlib.colors import ListedColormap
 
-    figure = new_figure(4.6)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(4.6)
     count = len(recurrence.matrix)
     ax.imshow(
         recurrence.matrix,
@@ -49,18 +48,10 @@ def plot(recurrence: Recurrence) -> Figure:
     )
     ax.set(xlabel="Number of the state", ylabel="Number of the state")
     ax.tick_params(axis="both", top=True, right=True)
-    told = [f"threshold  {recurrence.threshold:.3g}"]
-    told += [f"{_NAMES[name]}  {_shown(value)}" for name, value in recurrence.quantities.items()]
-    beside(
-        ax,
-        "\n".join(told),
-        (1.0, 1.0),
-        (8, 0),
-        "left top",
-        xycoords="axes fraction",
-        fontsize=SMALL,
-        linespacing=1.7,
-    )
+    lines = [f"threshold  {recurrence.threshold:.3g}"]
+    lines += [f"{_NAMES[name]}  {_shown(value)}" for name, value in recurrence.quantities.items()]
+    how = {"xycoords": "axes fraction", "fontsize": SMALL, "linespacing": 1.7}
+    beside(ax, "\n".join(lines), (1.0, 1.0), (8, 0), "left top", **how)
     return figure
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import beside
+from printhammer.figures.elements.marks import beside, heading, note
 from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def plot(
         ax = figure.add_subplot(rows, columns, place + 1)
         _panel(ax, table, _sensitivities(table, name, number), bars)
         of_dot = f", dot {number + 1}" if name in table.quantities and len(table.dots) > 1 else ""
-        ax.set_title(name.replace("_", " ") + of_dot, loc="left", fontsize=style.SMALL)
+        heading(ax, name.replace("_", " ") + of_dot)
         if place >= len(quantities) - columns:
             ax.set_xlabel("change in % for 1 % of the constant", fontsize=style.SMALL)
     remarks = [] if table.ok else [f"The run ended early: {table.status}."]
@@ -103,31 +103,16 @@ def _panel(ax: Axes, table: Sensitivities, values: FloatArray, bars: int) -> Non
     sizes = np.where(np.isfinite(values), np.abs(values), 0.0)
     order = [int(k) for k in np.argsort(-sizes, kind="stable")[:bars] if sizes[k] >= 5e-4]
     if not order:
-        ax.text(
-            0.5,
-            0.5,
-            "no sensitivity",
-            transform=ax.transAxes,
-            ha="center",
-            color=style.MUTED,
-            fontsize=style.SMALL,
-        )
+        note(ax, "no sensitivity", (0.5, 0.5), ha="center", va="baseline", zorder=3.0)
         ax.set_yticks([])
         return
     longest = float(sizes[order[0]])
     for height, k in enumerate(order):
         value = float(values[k])
-        colour = style.BLUE if value > 0.0 else style.ORANGE
+        colour, shift, side = (style.BLUE, 3.0, "left") if value > 0.0 else (style.ORANGE, -3.0, "right")
         ax.barh(height, value, height=_BAR, color=colour, gid=f"bar-{table.constants[k]}")
-        beside(
-            ax,
-            f"{value:+.3g}".replace("-", "−"),
-            (value, height),
-            (3.0 if value > 0.0 else -3.0, 0.0),
-            ha="left" if value > 0.0 else "right",
-            va="center",
-            color=style.INK,
-        )
+        text = f"{value:+.3g}".replace("-", "−")
+        beside(ax, text, (value, height), (shift, 0.0), f"{side} center", color=style.INK)
     ax.axvline(0.0, color=style.INK, lw=style.HAIR)
     # Room for the numbers at the ends of the bars.
     least = min(float(values[k]) for k in order)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.figures.chaos.continuation import axis_of
 from printhammer.figures.elements import style
-from printhammer.figures.elements.style import new_figure, sign, styled
+from printhammer.figures.elements.marks import legend_in_columns
+from printhammer.figures.elements.style import new_panel, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,8 +34,7 @@ def plot(chart: StabilityChart) -> Figure:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    figure = new_figure(4.4)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(4.4)
     headings, factors = zip(*map(axis_of, chart.names, chart.units), strict=True)
     handles: list[Line2D | Patch] = []
     if chart.settled.size:
@@ -44,39 +44,31 @@ def plot(chart: StabilityChart) -> Figure:
         edges = [_edges(axis) * factors[k] for k, axis in enumerate(chart.grid)]
         colours = ListedColormap(["white", _REGION, style.FAINT])
         ax.pcolormesh(*edges, shown, cmap=colours, vmin=0, vmax=2, zorder=0.5, rasterized=True)
-        told = f"from rest: period {chart.firings}"
-        handles.append(Patch(facecolor=_REGION, edgecolor="none", label=told))
+        name = f"from rest: period {chart.firings}"
+        handles.append(Patch(facecolor=_REGION, edgecolor="none", label=name))
         if (shown == 2).any():
             handles.append(Patch(facecolor=style.FAINT, edgecolor="none", label="run stopped"))
-    kinds = []
     for curve in chart.curves:
         colour, dash = _STYLES[curve.kind]
         x, y = factors[0] * curve.first, factors[1] * curve.second
         limits = np.where(curve.limits, y, np.nan)
         ax.plot(x, y, color=colour, lw=style.HAIR, ls=dash, alpha=0.5, zorder=2.0)
         ax.plot(x, limits, color=colour, lw=style.LINE, ls=dash, gid=curve.kind, zorder=3.0)
-        if curve.kind not in kinds:
-            kinds.append(curve.kind)
+    kinds = {curve.kind for curve in chart.curves}
     handles += [
-        Line2D([], [], color=_STYLES[kind][0], ls=_STYLES[kind][1], lw=style.LINE, label=kind)
-        for kind in _STYLES
+        Line2D([], [], color=colour, ls=dash, lw=style.LINE, label=kind)
+        for kind, (colour, dash) in _STYLES.items()
         if kind in kinds
     ]
     own = chart.regime.value(chart.names[1]) * factors[1]
-    ax.axhline(own, color=style.MUTED, lw=style.HAIR, ls=(0, (1, 2)), zorder=1.0, gid="own")
-    handles.append(Line2D([], [], color=style.MUTED, lw=style.HAIR, ls=(0, (1, 2)), label="the hammer's own"))
+    dotted: dict[str, Any] = {"color": style.MUTED, "lw": style.HAIR, "ls": (0, (1, 2))}
+    ax.axhline(own, zorder=1.0, gid="own", **dotted)
+    handles.append(Line2D([], [], label="the hammer's own", **dotted))
     ax.set_xlim(*(factors[0] * end for end in chart.bounds[0]))
     ax.set_ylim(*(factors[1] * end for end in chart.bounds[1]))
     ax.set_xlabel(headings[0])
     ax.set_ylabel(headings[1])
-    ax.legend(
-        handles=handles,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=4,
-        fontsize=style.SMALL,
-        frameon=False,
-    )
+    legend_in_columns(ax, handles, 4)
     remarks = [f"Not followed: {'; '.join(chart.refused)}."] if chart.refused else []
     sign(figure, chart.regime.hammer, *remarks)
     return figure

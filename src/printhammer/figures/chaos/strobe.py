@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import HALO, note
+from printhammer.figures.elements.marks import HALO, dots, heading, note
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import new_figure, sign, styled
+from printhammer.figures.elements.style import new_panel, sign, styled
 from printhammer.run.window import Window
 from printhammer.units import from_si
 
@@ -42,13 +42,12 @@ def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
     Rings are the last points of a periodic train. To fit, the axes end close about the points, instead of at
     the window of Fig. 11.
     """
-    figure = new_figure(4.6)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(4.6)
     window = _close(strobe) if fit else strobe.window
     way, speed = scales_of(window)
     panel(ax, strobe, window, way, speed, size=2.2, named=False)
     judged = "" if strobe.verdict is None else f": {strobe.verdict.name.replace('-', ' ')}"
-    ax.set_title(f"{shown_period(strobe.period)}{judged}", loc="left", fontsize=style.SMALL)
+    heading(ax, f"{shown_period(strobe.period)}{judged}")
     label(ax, "x", way)
     label(ax, "y", speed)
     remarks = [] if strobe.ok else [f"The run ended early: {strobe.status}."]
@@ -95,12 +94,10 @@ def panel(
     ax.set_xlim(*(float(way.shown(end)) for end in window.x))
     ax.set_ylim(*(float(speed.shown(end)) for end in window.v))
     if strobe.hammer.position is not None:
-        line = ax.axvline(
-            float(way.shown(strobe.hammer.position)), color=style.MUTED, lw=style.HAIR, zorder=1.0
-        )
-        line.set_gid("backstop")
+        at = float(way.shown(strobe.hammer.position))
+        ax.axvline(at, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="backstop")
     x, v = way.shown(strobe.x), speed.shown(strobe.v)
-    ax.plot(x, v, ls="none", marker="o", ms=size, mew=0.0, color=style.BLUE, gid="points", zorder=3.0)
+    dots(ax, x, v, size, style.BLUE, gid="points", zorder=3.0)
     judged = strobe.verdict
     if judged is not None and judged.period is not None and judged.period <= min(_CYCLE, len(x)):
         cycle = slice(len(x) - judged.period, None)
@@ -110,8 +107,8 @@ def panel(
     if named and judged is not None:
         note(ax, judged.name.replace("-", " "), (0.97, 0.04), ha="right", va="bottom", bbox=HALO)
         if printed and printed != judged.name:
-            told = f"paper: {printed.replace('-', ' ')}"
-            note(ax, told, (0.97, 0.15), ha="right", va="bottom", fontsize=style.TINY, bbox=HALO)
+            text = f"paper: {printed.replace('-', ' ')}"
+            note(ax, text, (0.97, 0.15), ha="right", va="bottom", fontsize=style.TINY, bbox=HALO)
     outside = int(np.count_nonzero(np.isfinite(strobe.x) & ~window.inside(strobe.x, strobe.v)))
     if outside:
         note(ax, f"{outside} outside", (0.97, 0.86), ha="right", fontsize=style.TINY)

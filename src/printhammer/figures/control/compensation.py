@@ -9,6 +9,7 @@ import numpy as np
 from printhammer.control.table.histories import REST, gap_text, histories, number_of
 from printhammer.control.table.report import STRATEGIES
 from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import heading, inside
 from printhammer.figures.elements.scales import Scale
 from printhammer.figures.elements.style import foot, new_figure, sign, styled
 
@@ -30,8 +31,7 @@ _BINS: Final = 41
 def plot(table: CompensationTable) -> Figure:
     """Draw a table: as maps of history by history at one or few rates, else against the rate."""
     figure = _few_rates(table) if table.rates.size < _FEW else _many_rates(table)
-    told = f"{table.hammer} · {table.fingerprint[:8]} · at most {table.largest_current:g} A"
-    foot(figure, told)
+    foot(figure, f"{table.hammer} · {table.fingerprint[:8]} · at most {table.largest_current:g} A")
     return figure
 
 
@@ -40,32 +40,24 @@ def _few_rates(table: CompensationTable) -> Figure:
     figure = new_figure(1.2 + 2.1 * table.rates.size)
     axes = figure.subplots(table.rates.size, 2, squeeze=False)
     side, across = table.reach + 1, (table.reach + 1) ** (table.gaps - 1)
-    told = {number_of(row, table.reach): row for row in histories(table.gaps, table.reach)}
+    every = {number_of(row, table.reach): row for row in histories(table.gaps, table.reach)}
     for row, rate in enumerate(table.rates.tolist()):
         for ax, name, word in zip(
             axes[row], ("advance", "width"), ("Fired before its slot", "Width of the pulse"), strict=True
         ):
             values = np.full((side, across), np.nan)
-            for number in told:
+            for number in every:
                 values[divmod(number, across)] = getattr(table, name)[row, number]
             shown = _MICROSECONDS.shown(values)
             mesh = ax.pcolormesh(np.ma.masked_invalid(shown), cmap="viridis")
             for (down, right), value in np.ndenumerate(shown):
                 if np.isfinite(value):
-                    dark = mesh.norm(value) < 0.6
-                    ax.text(
-                        right + 0.5,
-                        down + 0.5,
-                        f"{value:.1f}",
-                        ha="center",
-                        va="center",
-                        fontsize=style.TINY,
-                        color="white" if dark else "black",
-                    )
-            ax.set_title(f"{word}, µs, at {rate:g} Hz", loc="left", fontsize=style.SMALL)
+                    colour = "white" if mesh.norm(value) < 0.6 else "black"
+                    inside(ax, f"{value:.1f}", right + 0.5, down + 0.5, colour)
+            heading(ax, f"{word}, µs, at {rate:g} Hz")
             ax.set_yticks(np.arange(side) + 0.5, [gap_text(gap) for gap in range(side)])
             ticks = {
-                number % across: "-".join(map(gap_text, history[1:])) for number, history in told.items()
+                number % across: "-".join(map(gap_text, history[1:])) for number, history in every.items()
             }
             ax.set_xticks([place + 0.5 for place in ticks], list(ticks.values()), fontsize=style.TINY)
             ax.set_ylabel("Last gap, slots")
@@ -90,22 +82,15 @@ def _many_rates(table: CompensationTable) -> Figure:
             values = _MICROSECONDS.shown(getattr(table, name)[shown, column])
             ax.plot(rates, values, color=colour, lw=style.THIN, label=word, gid=f"{name} {gap}")
             braked = table.brake_width[shown, column] > 0.0
-            ax.plot(
-                rates[braked],
-                values[braked],
-                ls="none",
-                marker="o",
-                ms=2.5,
-                color=colour,
-                gid=f"braked {name} {gap}",
-                label="with a brake pulse before" if ax is lower and gap == 1 and braked.any() else None,
-            )
+            first = ax is lower and gap == 1 and braked.any()
+            names = {"gid": f"braked {name} {gap}", "label": "with a brake pulse before" if first else None}
+            ax.plot(rates[braked], values[braked], ls="none", marker="o", ms=2.5, color=colour, **names)
     upper.axhline(0.0, color=style.MUTED, lw=style.HAIR)
     upper.set_ylabel("Fired before its slot  [µs]")
     lower.set_ylabel("Width of the pulse  [µs]")
     lower.set_xlabel("Slots per second  [kHz]")
     lower.legend(frameon=False, fontsize=style.SMALL)
-    upper.set_title("Dots after a dot from rest", loc="left", fontsize=style.SMALL)
+    heading(upper, "Dots after a dot from rest")
     return figure
 
 
@@ -123,9 +108,8 @@ def plot_report(report: TableReport) -> Figure:
     places = np.arange(len(report.hammers))
     for number, (name, colour) in enumerate(zip(STRATEGIES, (style.ORANGE, style.BLUE), strict=True)):
         bars.bar(places + 0.4 * number - 0.2, share[number], 0.38, color=colour, label=name)
-    bars.set_xticks(
-        places, [name.replace(" %", "%") for name in report.hammers], fontsize=style.TINY, rotation=30
-    )
+    names = [name.replace(" %", "%") for name in report.hammers]
+    bars.set_xticks(places, names, fontsize=style.TINY, rotation=30)
     for text in bars.get_xticklabels():
         text.set_horizontalalignment("right")
     bars.set_ylabel("Dots within limits  [%]")
@@ -135,19 +119,12 @@ def plot_report(report: TableReport) -> Figure:
     bars.legend(frameon=False, fontsize=style.SMALL, ncols=2, loc="upper right")
     rates = report.rates
     span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
-    bars.set_title(f"Hammers driven, {span}", loc="left", fontsize=style.SMALL)
-    _histogram(
-        figure.add_subplot(grid[1, 0]),
-        100.0 * report.force_deviation,
-        100.0 * report.limits.force,
-        "Force off by  [%]",
-    )
-    _histogram(
-        figure.add_subplot(grid[1, 1]),
-        _MICROSECONDS.shown(report.arrival_deviation),
-        float(_MICROSECONDS.shown(report.limits.arrival)),
-        "Arrival off by  [µs]",
-    )
+    heading(bars, f"Hammers driven, {span}")
+    off, limit = 100.0 * report.force_deviation, 100.0 * report.limits.force
+    _histogram(figure.add_subplot(grid[1, 0]), off, limit, "Force off by  [%]")
+    late = _MICROSECONDS.shown(report.arrival_deviation)
+    limit = float(_MICROSECONDS.shown(report.limits.arrival))
+    _histogram(figure.add_subplot(grid[1, 1]), late, limit, "Arrival off by  [µs]")
     sign(figure, report.hammer)
     return figure
 
@@ -159,7 +136,7 @@ def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
     for row, colour, look in zip(values, (style.ORANGE, style.BLUE), ("--", "-"), strict=True):
         known = np.clip(row[~np.isnan(row)], edges[0], edges[-1])
         ax.hist(known, bins=edges.tolist(), histtype="step", color=colour, ls=look, lw=style.THIN)
-    ax.set_title("what is farther off: at the ends", loc="right", fontsize=style.TINY)
+    heading(ax, "what is farther off: at the ends", loc="right", fontsize=style.TINY)
     ax.set_yscale("log")
     ax.set_xlabel(name)
     ax.set_ylabel("Dots of the cycle")

@@ -1,22 +1,24 @@
-"""A burst of least work: motion, current, power of the coil, and where the energy went."""
+"""Bursts of least work: motion, current and energies of one, and what they cost against the rate."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import beside
-from printhammer.figures.elements.style import new_figure, sign, styled
+from printhammer.figures.elements.marks import beside, heading
+from printhammer.figures.elements.scales import Scale, label, scale
+from printhammer.figures.elements.style import new_figure, new_panel, sign, styled
+from printhammer.figures.elements.timeline import between_surfaces, current_between
 from printhammer.run.coil_work import coil_power
-from printhammer.units import from_si
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from printhammer.control.least_work.burst import LeastWork
+    from printhammer.control.least_work.rates import LeastWorkRates
 
 _AFTER: Final = 0.08
 
@@ -33,52 +35,29 @@ def plot(burst: LeastWork) -> Figure:
     motion = figure.add_subplot(grid[0])
     current = figure.add_subplot(grid[1], sharex=motion)
     power = figure.add_subplot(grid[2], sharex=motion)
-    run = burst.motion
-    time = _ms(run.t)
-    _motion(motion, burst)
-    current.plot(time, run.current, color=style.BLUE, lw=style.THIN, gid="current")
-    current.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
-    for bound in (-burst.largest, burst.largest):
-        current.axhline(bound, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)))
+    run, hammer = burst.motion, burst.hammer
+    assert hammer.front is not None
+    between_surfaces(motion, hammer, run, 2.2)
+    ms, um = scale("time").factor, scale("displacement").factor
+    for contact, force in zip(burst.contacts, burst.forces.tolist(), strict=True):
+        place = (ms * contact.t_peak, um * (hammer.front + contact.depth))
+        beside(motion, f"{force:.3f}", place, (0.0, 3.0), "center baseline")
+    heading(motion, f"{len(burst.contacts)} dots at {burst.rate:.6g} Hz, force over that of a single pulse")
+    current_between(current, run, burst.largest)
     span = 1.15 * burst.largest
     current.set_ylim(min(1.15 * float(run.current.min()), -0.2 * span), span)
-    current.set_ylabel("Current  [A]")
-    watts = coil_power(burst.hammer, run.x, run.v, run.force["magnet"])
-    power.fill_between(time, np.maximum(watts, 0.0), 0.0, color=style.ORANGE, lw=0.0, gid="given")
-    power.fill_between(time, np.minimum(watts, 0.0), 0.0, color=style.GREEN, lw=0.0, gid="taken back")
+    watts = coil_power(hammer, run.x, run.v, run.force["magnet"])
+    power.fill_between(ms * run.t, np.maximum(watts, 0.0), 0.0, color=style.ORANGE, lw=0.0, gid="given")
+    power.fill_between(ms * run.t, np.minimum(watts, 0.0), 0.0, color=style.GREEN, lw=0.0, gid="taken back")
     power.set_ylabel("Coil power  [W]")
     power.set_xlabel("Time  [ms]")
-    last = min((1.0 + _AFTER) * burst.rest_time, run.end)
-    motion.set_xlim(0.0, float(_ms(np.array([last]))[0]))
+    motion.set_xlim(0.0, ms * min((1.0 + _AFTER) * burst.rest_time, run.end))
     for ax in (motion, current):
         ax.tick_params(axis="x", labelbottom=False)
     _ledger(figure.add_subplot(grid[3]), burst)
-    remark = ""
-    if burst.adequate < burst.count:
-        remark = f"{burst.adequate} of {burst.count} dots are adequate."
-    sign(figure, burst.hammer, remark)
+    few = burst.adequate < burst.count
+    sign(figure, hammer, f"{burst.adequate} of {burst.count} dots are adequate." if few else "")
     return figure
-
-
-def _motion(ax: Axes, burst: LeastWork) -> None:
-    hammer, run = burst.hammer, burst.motion
-    assert hammer.front is not None
-    low, high = float(_um(run.x.min())), float(_um(run.x.max()))
-    room = 0.08 * (high - low)
-    top = high + 2.2 * room
-    ax.axhspan(_um(hammer.front), top, color=style.SURFACES["pack"], alpha=0.14, lw=0.0)
-    ax.axhspan(low - room, _um(hammer.origin), color=style.SURFACES["backstop"], alpha=0.25, lw=0.0)
-    ax.plot(_ms(run.t), _um(run.x), color=style.INK, lw=style.LINE, gid="displacement")
-    for contact, force in zip(burst.contacts, burst.forces.tolist(), strict=True):
-        place = float(_ms(np.array([contact.t_peak]))[0])
-        beside(ax, f"{force:.3f}", (place, float(_um(hammer.front + contact.depth))), (0.0, 3.0), ha="center")
-    ax.set_ylim(low - room, top)
-    ax.set_ylabel("Displacement  [µm]")
-    ax.set_title(
-        f"{len(burst.contacts)} dots at {burst.rate:.6g} Hz, force over that of a single pulse",
-        loc="left",
-        fontsize=style.SMALL,
-    )
 
 
 def _ledger(ax: Axes, burst: LeastWork) -> None:
@@ -99,21 +78,35 @@ def _ledger(ax: Axes, burst: LeastWork) -> None:
     ax.barh(rows, [value for _, value, _ in bars], color=[colour for *_, colour in bars], height=0.66)
     for row, (_name, value, _colour) in zip(rows.tolist(), bars, strict=True):
         ax.text(value + 0.01 * longest, row, f"{value:.3f}", va="center", fontsize=style.SMALL)
-    ax.plot(
-        [burst.bound_ratio] * 2,
-        [rows[2] - 0.45, rows[2] + 0.45],
-        color=style.INK,
-        lw=style.LINE,
-        gid="least positive work",
-    )
+    ends = [rows[2] - 0.45, rows[2] + 0.45]
+    ax.plot([burst.bound_ratio] * 2, ends, color=style.INK, lw=style.LINE, gid="least positive work")
     ax.set_yticks(rows, [name for name, *_ in bars], fontsize=style.SMALL)
     ax.set_xlim(0.0, 1.1 * longest)
     ax.set_xlabel("Energy over what the pack absorbs (line: least W+ of any current)")
 
 
-def _ms(time: np.ndarray) -> np.ndarray:
-    return np.asarray(from_si(1.0, "s", "ms") * time)
+@styled
+def plot_rates(bursts: LeastWorkRates) -> Figure:
+    """Draw net and positive work, and the least positive work of any current, against the rate.
 
-
-def _um(x: float | np.ndarray) -> float:
-    return from_si(1.0, "m", "um") * x  # type: ignore[return-value]
+    Crosses at the bottom: rates at which no current was found.
+    """
+    figure, ax = new_panel(3.6)
+    across = Scale("Rate", "Hz", "Hz")
+    rates = across.shown(bursts.rates)
+    thick: dict[str, Any] = {"lw": style.LINE, "ms": 4.0}
+    ax.plot(rates, bursts.positive_ratio, "o-", color=style.ORANGE, label="positive work W+", **thick)
+    least = "least W+ of any current"
+    ax.plot(rates, bursts.bound_ratio, color=style.INK, lw=style.THIN, ls=(0, (4, 3)), label=least)
+    ax.plot(rates, bursts.net_ratio, "s-", color=style.BLUE, label="net work W", **thick)
+    missing = bursts.status != "ok"
+    if missing.any():
+        ax.plot(rates[missing], [0.04] * int(missing.sum()), "x", color=style.MUTED, label="no current found")
+    ax.set_ylim(bottom=0.0)
+    ax.set_ylabel("Work over what the pack absorbs")
+    label(ax, "x", across)
+    ax.legend(fontsize=style.SMALL, loc="lower right", frameon=False)
+    heading(ax, f"Bursts of {bursts.count} dots")
+    ax.margins(x=0.03)
+    sign(figure, bursts.hammer)
+    return figure

@@ -1,13 +1,16 @@
-"""Ways to drive side by side: how far dots are off in all patterns, and the second of two dots by the gap."""
+"""Feedback beside other ways to drive: how far dots are off, the second of two by the gap, and one run."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.style import new_figure, sign, styled
+from printhammer.figures.elements.marks import dashed, dots, heading
+from printhammer.figures.elements.scales import scale
+from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
+from printhammer.figures.elements.timeline import between_surfaces, current_between
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
@@ -46,13 +49,9 @@ def plot(feedback: Feedback) -> Figure:
         below[column].set_ylabel(name)
         below[column].set_xlabel("Time between two slots  [ms]")
     above[0].set_ylabel("Share of the dots")
-    above[0].set_title(
-        f"All dots of the patterns of eight slots at {feedback.rate:.6g} Hz",
-        loc="left",
-        fontsize=style.SMALL,
-    )
-    above[1].set_title("what is farther off: at the ends", loc="right", fontsize=style.SMALL)
-    below[0].set_title("The second of two dots", loc="left", fontsize=style.SMALL)
+    heading(above[0], f"All dots of the patterns of eight slots at {feedback.rate:.6g} Hz")
+    heading(above[1], "what is farther off: at the ends", loc="right")
+    heading(below[0], "The second of two dots")
     # Room for the legend above the bars.
     above[1].set_ylim(0.0, (1.1 + 0.14 * len(feedback.strategies)) * above[1].get_ylim()[1])
     above[1].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
@@ -81,19 +80,18 @@ def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -
         if not known.size:
             continue
         counts, _ = np.histogram(np.clip(known, -reach, reach), edges)
-        passed = 100.0 * feedback.passed[number].mean()
+        text = f"{name}: {100.0 * feedback.passed[number].mean():.0f} % of the patterns"
         colour, _marker = _look(feedback, number)
-        ax.stairs(
-            counts / known.size,
-            edges,
-            color=colour,
-            fill=number == len(feedback.strategies) - 1,
-            alpha=0.75 if number == len(feedback.strategies) - 1 else 1.0,
-            lw=style.THIN,
-            label=f"{name}: {passed:.0f} % of the patterns",
-            gid=name,
-        )
-    _limits(ax.axvline, limit)
+        last = number == len(feedback.strategies) - 1
+        how: dict[str, Any] = {
+            "fill": last,
+            "alpha": 0.75 if last else 1.0,
+            "lw": style.THIN,
+            "label": text,
+            "gid": name,
+        }
+        ax.stairs(counts / known.size, edges, color=colour, **how)
+    dashed(ax.axvline, -limit, limit)
     ax.set_xlim(-reach, reach)
 
 
@@ -103,22 +101,39 @@ def _by_gap(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> N
     reach = _REACH * limit
     for number, name in enumerate(feedback.strategies):
         colour, marker = _look(feedback, number)
-        ax.plot(
-            gaps,
-            np.clip(values[number], -reach, reach),
-            color=colour,
-            marker=marker,
-            ms=2.6,
-            lw=style.THIN,
-            label=name,
-            gid=name,
-        )
-    _limits(ax.axhline, limit)
+        how: dict[str, Any] = {"marker": marker, "ms": 2.6, "lw": style.THIN, "label": name, "gid": name}
+        ax.plot(gaps, np.clip(values[number], -reach, reach), color=colour, **how)
+    dashed(ax.axhline, -limit, limit)
     ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
     ax.set_ylim(-1.05 * reach, 1.05 * reach)
     ax.set_xlim(float(gaps[0]), float(gaps[-1]) if len(gaps) > 1 else float(gaps[0]) + 1.0)
 
 
-def _limits(line: object, limit: float) -> None:
-    for end in (-limit, limit):
-        line(end, color=style.MUTED, lw=style.HAIR, ls=(0, (4, 3)))  # type: ignore[operator]
+@styled
+def plot_run(feedback: Feedback) -> Figure:
+    """Draw the run of a comparison.
+
+    Displacement, the samples that the controller looked at, the times at which touches are wanted (short
+    lines at the front of the pack); below, the current and its bounds.
+    """
+    figure = new_figure(4.6)
+    panel, strip = with_strip(figure, 2.6)
+    run, hammer = feedback.run, feedback.driven
+    assert hammer.front is not None
+    ms, um = scale("time").factor, scale("displacement").factor
+    room = between_surfaces(panel, hammer, run.motion, 2.0)
+    samples = {"marker": ".", "mew": None, "label": "what the sensor showed", "gid": "samples"}
+    dots(panel, ms * run.times, um * run.shown, 2.0, style.ORANGE, **samples)
+    front = um * hammer.front
+    due: dict[str, Any] = {"color": style.BLUE, "lw": style.LINE, "label": "touch wanted", "gid": "due"}
+    panel.vlines(ms * run.due, front - 0.6 * room, front + 0.6 * room, **due)
+    heading(panel, f"Slots {run.pattern} at {feedback.rate:.6g} Hz with feedback")
+    panel.legend(fontsize=style.SMALL, frameon=False, loc="upper right", ncols=2)
+    current_between(strip, run.motion, feedback.driver.current)
+    strip.set_ylim(-1.2 * feedback.driver.current, 1.2 * feedback.driver.current)
+    strip.set_xlabel("Time  [ms]")
+    first, last = float(run.due[0]), float(run.due[-1])
+    span = feedback.single.flight_time
+    panel.set_xlim(ms * (first - 1.3 * span), ms * min(last + 3.0 * span, float(np.max(run.motion.t))))
+    sign(figure, hammer)
+    return figure

@@ -55,8 +55,8 @@ def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str
 
 def places(hammer: Hammer) -> dict[str, float]:
     """Return the positions that a hammer has of "backstop", "pack" and "platen", m, in this order."""
-    found = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
-    return {name: place for name, place in found.items() if place is not None}
+    own = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
+    return {name: place for name, place in own.items() if place is not None}
 
 
 def times_of(motion: Motion, start: float | None = None, end: float | None = None) -> FloatArray:

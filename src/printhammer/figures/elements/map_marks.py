@@ -85,22 +85,25 @@ def edges(centres: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Scales:
-    """How the displacements, times and rates of maps are shown."""
+    """How the displacements, times and rates of maps are shown, and in which colours."""
 
     way: Scale
     time: Scale
     rate: Scale
+    norm: Normalize
 
 
 def scales_of(*charts: xr.Dataset) -> Scales:
-    """Return the scales that suit all of some maps."""
-    ends = [*limits_of(*charts), *(place for chart in charts for place in places_of(chart).values())]
+    """Return the scales that suit all of some maps, the scale of the colours from end to end."""
+    from matplotlib.colors import Normalize
+
+    low, high = limits_of(*charts)
+    ends = [low, high, *(place for chart in charts for place in places_of(chart).values())]
     fast = max(float(chart["rate"][-1]) for chart in charts)
-    return Scales(
-        scale("displacement", max(map(abs, ends))),
-        scale("time", max(float(chart["time"][-1]) for chart in charts)),
-        Scale("Rate", "Hz", "kHz" if fast >= _KILO else "Hz"),
-    )
+    way = scale("displacement", max(map(abs, ends)))
+    time = scale("time", max(float(chart["time"][-1]) for chart in charts))
+    colours = Normalize(float(way.shown(low)), float(way.shown(high)))
+    return Scales(way, time, Scale("Rate", "Hz", "kHz" if fast >= _KILO else "Hz"), colours)
 
 
 def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
@@ -111,8 +114,11 @@ def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
     return low, high if high > low else low + 1e-6
 
 
-def picture(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> QuadMesh:
-    """Draw the displacement of a map in colours, time to the right and rate upward; cells as pixels."""
+def picture(ax: Axes, chart: xr.Dataset, scales: Scales) -> QuadMesh:
+    """Draw the displacement of a map in colours, time to the right and rate upward; cells as pixels.
+
+    Firings and lost dots are drawn over it, see `firing_lines`.
+    """
     from matplotlib import colormaps
 
     time, rate = scales.time, scales.rate
@@ -121,7 +127,7 @@ def picture(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> Qua
         rate.shown(edges(chart["rate"].values)),
         np.ma.masked_invalid(scales.way.shown(chart["displacement"].values)),
         cmap=colormaps[COLOURS].with_extremes(bad=UNKNOWN),
-        norm=norm,
+        norm=scales.norm,
         rasterized=True,
         zorder=0.5,
     )
@@ -130,6 +136,7 @@ def picture(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> Qua
     ax.set_xlim(float(time.shown(chart["time"][0])), float(time.shown(chart["time"][-1])))
     ax.set_xlabel(f"Time from the first firing  [{time.sign}]")
     ax.set_ylabel(f"{rate.label}  [{rate.sign}]")
+    firing_lines(ax, chart, scales)
     return mesh
 
 
@@ -150,24 +157,16 @@ def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
         at = time.shown(fired[:, firing])
         # A line leans as the firing times do, from one border of the cell to the other; a mark does not.
         slopes = np.zeros_like(at) if few or firing == 0 else -at / rates
-        along = _strokes(at, slopes, rates, rows) if few else (at, rates)
-        ax.plot(
-            along[0],
-            shown.shown(along[1]),
-            color=LINES,
-            lw=HAIR,
-            alpha=0.6,
-            zorder=2.0,
-            gid=f"firing {firing + 1}",
-        )
+        across, up = _strokes(at, slopes, rates, rows) if few else (at, rates)
+        gid = f"firing {firing + 1}"
+        ax.plot(across, shown.shown(up), color=LINES, lw=HAIR, alpha=0.6, zorder=2.0, gid=gid)
         missed = np.flatnonzero(~struck[:, firing] & np.isfinite(at))
         lost.append(_strokes(at, slopes, rates, rows, missed))
     lost_at, lost_rates = (np.concatenate(parts) for parts in zip(*lost, strict=True))
     if lost_at.size:
         cap: Literal["butt", "projecting"] = "butt" if few else "projecting"
-        ax.plot(
-            lost_at, shown.shown(lost_rates), color=ORANGE, lw=_LOST, solid_capstyle=cap, zorder=2.5, gid=LOST
-        )
+        lost_up = shown.shown(lost_rates)
+        ax.plot(lost_at, lost_up, color=ORANGE, lw=_LOST, solid_capstyle=cap, zorder=2.5, gid=LOST)
 
 
 def _strokes(
@@ -180,9 +179,8 @@ def _strokes(
     """Return strokes through the cells of some rows, from the lower border to the upper one, NaN between."""
     centre, place, slope = rates[rows], at[rows], slopes[rows]
     ends = np.column_stack([borders[:-1][rows], borders[1:][rows], np.full_like(centre, np.nan)])
-    return (
-        place[:, np.newaxis] + slope[:, np.newaxis] * (ends - centre[:, np.newaxis])
-    ).ravel(), ends.ravel()
+    across = place[:, np.newaxis] + slope[:, np.newaxis] * (ends - centre[:, np.newaxis])
+    return across.ravel(), ends.ravel()
 
 
 def key(ax: Axes, chart: xr.Dataset) -> None:
@@ -202,12 +200,12 @@ def key(ax: Axes, chart: xr.Dataset) -> None:
     legend_above(ax, handles)
 
 
-def colour_bar(ax: Axes, chart: xr.Dataset, norm: Normalize, scales: Scales) -> None:
+def colour_bar(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
     """Draw the scale of the colours from the lowest place to the highest, with marks; white: not reached."""
     from matplotlib import colormaps
 
     way = scales.way
-    low, high = float(norm.vmin or 0.0), float(norm.vmax or 1.0)
+    low, high = float(scales.norm.vmin or 0.0), float(scales.norm.vmax or 1.0)
     places = {name: float(way.shown(place)) for name, place in places_of(chart).items()}
     ends = [low, high, *places.values()]
     room = 0.02 * (max(ends) - min(ends))
@@ -243,18 +241,9 @@ def failures(chart: xr.Dataset) -> str:
 
 def sign_map(figure: Figure, chart: xr.Dataset, *remarks: str) -> None:
     """Write below a figure where its map comes from, and remarks above it."""
-    told = [str(chart.attrs.get("hammer", chart.attrs.get("source", "")))]
-    if "hammer_fingerprint" in chart.attrs:
-        told.append(str(chart.attrs["hammer_fingerprint"])[:8])
+    origin = [str(chart.attrs.get("hammer", chart.attrs.get("source", "")))]
+    origin.append(str(chart.attrs.get("hammer_fingerprint", ""))[:8])
     constants = str(chart.attrs.get("hammer_constants", ""))
     if constants.startswith("in part"):
-        told.append(f"constants {constants}")
-    foot(figure, " · ".join(filter(None, told)), "\n".join(filter(None, remarks)))
-
-
-def norm_of(scales: Scales, *charts: xr.Dataset) -> Normalize:
-    """Return the scale of the colours that holds the displacements of maps."""
-    from matplotlib.colors import Normalize
-
-    low, high = limits_of(*charts)
-    return Normalize(float(scales.way.shown(low)), float(scales.way.shown(high)))
+        origin.append(f"constants {constants}")
+    foot(figure, " · ".join(filter(None, origin)), "\n".join(filter(None, remarks)))

@@ -23,10 +23,12 @@ from printhammer.figures.elements.style import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
+    import numpy.typing as npt
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.text import Text
 
     from printhammer.figures.elements.scales import Scale
@@ -120,6 +122,11 @@ def note(ax: Axes, text: str, at: tuple[float, float], **options: Any) -> Text:
     return ax.text(*at, text, transform=ax.transAxes, **style)
 
 
+def inside(ax: Axes, text: str, x: float, y: float, color: str) -> None:
+    """Write tiny in the middle of a cell at a place in data units."""
+    ax.text(x, y, text, ha="center", va="center", fontsize=TINY, color=color)
+
+
 def beside(
     ax: Axes,
     text: str,
@@ -134,10 +141,37 @@ def beside(
     ax.annotate(text, at, shift, **how)
 
 
+def heading(ax: Axes, text: str, **options: Any) -> None:
+    """Write small above a panel, from the left."""
+    ax.set_title(text, **{"loc": "left", "fontsize": SMALL, **options})
+
+
+def dots(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, size: float, color: str, **options: Any) -> None:
+    """Draw points as dots without a rim, or as another `marker`, of a size in points."""
+    ax.plot(x, y, **{"ls": "none", "marker": "o", "ms": size, "mew": 0.0, "color": color, **options})
+
+
+def dashed(line: Callable[..., Any], *levels: float, **options: Any) -> None:
+    """Draw thin dashed lines at levels by `axhline` or `axvline` of some axes."""
+    for level in levels:
+        line(level, **{"color": MUTED, "lw": HAIR, "ls": (0, (4, 3)), **options})
+
+
 def legend_above(ax: Axes, handles: Sequence[Artist], **options: Any) -> None:
     """Write a legend in one line above the axes, from the left."""
     where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
     ax.legend(handles=handles, fontsize=SMALL, frameon=False, ncols=len(handles), **where, **options)
+
+
+def legend_in_columns(ax: Axes, handles: Sequence[Artist], columns: int, size: float = SMALL) -> None:
+    """Write a legend in columns above the middle of the axes, in letters of a size in points."""
+    where: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    ax.legend(handles=handles, ncols=columns, fontsize=size, frameon=False, **where)
+
+
+def legend_below(figure: Figure, *entries: Any, **options: Any) -> None:
+    """Write a legend below all panels, from the left; `entries` and options are those of `Figure.legend`."""
+    figure.legend(*entries, loc="outside lower left", fontsize=SMALL, frameon=False, **options)
 
 
 def contact_spans(ax: Axes, motion: Motion, until: float, shown: Scale) -> None:
@@ -200,19 +234,8 @@ def arrows(
 def firings(ax: Axes, times: Iterable[float], shown: Scale, color: str = BLUE, foot: float = 0.022) -> None:
     """Mark firing times, s, by small triangles inside the lower edge of the axes."""
     at = [float(shown.shown(t)) for t in times]
-    ax.plot(
-        at,
-        [foot] * len(at),
-        ls="none",
-        marker="^",
-        ms=4.5,
-        mew=0.0,
-        color=color,
-        transform=ax.get_xaxis_transform(),
-        clip_on=False,
-        zorder=5.0,
-        gid="firings",
-    )
+    how = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 5.0, "gid": "firings"}
+    dots(ax, at, [foot] * len(at), 4.5, color, marker="^", **how)
 
 
 def drive_strip(

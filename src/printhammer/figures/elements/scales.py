@@ -69,7 +69,7 @@ _SCALES: Final[dict[str, tuple[tuple[float, Scale], ...]]] = {
 
 def scale(name: Name, largest: float = 0.0) -> Scale:
     """Return how a quantity up to some absolute value, SI, is shown: large hammers get larger units."""
-    return next(found for limit, found in _SCALES[name] if largest <= limit)
+    return next(shown for limit, shown in _SCALES[name] if largest <= limit)
 
 
 def label(ax: Axes, side: Literal["x", "y"], shown: Scale, name: str = "") -> SecondaryAxis | None:

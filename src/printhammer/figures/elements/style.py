@@ -111,6 +111,12 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def new_panel(height: float, width: float = WIDTH) -> tuple[Figure, Axes]:
+    """Return a figure as `new_figure` does, with one panel."""
+    figure = new_figure(height, width)
+    return figure, figure.add_subplot()
+
+
 def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
     """Divide a figure into a panel and a slim strip below it on the same time axis."""
     grid = figure.add_gridspec(2, 1, height_ratios=(ratio, 1.0), hspace=0.03)
@@ -125,16 +131,16 @@ def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
     """Write below a figure which hammer it shows, how its constants came about, and remarks on the run."""
     statuses = {constant.status for constant in hammer.constants.values()}
     known = [status for status in ("reconstructed", "assumed") if status in statuses]
-    told = [hammer.name, hammer.fingerprint[:8]]
+    origin = [hammer.name, hammer.fingerprint[:8]]
     if known:
-        told.append(f"constants in part {' and '.join(known)}")
-    shown = [line for remark in remarks if remark for line in wrap(remark, _LINE_OF_REMARK)]
-    foot(figure, " · ".join(told), "\n".join(shown))
+        origin.append(f"constants in part {' and '.join(known)}")
+    lines = [line for remark in remarks if remark for line in wrap(remark, _LINE_OF_REMARK)]
+    foot(figure, " · ".join(origin), "\n".join(lines))
 
 
-def foot(figure: Figure, told: str, remark: str = "") -> None:
+def foot(figure: Figure, origin: str, remark: str = "") -> None:
     """Write below a figure where it comes from, and a remark above it."""
-    text = figure.supxlabel(told, x=0.99, ha="right", fontsize=TINY, color=MUTED)
+    text = figure.supxlabel(origin, x=0.99, ha="right", fontsize=TINY, color=MUTED)
     text.set_in_layout(True)
     if remark:
         figure.suptitle(remark, x=0.01, ha="left", fontsize=SMALL, color=ORANGE)

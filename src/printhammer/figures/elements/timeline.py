@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from printhammer.figures.elements import style
+from printhammer.figures.elements import marks, style
 from printhammer.figures.elements.curves import places, times_of
-from printhammer.figures.elements.marks import (
-    curve,
-    drive_strip,
-    firings,
-    legend_above,
-    name_lines,
-    place_lines,
-)
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from printhammer.hammer.hammer import Hammer
@@ -77,31 +70,53 @@ def timeline(
 
     panel.set_xlim(0.0, float(time.shown(until)))
     panel.set_ylim(float(way.shown(low)), float(way.shown(high)))
-    place_lines(panel, hammer, way)
+    marks.place_lines(panel, hammer, way)
     several = len(motions) > 1
     for number, (motion, grid, path) in enumerate(zip(motions, grids, paths, strict=True)):
         colour, dash, width = _LOOKS[number % len(_LOOKS)]
         gid = f"displacement {number + 1}" if several else "displacement"
         # Later motions lie under earlier ones where they agree.
         order = 3.0 - 0.1 * number
-        curve(panel, time.shown(grid), way.shown(path), gid, colour, ls=dash, lw=width, zorder=order)
+        marks.curve(panel, time.shown(grid), way.shown(path), gid, colour, ls=dash, lw=width, zorder=order)
         if show_firings:
-            firings(
-                panel,
-                motion.drive.times[motion.drive.times <= until],
-                time,
-                colour if several else style.BLUE,
-            )
-    drive_strip(strip, motions, grids, until, [look[0] for look in _LOOKS[: len(motions)]])
-    name_lines(panel, hammer, way)
+            fired = motion.drive.times[motion.drive.times <= until]
+            marks.firings(panel, fired, time, colour if several else style.BLUE)
+    marks.drive_strip(strip, motions, grids, until, [look[0] for look in _LOOKS[: len(motions)]])
+    marks.name_lines(panel, hammer, way)
     if labels:
-        _legend(figure, labels)
+        _legend(panel, labels)
     elif heading:
-        panel.set_title(heading, loc="left", fontsize=style.SMALL, color=style.INK, pad=4.0)
+        marks.heading(panel, heading, color=style.INK, pad=4.0)
     label(panel, "y", way)
     messages = [motion.message for motion in motions if motion.message]
     sign(figure, hammer, *remarks, *messages)
     return figure
+
+
+def between_surfaces(ax: Axes, hammer: Hammer, motion: Motion, above: float) -> float:
+    """Draw displacement, µm, against time, ms, between the tinted pack and backstop.
+
+    `above` is the room over the motion, in units of that below it, 8 % of its range; returned in µm.
+    """
+    ms, um = scale("time").factor, scale("displacement").factor
+    assert hammer.front is not None
+    low, high = um * float(motion.x.min()), um * float(motion.x.max())
+    room = _HEADROOM * (high - low)
+    top = high + above * room
+    ax.axhspan(um * hammer.front, top, color=style.SURFACES["pack"], alpha=0.14, lw=0.0)
+    ax.axhspan(low - room, um * hammer.origin, color=style.SURFACES["backstop"], alpha=0.25, lw=0.0)
+    ax.plot(ms * motion.t, um * motion.x, color=style.INK, lw=style.LINE, gid="displacement")
+    ax.set_ylim(low - room, top)
+    ax.set_ylabel("Displacement  [µm]")
+    return room
+
+
+def current_between(ax: Axes, motion: Motion, largest: float) -> None:
+    """Draw the current of a motion, A, against time, ms, and its bounds to either side as dashed lines."""
+    ax.plot(scale("time").factor * motion.t, motion.current, color=style.BLUE, lw=style.THIN, gid="current")
+    ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
+    marks.dashed(ax.axhline, -largest, largest)
+    ax.set_ylabel("Current  [A]")
 
 
 def _limits(hammer: Hammer, paths: Sequence[FloatArray]) -> tuple[float, float]:
@@ -112,11 +127,11 @@ def _limits(hammer: Hammer, paths: Sequence[FloatArray]) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _legend(figure: Figure, labels: Sequence[str]) -> None:
+def _legend(panel: Axes, labels: Sequence[str]) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=_LOOKS[number][0], ls=_LOOKS[number][1], lw=style.THIN + 0.5, label=text)
-        for number, text in enumerate(labels)
+        Line2D([], [], color=colour, ls=dash, lw=style.THIN + 0.5, label=text)
+        for (colour, dash, _width), text in zip(_LOOKS, labels, strict=False)
     ]
-    legend_above(figure.axes[0], handles)
+    marks.legend_above(panel, handles)

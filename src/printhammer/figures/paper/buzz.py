@@ -40,11 +40,11 @@ def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | 
     """
     from printhammer.printing.dots.buzz import find_buzz_train
 
-    found = search if search is not None else find_buzz_train(hammer)
-    train = found.best
+    search = find_buzz_train(hammer) if search is None else search
+    train = search.best
     motion = fired(hammer, train.times if train is not None else (0.0,), duration)
     until = motion.end if duration is not None else shown_until(motion)
-    remarks = [] if found.train is not None else [f"No buzz printing: {found.reason}."]
+    remarks = [] if search.train is not None else [f"No buzz printing: {search.reason}."]
     if train is not None and train.count:
         remarks.append(f"{train.touches_text}.")
     heading = _heading(train) if train is not None else "a single pulse"
@@ -61,15 +61,11 @@ def _heading(train: BuzzTrain) -> str:
         how = f"{len(train.times)} pulses, one every {interval}"
     else:
         how = f"{len(train.times)} pulses, each {interval} after leaving the pack"
-    return f"{how}: {_counted(train)}"
-
-
-def _counted(train: BuzzTrain) -> str:
-    if train.count == 0:
-        return "no dot that counts"
-    if train.count == 1:
-        return f"1 dot of {train.weakest:.2f} of the single-pulse force"
-    return f"{train.count} dots of {train.weakest:.2f} to {max(train.forces):.2f} of the single-pulse force"
+    force = f"{train.weakest:.2f} to {max(train.forces):.2f}" if train.count > 1 else f"{train.weakest:.2f}"
+    dots = "1 dot" if train.count == 1 else f"{train.count} dots"
+    return (
+        f"{how}: {dots} of {force} of the single-pulse force" if train.count else f"{how}: no dot that counts"
+    )
 
 
 def _number(figure: Figure, motion: Motion, train: BuzzTrain, until: float) -> None:
@@ -81,12 +77,5 @@ def _number(figure: Figure, motion: Motion, train: BuzzTrain, until: float) -> N
         force = forces.get(contact.firing) if contact.firing is not None else None
         if contact.surface != "pack" or contact.extra or force is None or contact.t_peak > until:
             continue
-        peak = float(motion.at(contact.t_peak)[0][0])
-        beside(
-            panel,
-            f"{force:.2f}",
-            (float(time.shown(contact.t_peak)), float(way.shown(peak))),
-            (0, 3),
-            "center bottom",
-            color=INK,
-        )
+        peak = float(time.shown(contact.t_peak)), float(way.shown(motion.at(contact.t_peak)[0][0]))
+        beside(panel, f"{force:.2f}", peak, (0, 3), "center bottom", color=INK)

@@ -11,7 +11,7 @@ from printhammer.figures.elements.curves import fired, places, times_of, total_f
 from printhammer.figures.elements.marks import HALO, arrows, curve, note, place_lines
 from printhammer.figures.elements.room import freest, occupied
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import BLUE, FAINT, HAIR, MUTED, TINY, new_figure, sign, styled
+from printhammer.figures.elements.style import BLUE, FAINT, HAIR, MUTED, TINY, new_panel, sign, styled
 from printhammer.figures.paper.total_force import rigid_remark
 
 if TYPE_CHECKING:
@@ -44,8 +44,7 @@ def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     ends = [*places(hammer).values(), float(x.min()), float(x.max())]
     room = 0.05 * (max(ends) - min(ends)) or 1e-6
     way, force = scale("displacement", max(map(abs, ends))), scale("force")
-    figure = new_figure(4.8)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(4.8)
     ax.set_xlim(float(way.shown(min(ends) - room)), float(way.shown(max(ends) + room)))
     low, high = float(total.min()), float(total.max())
     above = (high - low) or 1.0
@@ -78,16 +77,8 @@ def _annotate(
     """Add the insert, if there is a settle-out to show, and what the loops mean, where there is room."""
     points = occupied(ax)
     if late.any():
-        left, bottom, width, height = _place(points)
-        _insert(
-            ax,
-            (left, bottom, width, height),
-            motion,
-            way.shown(x[late]),
-            force.shown(total[late]),
-            way,
-            force,
-        )
+        left, bottom, width, height = box = _place(points)
+        _insert(ax, box, motion, way.shown(x[late]), force.shown(total[late]), way, force)
         # What the insert covers, its tick labels included, is taken.
         covered = np.meshgrid(
             np.linspace(left - 0.07, left + width, 30), np.linspace(bottom - 0.07, bottom + height + 0.05, 30)
@@ -103,7 +94,7 @@ def _annotate(
 
 def _place(points: FloatArray) -> tuple[float, float, float, float]:
     """Return left, bottom, width and height of the insert: as large as fits, best at the upper right."""
-    found = []
+    boxes = []
     for width, height in _INSERTS:
         corners = [
             (left, bottom)
@@ -112,10 +103,10 @@ def _place(points: FloatArray) -> tuple[float, float, float, float]:
         ]
         # Its tick labels and title need room too.
         (left, bottom), covered = freest(points, (width + 0.07, height + 0.12), corners)
-        found.append((covered, (left + 0.07, bottom + 0.07, width, height)))
+        boxes.append((covered, (left + 0.07, bottom + 0.07, width, height)))
         if covered == 0:
             break
-    return min(found, key=lambda entry: entry[0])[1]
+    return min(boxes, key=lambda entry: entry[0])[1]
 
 
 def _insert(

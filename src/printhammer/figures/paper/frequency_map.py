@@ -38,15 +38,13 @@ def frequency_map(
     InputError
         The hammer has no waveform or no rest state, or the map fewer than two times.
     """
-    found = map_marks.drawable(map_marks.chart_of(hammer, rates) if chart is None else chart)
-    scales = map_marks.scales_of(found)
-    norm = map_marks.norm_of(scales, found)
+    chart = map_marks.drawable(map_marks.chart_of(hammer, rates) if chart is None else chart)
+    scales = map_marks.scales_of(chart)
     figure = new_figure(4.6)
     grid = figure.add_gridspec(1, 2, width_ratios=(30.0, 1.0))
     panel, bar = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
-    map_marks.picture(panel, found, norm, scales)
-    map_marks.firing_lines(panel, found, scales)
-    map_marks.key(panel, found)
-    map_marks.colour_bar(bar, found, norm, scales)
-    map_marks.sign_map(figure, found, map_marks.failures(found))
+    map_marks.picture(panel, chart, scales)
+    map_marks.key(panel, chart)
+    map_marks.colour_bar(bar, chart, scales)
+    map_marks.sign_map(figure, chart, map_marks.failures(chart))
     return figure

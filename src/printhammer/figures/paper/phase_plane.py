@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from printhammer.figures.elements.curves import fired, orbit, places, times_of
 from printhammer.figures.elements.marks import arrows, curve, place_lines
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import BLUE, FAINT, HAIR, new_figure, sign, styled
+from printhammer.figures.elements.style import BLUE, FAINT, HAIR, new_panel, sign, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,8 +29,7 @@ def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     slow, fast = float(v.min()), float(v.max())
     above = (fast - slow) or 1e-3
     way, speed = scale("displacement", max(abs(low), abs(high))), scale("velocity")
-    figure = new_figure(4.4)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(4.4)
     ax.set_xlim(float(way.shown(low - room)), float(way.shown(high + room)))
     # The names of the places are written above the orbit.
     ax.set_ylim(float(speed.shown(slow - 0.06 * above)), float(speed.shown(fast + 0.17 * above)))

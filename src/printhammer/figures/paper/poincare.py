@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final, Literal
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import RING, panel, scales_of, shown_period
 from printhammer.figures.elements.curves import waveform_of
-from printhammer.figures.elements.marks import note
+from printhammer.figures.elements.marks import legend_below, note
 from printhammer.figures.elements.scales import label
-from printhammer.figures.elements.style import INK, SMALL, new_figure, sign, styled
+from printhammer.figures.elements.style import INK, new_figure, sign, styled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,20 +24,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.schemes_1983 import Reading, Scheme
 
-PERIODS: Final = (
-    1.35e-3,
-    1.3e-3,
-    1.25e-3,
-    1.2e-3,
-    1.15e-3,
-    1.1e-3,
-    1.05e-3,
-    1e-3,
-    0.95e-3,
-    0.9e-3,
-    0.85e-3,
-    0.8e-3,
-)
+PERIODS: Final = tuple(hundredths / 1e5 for hundredths in range(135, 75, -5))
 """Strobe times of the panels, s: from 1.35 ms down to 0.80 ms."""
 
 POINTS: Final = 200
@@ -79,31 +66,39 @@ def poincare(
     reading : str, optional
         When the short step of that schedule is taken.
     """
+    from matplotlib.lines import Line2D
+
     waveform_of(hammer)
-    found = _strobed(hammer, periods, points, scheme, reading) if strobes is None else list(strobes)
-    if not found:
+    shown = _strobed(hammer, periods, points, scheme, reading) if strobes is None else list(strobes)
+    if not shown:
         raise InputError("strobes: expected at least one train to draw")
-    window = found[0].window
+    window = shown[0].window
     way, speed = scales_of(window)
-    rows = -(-len(found) // _COLUMNS)
-    columns = min(_COLUMNS, len(found))
+    rows = -(-len(shown) // _COLUMNS)
+    columns = min(_COLUMNS, len(shown))
     figure = new_figure(0.7 + 1.75 * rows)
     grid = figure.add_gridspec(rows, columns, wspace=0.02, hspace=0.02)
-    for i, strobe in enumerate(found):
+    for i, strobe in enumerate(shown):
         row, column = divmod(i, columns)
         ax = figure.add_subplot(grid[row, column])
         panel(ax, strobe, window, way, speed, size=1.6, printed=_printed(strobe, printed or {}))
-        if len(found) <= len(ascii_lowercase):
+        if len(shown) <= len(ascii_lowercase):
             note(ax, f"({ascii_lowercase[i]})", (0.03, 0.96), color=INK)
         ax.locator_params(axis="both", nbins=5)
-        lowest = i + columns >= len(found)
+        lowest = i + columns >= len(shown)
         ax.tick_params(labelbottom=lowest, labelleft=column == 0)
         _edge(ax, "x", way, lowest, row == 0)
-        _edge(ax, "y", speed, column == 0, i + 1 == len(found) or column == columns - 1)
+        _edge(ax, "y", speed, column == 0, i + 1 == len(shown) or column == columns - 1)
     if any(line.get_gid() == "cycle" for ax in figure.axes for line in ax.lines):
-        _key(figure)
+        circles = Line2D([], [], label="last points of a periodic train", **RING)
+        legend_below(figure, handles=[circles], handletextpad=0.2)
     by_scheme = [f"As {scheme} computes it on the schedule of 1983, short step: {reading}."] if scheme else []
-    sign(figure, hammer, *by_scheme, *_remarks(found))
+    early = (
+        f"The run at {shown_period(strobe.period)} ended early: {strobe.status}."
+        for strobe in shown
+        if not strobe.ok
+    )
+    sign(figure, hammer, *by_scheme, *early)
     return figure
 
 
@@ -130,19 +125,6 @@ def _printed(strobe: Strobe, verdicts: Mapping[float, str]) -> str:
     return next(said, "")
 
 
-def _key(figure: Figure) -> None:
-    """Write below the panels what the circles are."""
-    from matplotlib.lines import Line2D
-
-    figure.legend(
-        handles=[Line2D([], [], label="last points of a periodic train", **RING)],
-        loc="outside lower left",
-        fontsize=SMALL,
-        frameon=False,
-        handletextpad=0.2,
-    )
-
-
 def _edge(ax: Axes, side: Literal["x", "y"], shown: Scale, here: bool, opposite: bool) -> None:
     """Name the axis of a panel where it lies on an edge of the figure, and the other unit system opposite."""
     other = label(ax, side, shown)
@@ -151,12 +133,3 @@ def _edge(ax: Axes, side: Literal["x", "y"], shown: Scale, here: bool, opposite:
     if other is not None and not opposite:
         other.remove()
         ax.tick_params(axis=side, top=side == "x", right=side == "y")
-
-
-def _remarks(strobes: Sequence[Strobe]) -> list[str]:
-    """Return what went wrong in the runs."""
-    return [
-        f"The run at {shown_period(strobe.period)} ended early: {strobe.status}."
-        for strobe in strobes
-        if not strobe.ok
-    ]

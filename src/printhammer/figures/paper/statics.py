@@ -11,7 +11,7 @@ from printhammer.figures.elements import style
 from printhammer.figures.elements.curves import places, reach
 from printhammer.figures.elements.marks import curve, place_lines
 from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import new_figure, sign, styled
+from printhammer.figures.elements.style import new_panel, sign, styled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,6 +44,8 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     InputError
         The hammer has no magnet, nothing that gives its stroke, or no current is in range.
     """
+    from printhammer.hammer.static_force import StaticForce
+
     if hammer.magnet is None:
         raise InputError(f"the hammer {hammer.name!r} has no magnet, whose force Fig. 2 shows")
     low, high = getattr(hammer.magnet, "current_range", (-np.inf, np.inf))
@@ -57,21 +59,23 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     if places(hammer):
         x = np.unique(np.concatenate([x, list(places(hammer).values())]))
         x = x[(x >= start) & (x <= end)]
-    figure = new_figure(4.6)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(4.6)
     way, force = scale("displacement", end), scale("force")
-    magnet = {current: force.shown(_magnet(hammer, x, current)) for current in inside}
-    spring = force.shown(_spring(hammer, x)) if hammer.spring is not None else None
+    static = StaticForce(hammer)
+    curves = {
+        f"{current:g} A": force.shown([static.magnet(place, current) for place in x.tolist()])
+        for current in inside
+    }
+    spring = None
+    if hammer.spring is not None:
+        spring = force.shown([static.spring(place) for place in x.tolist()])
 
     ax.set_xlim(float(way.shown(start)), float(way.shown(end)))
-    ax.set_ylim(*_limits(hammer, x, list(magnet.values()), spring))
+    ax.set_ylim(*_limits(hammer, x, [*curves.values()], spring))
     ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0.5)
     place_lines(ax, hammer, way, "x")
-    names = [f"{current:g} A" for current in magnet]
-    colours = dict(zip(names, _colours(len(magnet)), strict=True))
-    curves = dict(zip(names, magnet.values(), strict=True))
-    for name, values in curves.items():
-        curve(ax, way.shown(x), values, f"magnet {name}", colours[name])
+    for (name, values), colour in zip(curves.items(), _colours(len(curves)), strict=True):
+        curve(ax, way.shown(x), values, f"magnet {name}", colour)
     if spring is not None:
         curve(ax, way.shown(x), spring, "spring", style.ORANGE)
         curve(ax, way.shown(x), -spring, "spring reflected", style.ORANGE, ls=(0, (4, 2)))
@@ -89,20 +93,6 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     label(ax, "y", force)
     sign(figure, hammer)
     return figure
-
-
-def _magnet(hammer: Hammer, x: FloatArray, current: float) -> FloatArray:
-    from printhammer.hammer.static_force import StaticForce
-
-    static = StaticForce(hammer)
-    return np.array([static.magnet(place, current) for place in x.tolist()])
-
-
-def _spring(hammer: Hammer, x: FloatArray) -> FloatArray:
-    from printhammer.hammer.static_force import StaticForce
-
-    static = StaticForce(hammer)
-    return np.array([static.spring(place) for place in x.tolist()])
 
 
 def _limits(

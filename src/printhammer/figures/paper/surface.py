@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from printhammer.figures.elements import map_marks
-from printhammer.figures.elements.style import BLUE, HAIR, INK, MUTED, SMALL, new_figure, styled
+from printhammer.figures.elements.marks import beside
+from printhammer.figures.elements.style import BLUE, HAIR, INK, MUTED, SMALL, new_panel, styled
 from printhammer.maps.layout import places_of
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ _SHEETS: Final = 2.0
 _FLAT: Final = 4e-4
 """How far a drawn curve may be from the computed one, in the units of the picture: 0.15 points."""
 
+_NAME: Final[dict[str, Any]] = {"fontsize": "medium"}
 _POST: Final = 0.13
 """Way from the displacement axis to the curves."""
 
@@ -105,8 +107,7 @@ def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
         (min(low, *places.values(), high), max(high, *places.values())),
         (float(every[0]), float(every[-1])),
     )
-    figure = new_figure(4.7)
-    ax = figure.add_subplot()
+    figure, ax = new_panel(4.7)
     ax.set_axis_off()
     rows = np.unique(np.linspace(0, len(every) - 1, min(CURVES, len(every))).round().astype(int))
     for row in rows[::-1]:
@@ -129,12 +130,10 @@ def _sheet(ax: Axes, view: _View, time: FloatArray, x: FloatArray, rate: float, 
     across, up = thinned(view.across(t, rate), view.up(x, rate), _FLAT)
     foot = float(view.up(view.heights[0], rate))
     ax.fill([across[0], *across, across[-1]], [foot, *up, foot], color="white", lw=0.0, zorder=_SHEETS)
-    (line,) = ax.plot(across, up, color=INK, lw=0.4, zorder=_SHEETS)
-    line.set_gid(f"rate {rate:.6g}")
+    ax.plot(across, up, color=INK, lw=0.4, zorder=_SHEETS, gid=f"rate {rate:.6g}")
     if front is not None and (x > front).any():
-        level = float(view.up(front, rate))
-        (line,) = ax.plot(*_above(across, up, level), color=BLUE, lw=0.6, zorder=_SHEETS)
-        line.set_gid(f"in the pack at {rate:.6g}")
+        inside = _above(across, up, float(view.up(front, rate)))
+        ax.plot(*inside, color=BLUE, lw=0.6, zorder=_SHEETS, gid=f"in the pack at {rate:.6g}")
 
 
 def thinned(x: FloatArray, y: FloatArray, room: float) -> tuple[FloatArray, FloatArray]:
@@ -169,72 +168,73 @@ def _above(x: FloatArray, y: FloatArray, level: float) -> tuple[FloatArray, Floa
 
 def _time_axis(ax: Axes, view: _View, time: Scale) -> None:
     first, last = view.times
-    foot = float(view.up(view.heights[0], view.rates[0]))
-    ax.plot(view.across([first, last], view.rates[0]), [foot, foot], color=INK, lw=HAIR)
-    for tick in _ticks(float(time.shown(first)), float(time.shown(last)), 9):
-        at = float(view.across(tick / time.factor, view.rates[0]))
-        ax.plot([at, at], [foot, foot - _TICK], color=INK, lw=HAIR)
-        _text(ax, f"{tick:g}", (at, foot - _TICK), (0.0, -2.0), ha="center", va="top")
-    middle = float(view.across(0.5 * (first + last), view.rates[0]))
-    _text(
-        ax,
-        f"Time from the first firing  [{time.sign}]",
-        (middle, foot - _TICK),
-        (0.0, -14.0),
-        ha="center",
-        va="top",
-        fontsize="medium",
-    )
+    nearest = view.rates[0]
+    foot = float(view.up(view.heights[0], nearest))
+    ax.plot(view.across([first, last], nearest), [foot, foot], color=INK, lw=HAIR)
+    for tick in _ticks(time, first, last, 9):
+        at = float(view.across(tick / time.factor, nearest))
+        _mark(ax, f"{tick:g}", (at, foot), (0.0, -_TICK), (0.0, -2.0), "center top")
+    middle = float(view.across(0.5 * (first + last), nearest)), foot - _TICK
+    _text(ax, f"Time from the first firing  [{time.sign}]", middle, (0.0, -14.0), "center top", **_NAME)
 
 
 def _height_axis(ax: Axes, view: _View, way: Scale, places: dict[str, float]) -> None:
     low, high = view.heights
-    at = float(view.across(view.times[0], view.rates[0])) - _POST
-    ends = [float(view.up(end, view.rates[0])) for end in (low, high)]
+    nearest = view.rates[0]
+    at = float(view.across(view.times[0], nearest)) - _POST
+    ends = [float(view.up(end, nearest)) for end in (low, high)]
     ax.plot([at, at], ends, color=INK, lw=HAIR)
-    for tick in _ticks(float(way.shown(low)), float(way.shown(high)), 4):
-        up = float(view.up(tick / way.factor, view.rates[0]))
-        ax.plot([at, at - _TICK], [up, up], color=INK, lw=HAIR)
-        _text(ax, f"{tick:g}", (at - _TICK, up), (-2.0, 0.0), ha="right", va="center")
+    for tick in _ticks(way, low, high, 4):
+        up = float(view.up(tick / way.factor, nearest))
+        _mark(ax, f"{tick:g}", (at, up), (-_TICK, 0.0), (-2.0, 0.0), "right center")
     for name, place in places.items():
-        up = float(view.up(place, view.rates[0]))
         colour = BLUE if name == "pack" else MUTED
-        ax.plot([at, at + _TICK], [up, up], color=colour, lw=HAIR, gid=name)
-        _text(ax, name, (at + _TICK, up), (2.0, 0.0), ha="left", va="center", color=colour)
-    middle = 0.5 * (ends[0] + ends[1])
-    text = f"Displacement  [{way.sign}]"
-    _text(ax, text, (at, middle), (-26.0, 0.0), ha="right", va="center", fontsize="medium", rotation=90.0)
+        here = at, float(view.up(place, nearest))
+        _mark(ax, name, here, (_TICK, 0.0), (2.0, 0.0), "left center", colour, gid=name)
+    middle = at, 0.5 * (ends[0] + ends[1])
+    _text(ax, f"Displacement  [{way.sign}]", middle, (-26.0, 0.0), "right center", rotation=90.0, **_NAME)
 
 
 def _rate_axis(ax: Axes, view: _View, shown: Scale) -> None:
     end, floor = view.times[1], view.heights[0]
-    first, last = view.rates
-    across = [float(view.across(end, rate)) for rate in (first, last)]
-    up = [float(view.up(floor, rate)) for rate in (first, last)]
+    across = [float(view.across(end, rate)) for rate in view.rates]
+    up = [float(view.up(floor, rate)) for rate in view.rates]
     ax.plot(across, up, color=INK, lw=HAIR)
-    for tick in _ticks(float(shown.shown(first)), float(shown.shown(last)), 5):
+    for tick in _ticks(shown, *view.rates, 5):
         rate = tick / shown.factor
         at = float(view.across(end, rate)), float(view.up(floor, rate))
-        ax.plot([at[0], at[0] + _TICK], [at[1], at[1]], color=INK, lw=HAIR)
-        _text(ax, f"{tick:g}", (at[0] + _TICK, at[1]), (2.0, 0.0), ha="left", va="center")
+        _mark(ax, f"{tick:g}", at, (_TICK, 0.0), (2.0, 0.0), "left center")
     middle = 0.5 * (across[0] + across[1]), 0.5 * (up[0] + up[1])
-    _text(
-        ax,
-        f"{shown.label}  [{shown.sign}]",
-        middle,
-        (32.0, -4.0),
-        ha="center",
-        va="center",
-        fontsize="medium",
-        rotation=float(np.degrees(np.arctan2(_LEAN[1], _LEAN[0]))),
-    )
+    lean = float(np.degrees(np.arctan2(_LEAN[1], _LEAN[0])))
+    text = f"{shown.label}  [{shown.sign}]"
+    _text(ax, text, middle, (32.0, -4.0), "center center", rotation=lean, **_NAME)
 
 
-def _ticks(low: float, high: float, most: int) -> list[float]:
+def _ticks(shown: Scale, first: float, last: float, most: int) -> list[float]:
+    low, high = float(shown.shown(first)), float(shown.shown(last))
     ticks = MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
     return [float(tick) for tick in ticks if low <= tick <= high * (1.0 + 1e-12)]
 
 
-def _text(ax: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **options: Any) -> None:
-    style = {"fontsize": SMALL, "color": INK, **options}
-    ax.annotate(text, at, xytext=shift, textcoords="offset points", annotation_clip=False, **style)
+def _mark(
+    ax: Axes,
+    text: str,
+    at: tuple[float, float],
+    way: tuple[float, float],
+    shift: tuple[float, float],
+    side: str,
+    color: str = INK,
+    **options: Any,
+) -> None:
+    """Draw a tick from a place on an axis some way off, and its text beside its end."""
+    end = at[0] + way[0], at[1] + way[1]
+    ax.plot([at[0], end[0]], [at[1], end[1]], color=color, lw=HAIR, **options)
+    _text(ax, text, end, shift, side, color=color)
+
+
+def _text(
+    ax: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], side: str, **options: Any
+) -> None:
+    beside(
+        ax, text, at, shift, side, **{"fontsize": SMALL, "color": INK, "annotation_clip": False, **options}
+    )

@@ -12,7 +12,6 @@ from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from printhammer.hammer.hammer import Hammer
@@ -26,6 +25,8 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     The impacts on a rigid backstop have no finite force and are not drawn. The time shown ends, unless given,
     when the armature has settled, at most after 4 ms.
     """
+    from matplotlib.patches import Patch
+
     motion = fired(hammer, duration=duration)
     until = motion.end if duration is not None else shown_until(motion)
     times = times_of(motion, 0.0, until)
@@ -40,7 +41,14 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     panel.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0.6)
     contact_spans(panel, motion, until, time)
     curve(panel, time.shown(times), force.shown(total), "total force", style.INK, lw=1.0)
-    _key(panel, motion)
+    touched = {contact.surface for contact in motion.contacts}
+    handles = [
+        Patch(color=style.SURFACES[name], alpha=0.3, lw=0.0, label=f"touches the {name}")
+        for name in ("pack", "backstop")
+        if name in touched
+    ]
+    if handles:
+        legend_above(panel, handles, handlelength=1.2)
     drive_strip(strip, [motion], [times], until, [style.BLUE])
     label(panel, "y", force, "Total force")
     sign(figure, hammer, motion.message, rigid_remark(motion))
@@ -51,16 +59,3 @@ def rigid_remark(motion: Motion) -> str:
     """Return one sentence on what a force diagram cannot show of this motion; empty if nothing."""
     impacts = any(c.surface == "backstop" and c.peak_force is None and not c.initial for c in motion.contacts)
     return "The rigid backstop changes the velocity at once; its impulses are not drawn." if impacts else ""
-
-
-def _key(ax: Axes, motion: Motion) -> None:
-    from matplotlib.patches import Patch
-
-    touched = {contact.surface for contact in motion.contacts}
-    handles = [
-        Patch(color=style.SURFACES[name], alpha=0.3, lw=0.0, label=f"touches the {name}")
-        for name in ("pack", "backstop")
-        if name in touched
-    ]
-    if handles:
-        legend_above(ax, handles, handlelength=1.2)

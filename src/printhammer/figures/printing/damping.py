@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import ALONG_Y, beside
+from printhammer.figures.elements.marks import ALONG_Y, beside, dashed, heading
 from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -44,60 +44,42 @@ def plot(study: DampingStudy) -> Figure:
     )
     for ax, (name, values, missing) in zip(axes, panels, strict=True):
         status = study.status.tolist() if ax is axes[0] else [""] * count
-        told = [missing if well else str(text) for well, text in zip(prints, status, strict=True)]
-        _panel(ax, study, values, told)
+        otherwise = [missing if well else str(text) for well, text in zip(prints, status, strict=True)]
+        _panel(ax, study, values, otherwise)
         ax.set_xlabel(name)
-    labels = [one.label.replace(" us", " µs") for one in study.materials]
+    labels = [material.label.replace(" us", " µs") for material in study.materials]
     axes[0].set_yticks(range(count), labels, fontsize=style.TINY)
     axes[0].set_ylim(count - 0.4, -0.6)
-    for tick, one in zip(axes[0].get_yticklabels(), study.materials, strict=True):
-        tick.set_color(COLOURS[one.kind])
-    kinds = [kind for kind in COLOURS if any(one.kind == kind for one in study.materials)]
+    for tick, material in zip(axes[0].get_yticklabels(), study.materials, strict=True):
+        tick.set_color(COLOURS[material.kind])
+    kinds = [kind for kind in COLOURS if any(material.kind == kind for material in study.materials)]
     for place, kind in enumerate(kinds):
-        beside(
-            axes[0],
-            kind,
-            (place / len(kinds), 1.0),
-            (0.0, 4.0),
-            xycoords="axes fraction",
-            color=COLOURS[kind],
-        )
+        where = place / len(kinds), 1.0
+        beside(axes[0], kind, where, (0.0, 4.0), xycoords="axes fraction", color=COLOURS[kind])
     over = int((study.status == "current limit").sum())
     limit = f"; hollow: over {study.current_limit:g} A" if over else f", {study.current_limit:g} A at most"
-    axes[2].set_title(f"All print with {study.nominal.force:.1f} N{limit}", loc="right", fontsize=style.SMALL)
+    heading(axes[2], f"All print with {study.nominal.force:.1f} N{limit}", loc="right")
     sign(figure, study.hammer)
     return figure
 
 
 def _panel(ax: Axes, study: DampingStudy, values: FloatArray, otherwise: list[str]) -> None:
     best = study.best
-    for row, one in enumerate(study.materials):
-        colour = COLOURS[one.kind]
+    for row, material in enumerate(study.materials):
+        colour = COLOURS[material.kind]
         if not np.isfinite(values[row]):
             beside(ax, otherwise[row], (0.0, row), (3.0, 0.0), xycoords=ALONG_Y, va="center")
             continue
         hollow = study.status[row] == "current limit"
-        ax.barh(
-            row,
-            values[row],
-            height=_BAR,
-            facecolor="white" if hollow else colour,
-            edgecolor=colour,
-            alpha=1.0 if row == best else 0.75,
-            gid=f"bar-{row}",
-        )
-        beside(
-            ax,
-            f"{values[row]:.4g}" if values[row] >= 100.0 else f"{values[row]:.2f}",
-            (values[row], row),
-            (2.0, 0.0),
-            "left center",
-            fontweight="bold" if row == best else "normal",
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
-            color=style.INK,
-        )
-        if one.kind == "as it is":
-            ax.axvline(values[row], color=style.MUTED, lw=style.THIN, ls=(0, (4, 3)), zorder=0.5)
+        inside, alpha = "white" if hollow else colour, 1.0 if row == best else 0.75
+        look: dict[str, Any] = {"facecolor": inside, "edgecolor": colour, "alpha": alpha, "gid": f"bar-{row}"}
+        ax.barh(row, values[row], height=_BAR, **look)
+        text = f"{values[row]:.4g}" if values[row] >= 100.0 else f"{values[row]:.2f}"
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+        how = {"fontweight": "bold" if row == best else "normal", "bbox": box, "color": style.INK}
+        beside(ax, text, (values[row], row), (2.0, 0.0), "left center", **how)
+        if material.kind == "as it is":
+            dashed(ax.axvline, values[row], lw=style.THIN, zorder=0.5)
     ax.set_xlim(0.0, 1.24 * float(np.nanmax(values, initial=1e-12)))
     ax.grid(axis="x", color=style.FAINT, lw=0.5)
     ax.set_axisbelow(True)

@@ -10,6 +10,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.ink import Sheet, coloured, inked
+from printhammer.figures.elements.marks import dots, heading, note
 from printhammer.figures.elements.scales import Scale
 from printhammer.figures.elements.style import sign, styled
 
@@ -96,15 +97,14 @@ def plot(page: Page, view: View = "page") -> Figure:
         axes.append(_panel(figure, sheet, top, strip, name, left))
         if number == 2 or not beside:
             top -= strip + _GAP
-    across, down = page.places
     fine = max(page.head.pitch / _FINENESS, sheet.width / _ACROSS)
-    _paper(axes[0], sheet, *_dots(page), page.head.wire_diameter, fine)
+    _paper(axes[0], sheet, page, _dots(page), fine)
     full = np.full(page.line.shape, page.head.density)
-    _paper(axes[1], sheet, *page.intended, full, page.head.wire_diameter, fine)
-    _differences(figure, axes[2], page, across, down, beside * _LABEL)
+    _paper(axes[1], sheet, page, (*page.intended, full), fine)
+    _differences(figure, axes[2], page, beside * _LABEL)
     top -= 1.5 * _LABEL
     _zoom(_panel(figure, place, top, zoom, _zoom_title(page)), place, page)
-    _tell(figure, page)
+    _sign(figure, page)
     return figure
 
 
@@ -156,7 +156,7 @@ def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, 
     ax.set_yticks([])
     for spine in ax.spines.values():
         spine.set_color(style.FAINT)
-    ax.set_title(title, loc="left", fontsize=style.SMALL, color=style.MUTED, pad=3.0)
+    heading(ax, title, color=style.MUTED, pad=3.0)
     return ax
 
 
@@ -174,31 +174,19 @@ def _zoom_title(page: Page) -> str:
 
 def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return places and densities of all that is on the paper, extra contacts among it."""
-    on = page.printed
-    (across, down), (more_across, more_down) = page.places, page.extra_places
-    return (
-        np.concatenate([across[on], more_across]),
-        np.concatenate([down[on], more_down]),
-        np.concatenate([page.density[on], page.extra_density]),
+    printed, extra = (*page.places, page.density), (*page.extra_places, page.extra_density)
+    across, down, density = (
+        np.concatenate([values[page.printed], more]) for values, more in zip(printed, extra, strict=True)
     )
+    return across, down, density
 
 
-def _paper(
-    ax: Axes,
-    sheet: Sheet,
-    across: FloatArray,
-    down: FloatArray,
-    density: FloatArray,
-    diameter: float,
-    finest: float,
-) -> None:
-    picture = coloured(inked(sheet, across, down, density, diameter, finest))
-    ax.imshow(
-        picture,
-        extent=(sheet.left, sheet.right, sheet.bottom, sheet.top),
-        aspect="auto",
-        interpolation="antialiased",
-    )
+def _paper(ax: Axes, sheet: Sheet, page: Page, dots: tuple[FloatArray, ...], finest: float) -> None:
+    """Draw a sheet with dots: places across and down, m, and densities; pixels not below the finest, m."""
+    across, down, density = dots
+    picture = coloured(inked(sheet, across, down, density, page.head.wire_diameter, finest))
+    extent = (sheet.left, sheet.right, sheet.bottom, sheet.top)
+    ax.imshow(picture, extent=extent, aspect="auto", interpolation="antialiased")
 
 
 def _discs(
@@ -207,15 +195,8 @@ def _discs(
     from matplotlib.collections import EllipseCollection
 
     size = np.full(across.shape, diameter)
-    discs = EllipseCollection(
-        size,
-        size,
-        np.zeros(across.shape),
-        units="xy",
-        offsets=np.column_stack([across, down]),
-        offset_transform=ax.transData,
-        **options,
-    )
+    where = {"offsets": np.column_stack([across, down]), "offset_transform": ax.transData}
+    discs = EllipseCollection(size, size, np.zeros(across.shape), units="xy", **where, **options)
     ax.add_collection(discs, autolim=False)
     return discs
 
@@ -229,68 +210,37 @@ def _in_points(ax: Axes, length: float) -> float:
     return float(72.0 * width * ax.get_position().width * length / (right - left))
 
 
-def _differences(
-    figure: Figure, ax: Axes, page: Page, across: FloatArray, down: FloatArray, above: float
-) -> None:
+def _differences(figure: Figure, ax: Axes, page: Page, above: float) -> None:
     """Draw where dots are off, and a scale above the panel, by some inches more than need be."""
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
-    on, head = page.printed, page.head
+    on, head, (across, down) = page.printed, page.head, page.places
     error = _MICRONS.shown(page.placement_error[on])
     # At least as wide as the limits, so that nothing shines that is nothing.
     bound = float(_MICRONS.shown(page.limits.arrival * page.speed))
     widest = max(float(np.abs(error).max(initial=0.0)), bound)
     colours = LinearSegmentedColormap.from_list("off", [style.BLUE, _NEUTRAL, style.ORANGE])
-    discs = _discs(
-        ax,
-        across[on],
-        down[on],
-        head.wire_diameter,
-        array=error,
-        cmap=colours,
-        norm=Normalize(-widest, widest),
-        linewidths=0.0,
-        gid="placement error",
-    )
-    lost_across, lost_down = (part[page.lost] for part in page.intended)
+    off = {"array": error, "cmap": colours, "norm": Normalize(-widest, widest), "gid": "placement error"}
+    discs = _discs(ax, across[on], down[on], head.wire_diameter, linewidths=0.0, **off)
+    wanted_across, wanted_down = (part[page.lost] for part in page.intended)
     mark = max(_in_points(ax, head.wire_diameter), _LEAST_MARK)
-    ax.plot(
-        lost_across,
-        lost_down,
-        ls="none",
-        marker="x",
-        ms=0.9 * mark,
-        mew=0.25 * mark,
-        color=style.INK,
-        gid="lost",
-    )
+    cross = {"marker": "x", "mew": 0.25 * mark, "gid": "lost"}
+    dots(ax, wanted_across, wanted_down, 0.9 * mark, style.INK, **cross)
     width, whole = figure.get_size_inches()
     box = ax.get_position()
-    bar_axes = figure.add_axes(
-        ((_WIDTH - _SIDE - _BAR - 0.75) / width, box.y1 + (0.06 + above) / whole, _BAR / width, 0.09 / whole)
-    )
+    left, bottom = (_WIDTH - _SIDE - _BAR - 0.75) / width, box.y1 + (0.06 + above) / whole
+    bar_axes = figure.add_axes((left, bottom, _BAR / width, 0.09 / whole))
     bar = figure.colorbar(discs, cax=bar_axes, orientation="horizontal", ticks=[])
     bar.outline.set_visible(False)
-    for place, side, text in (
-        (-0.02, "right", f"−{widest:.3g} µm, early"),
-        (1.02, "left", f"late, {widest:.3g} µm"),
-    ):
-        bar_axes.text(
-            place,
-            0.5,
-            text,
-            ha=side,
-            va="center",
-            fontsize=style.TINY,
-            color=style.MUTED,
-            transform=bar_axes.transAxes,
-        )
+    how = {"va": "center", "fontsize": style.TINY, "zorder": 3.0}
+    note(bar_axes, f"−{widest:.3g} µm, early", (-0.02, 0.5), ha="right", **how)
+    note(bar_axes, f"late, {widest:.3g} µm", (1.02, 0.5), ha="left", **how)
 
 
 def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
     head = page.head
     fine = max(head.pitch / _ZOOM_FINENESS, sheet.width / _ACROSS)
-    _paper(ax, sheet, *_dots(page), head.wire_diameter, fine)
+    _paper(ax, sheet, page, _dots(page), fine)
     across, down = page.intended
     reach = head.pitch
     near = (across > sheet.left - reach) & (across < sheet.right + reach)
@@ -300,15 +250,13 @@ def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
     rings = {"facecolors": "none", "linewidths": min(style.THIN, 0.07 * mark)}
     _discs(ax, across[on], down[on], head.wire_diameter, edgecolors=style.BLUE, gid="wanted", **rings)
     _discs(ax, across[lost], down[lost], head.wire_diameter, edgecolors=style.ORANGE, gid="lost", **rings)
-    ax.plot(
-        across[lost], down[lost], ls="none", marker="x", ms=0.4 * mark, mew=0.1 * mark, color=style.ORANGE
-    )
+    dots(ax, across[lost], down[lost], 0.4 * mark, style.ORANGE, marker="x", mew=0.1 * mark)
     more = near[page.extra_of]
     extra_across, extra_down = (part[more] for part in page.extra_places)
     _discs(ax, extra_across, extra_down, head.wire_diameter, edgecolors=style.GREEN, gid="extra", **rings)
 
 
-def _tell(figure: Figure, page: Page) -> None:
+def _sign(figure: Figure, page: Page) -> None:
     """Write below the figure how good the page is."""
     sign(figure, page.hammer)
     _width, whole = figure.get_size_inches()
@@ -319,17 +267,16 @@ def _tell(figure: Figure, page: Page) -> None:
 def summary(page: Page) -> str:
     """Return in a line how good a page is."""
     lost, extra = int(page.lost.sum()), int(page.extra_contacts.sum())
-    told = [f"{page.line.size} dots wanted", f"{int(page.printed.sum())} printed", f"{lost} lost"]
+    said = [f"{page.line.size} dots wanted", f"{int(page.printed.sum())} printed", f"{lost} lost"]
     if not page.run.all():
-        told.append(f"{int((~page.run).sum())} not run")
-    told.append(f"{extra} extra contacts")
+        said.append(f"{int((~page.run).sum())} not run")
+    said.append(f"{extra} extra contacts")
     if page.printed.any():
         error = _MICRONS.shown(page.placement_error[page.printed])
-        told.append(f"placement ±{np.std(error):.3g} µm, worst {np.abs(error).max():.3g} µm")
-        told.append(
-            f"darkness {page.darkness[page.printed].min():.2f} to {page.darkness[page.printed].max():.2f}"
-        )
-    return " · ".join(told)
+        darkness = page.darkness[page.printed]
+        said.append(f"placement ±{np.std(error):.3g} µm, worst {np.abs(error).max():.3g} µm")
+        said.append(f"darkness {darkness.min():.2f} to {darkness.max():.2f}")
+    return " · ".join(said)
 
 
 def _zoom_alone(page: Page) -> Figure:
@@ -339,7 +286,7 @@ def _zoom_alone(page: Page) -> Figure:
     figure = _figure(height + 2.5 * _LABEL + _FOOT)
     title = f"{_printed_title(page)}\n{_zoom_title(page)}"
     _zoom(_panel(figure, place, _FOOT + height, height, title), place, page)
-    _tell(figure, page)
+    _sign(figure, page)
     return figure
 
 
@@ -350,5 +297,5 @@ def _sheet_alone(page: Page) -> Figure:
     ax.set_axis_off()
     ax.set_xlim(sheet.left, sheet.right)
     ax.set_ylim(sheet.bottom, sheet.top)
-    _paper(ax, sheet, *_dots(page), page.head.wire_diameter, page.head.pitch / _SHEET_FINENESS)
+    _paper(ax, sheet, page, _dots(page), page.head.pitch / _SHEET_FINENESS)
     return figure

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import ALONG_X, beside
+from printhammer.figures.elements.marks import ALONG_X, beside, dashed, dots, heading
 from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -41,14 +41,10 @@ def plot(quality: Quality) -> Figure:
     good = quality.fault < 0
     limits = quality.limits
     _box(plane, limits, late, share)
-    for which, colour, name in (
-        (good, style.BLUE, "within limits"),
-        (~good & ~quality.lost, style.ORANGE, "off"),
-    ):
+    off = ~good & ~quality.lost
+    for which, colour, name in ((good, style.BLUE, "within limits"), (off, style.ORANGE, "off")):
         if which.any():
-            plane.plot(
-                late[which], share[which], "o", ms=3.2, mew=0.0, alpha=0.7, color=colour, label=name, gid=name
-            )
+            dots(plane, late[which], share[which], 3.2, colour, alpha=0.7, label=name, gid=name)
     if quality.lost.any():
         plane.plot([], [], "x", ms=5.0, color=style.INK, label=f"{int(quality.lost.sum())} lost")
     plane.set_xlabel("Arrives late by  [µs]")
@@ -56,24 +52,23 @@ def plot(quality: Quality) -> Figure:
     plane.legend(loc="upper right", fontsize=style.TINY, frameon=False, handletextpad=0.2)
     begin = _window(quality)
     shown = (quality.slot >= begin) & (quality.slot < begin + _MOST_SLOTS)
-    where = quality.slot[shown]
+    where, colours = quality.slot[shown], np.where(good[shown], style.BLUE, style.ORANGE)
     for ax, values, bound in ((force, share, 100.0 * limits.force), (arrival, late, _US * limits.arrival)):
         ax.axhspan(-bound, bound, color=style.FAINT, alpha=0.5, lw=0.0)
         ax.axhline(0.0, color=style.MUTED, lw=style.HAIR)
-        ax.vlines(
-            where, 0.0, values[shown], color=np.where(good[shown], style.BLUE, style.ORANGE), lw=style.THIN
-        )
-        ax.scatter(where, values[shown], s=7.0, color=np.where(good[shown], style.BLUE, style.ORANGE), lw=0.0)
+        ax.vlines(where, 0.0, values[shown], color=colours, lw=style.THIN)
+        ax.scatter(where, values[shown], s=7.0, color=colours, lw=0.0)
         gone = quality.slot[shown & np.isnan(values)]
         ax.plot(gone, np.zeros(gone.size), "x", ms=5.0, color=style.INK, gid="lost")
-        _symmetric(ax, values, bound)
+        reach = _reach(values, bound)
+        ax.set_ylim(-reach, reach)
     force.set_ylabel("Force  [%]")
     arrival.set_ylabel("Arrival  [µs]")
     force.tick_params(axis="x", labelbottom=False)
     arrival.set_xlabel("Slot" if begin == 0 else f"Slot; the {_MOST_SLOTS} with the worst dot")
     arrival.set_xlim(begin - 1.0, min(begin + _MOST_SLOTS, len(quality.wanted)))
-    told = f"{quality.rate:g} Hz, {quality.strategy}: {int(good.sum())} of {good.size} dots within limits"
-    force.set_title(told, loc="left", fontsize=style.SMALL)
+    within = f"{int(good.sum())} of {good.size} dots within limits"
+    heading(force, f"{quality.rate:g} Hz, {quality.strategy}: {within}")
     sign(figure, quality.hammer, "" if quality.ok else f"The run ended early: {quality.status}.")
     return figure
 
@@ -87,28 +82,21 @@ def plot_safe_rate(*safe_rates: SafeRate) -> Figure:
     """
     figure = new_figure(4.6)
     axes = figure.subplots(2, 1, sharex=True)
-    for number, one in enumerate(safe_rates):
+    for number, safe in enumerate(safe_rates):
         colour = (style.BLUE, style.GREEN, style.ORANGE)[number % 3]
         for ax, low, high in (
-            (axes[0], 100.0 * one.force_low, 100.0 * one.force_high),
-            (axes[1], _US * one.arrival_low, _US * one.arrival_high),
+            (axes[0], 100.0 * safe.force_low, 100.0 * safe.force_high),
+            (axes[1], _US * safe.arrival_low, _US * safe.arrival_high),
         ):
-            ax.fill_between(one.rates, low, high, color=colour, alpha=0.3, lw=0.0)
-            ax.plot(one.rates, low, color=colour, lw=style.THIN)
-            ax.plot(one.rates, high, color=colour, lw=style.THIN, label=one.strategy)
-            if np.isfinite(one.rate):
-                ax.axvline(one.rate, color=colour, lw=style.THIN, ls=(0, (4, 3)), gid="safe rate")
-        if np.isfinite(one.rate):
-            beside(
-                axes[0],
-                f"{'at least ' if one.at_least else ''}{one.rate:g} Hz",
-                (one.rate, 1.0),
-                (-3.0, -3.0 - 10.0 * number),
-                "right top",
-                xycoords=ALONG_X,
-                fontsize=style.SMALL,
-                color=colour,
-            )
+            ax.fill_between(safe.rates, low, high, color=colour, alpha=0.3, lw=0.0)
+            ax.plot(safe.rates, low, color=colour, lw=style.THIN)
+            ax.plot(safe.rates, high, color=colour, lw=style.THIN, label=safe.strategy)
+            if np.isfinite(safe.rate):
+                dashed(ax.axvline, safe.rate, color=colour, lw=style.THIN, gid="safe rate")
+        if np.isfinite(safe.rate):
+            text = f"{'at least ' if safe.at_least else ''}{safe.rate:g} Hz"
+            how = {"xycoords": ALONG_X, "fontsize": style.SMALL, "color": colour}
+            beside(axes[0], text, (safe.rate, 1.0), (-3.0, -3.0 - 10.0 * number), "right top", **how)
     limits = safe_rates[0].limits
     for ax, bound in ((axes[0], 100.0 * limits.force), (axes[1], _US * limits.arrival)):
         ax.axhspan(-bound, bound, color=style.FAINT, alpha=0.5, lw=0.0, zorder=0)
@@ -118,7 +106,7 @@ def plot_safe_rate(*safe_rates: SafeRate) -> Figure:
     axes[1].set_xlabel("Slots per second  [Hz]")
     if len(safe_rates) > 1:
         axes[0].legend(loc="lower left", fontsize=style.TINY, frameon=False)
-    remarks = [one.failure.text for one in safe_rates if one.failure is not None]
+    remarks = [safe.failure.text for safe in safe_rates if safe.failure is not None]
     sign(figure, safe_rates[0].hammer, *remarks[:1])
     return figure
 
@@ -132,14 +120,8 @@ def _box(ax: Axes, limits: Limits, late: FloatArray, share: FloatArray) -> None:
     ax.add_patch(box)
     ax.axhline(0.0, color=style.MUTED, lw=style.HAIR)
     ax.axvline(0.0, color=style.MUTED, lw=style.HAIR)
-    reach = [_reach(late, x), _reach(share, y)]
-    ax.set_xlim(-reach[0], reach[0])
-    ax.set_ylim(-reach[1], reach[1])
-
-
-def _symmetric(ax: Axes, values: FloatArray, bound: float) -> None:
-    reach = _reach(values, bound)
-    ax.set_ylim(-reach, reach)
+    across, up = _reach(late, x), _reach(share, y)
+    ax.set(xlim=(-across, across), ylim=(-up, up))
 
 
 def _reach(values: FloatArray, bound: float) -> float:

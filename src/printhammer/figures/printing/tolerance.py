@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import dots, heading
 from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -36,13 +37,10 @@ def plot(batch: ToleranceYield, *, bars: int = 8) -> Figure:
         outcome = batch.passed.astype(float)
         title = "with passing"
     _correlations(right, batch, outcome, bars)
-    right.set_title(f"Rank correlation {title}", loc="left", fontsize=style.SMALL)
+    heading(right, f"Rank correlation {title}")
     odd = int((batch.status != "ok").sum())
-    sign(
-        figure,
-        batch.hammer,
-        f"{odd} of {len(batch.status)} draws make no hammer that prints." if odd else "",
-    )
+    remark = f"{odd} of {len(batch.status)} draws make no hammer that prints." if odd else ""
+    sign(figure, batch.hammer, remark)
     return figure
 
 
@@ -56,31 +54,19 @@ def _rates(ax: Axes, batch: ToleranceYield) -> None:
     ax.set_ylabel("Hammers that print well up to here  [%]")
     for share in (95.0, 50.0):
         ax.axhline(share, color=style.FAINT, lw=style.THIN, zorder=0)
-    told = f"{len(batch.passed)} hammers"
-    ax.set_title(told, loc="left", fontsize=style.SMALL)
+    heading(ax, f"{len(batch.passed)} hammers")
 
 
 def _singles(ax: Axes, batch: ToleranceYield) -> None:
-    for which, colour, name in (
-        (batch.passed, style.BLUE, "pass"),
-        (~batch.passed, style.ORANGE, "do not"),
-    ):
-        ax.plot(
-            1e6 * batch.single_flight_time[which],
-            batch.single_force[which],
-            "o",
-            ms=3.2,
-            mew=0.0,
-            alpha=0.8,
-            color=colour,
-            label=f"{int(which.sum())} {name}",
-        )
+    flights, forces = 1e6 * batch.single_flight_time, batch.single_force
+    for which, colour, name in ((batch.passed, style.BLUE, "pass"), (~batch.passed, style.ORANGE, "do not")):
+        dots(ax, flights[which], forces[which], 3.2, colour, alpha=0.8, label=f"{int(which.sum())} {name}")
     ax.set_xmargin(0.05)
     ax.set_xlabel("Single-pulse flight time  [µs]")
     ax.set_ylabel("Single-pulse force  [N]")
     ax.legend(fontsize=style.TINY, frameon=False, loc="best")
-    share = f"{100.0 * batch.share:.1f} ± {100.0 * batch.share_error:.1f} % pass at {batch.rate:g} Hz"
-    ax.set_title(share, loc="left", fontsize=style.SMALL)
+    share = f"{100.0 * batch.share:.1f} ± {100.0 * batch.share_error:.1f} %"
+    heading(ax, f"{share} pass at {batch.rate:g} Hz")
 
 
 def _correlations(ax: Axes, batch: ToleranceYield, outcome: np.ndarray, bars: int) -> None:

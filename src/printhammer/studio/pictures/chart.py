@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -32,22 +33,11 @@ FULL: Final = (512, 512)
 GAP: Final = 65535
 """Code of a displacement that is not known."""
 
+map_key: Final = attrgetter("hammer", "text", "constants", "waveform", "slots", "overlap", "low", "high")
+"""Returns what the map of a state depends on."""
+
 _RATES_OF_PIECE: Final = 64
 _TRIED: Final = 9
-
-
-def map_key(state: State) -> tuple[Any, ...]:
-    """Return what the map depends on."""
-    return (
-        state.hammer,
-        state.text,
-        state.constants,
-        state.waveform,
-        slots_of(state),
-        state.overlap,
-        state.low,
-        state.high,
-    )
 
 
 def try_map(state: State, known: State | None) -> State:
@@ -70,7 +60,7 @@ def try_map(state: State, known: State | None) -> State:
     if known is not None and alike(state, known):
         return known
     rates = tuple(np.linspace(state.low, state.high, _TRIED).tolist())
-    trains = _trains(state.fired, rates, slots_of(state), state.overlap)
+    trains = _trains(state.fired, rates, state.slots, state.overlap)
     for rate, train in zip(rates, trains, strict=True):
         try_out(state, train, _end(state), f"a run of the map, at {rate:.4g} Hz,")
     return state
@@ -104,7 +94,7 @@ def map_frame(
     def piece(first: int, last: int) -> None:
         patience.check()
         fired = rates[first:last].tolist()
-        trains = _trains(state.fired, tuple(fired), slots_of(state), state.overlap)
+        trains = _trains(state.fired, tuple(fired), state.slots, state.overlap)
         runs = Ensemble(hammer, trains, end, states=rest, tolerance=DISPLAY_TOLERANCE)
         ok[first:last] = runs.run(times=times, x=x[first:last], threads=1).ok
 
@@ -112,7 +102,7 @@ def map_frame(
     in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE])
     low, high = _limits(hammer.position, hammer.platen, x)
     arrays = {"codes": codes_of(x, low, high)}
-    told = {
+    heading = {
         "rates": [state.low, state.high],
         "end": end,
         "low": low,
@@ -124,21 +114,11 @@ def map_frame(
         "detail": "full" if size == FULL else "preview",
         "reason": "",
     }
-    return frame("map", serial, arrays, **told)
-
-
-def no_map(serial: int, reason: str) -> bytes:
-    """Return a map that there is not, and why."""
-    return frame("map", serial, reason=reason, detail="none")
-
-
-def slots_of(state: State) -> str:
-    """Return which slots are fired: the pattern, or as many as there are pulses."""
-    return state.pattern or "1" * state.pulses
+    return frame("map", serial, arrays, **heading)
 
 
 def _end(state: State) -> float:
-    return (len(slots_of(state)) - 1) / state.low + TAIL
+    return (len(state.slots) - 1) / state.low + TAIL
 
 
 @lru_cache(maxsize=64)

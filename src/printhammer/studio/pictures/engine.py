@@ -17,6 +17,7 @@ from printhammer.studio.frames import frame
 
 if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.studio.states.state import State
     from printhammer.support.arrays import FloatArray
@@ -29,7 +30,7 @@ MOST_ENDS: Final = 20_000
 
 
 def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
-    """Return the curves of a single run, and the run.
+    """Return the curves of a single run, and the run, given up after `bounds.MOST_STEPS` steps.
 
     Raises
     ------
@@ -37,7 +38,7 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
         The state describes no hammer or drive that could be run.
     """
     hammer, drive = state.changed, state.drive
-    motion = run_of(state)
+    motion = limited_run(hammer, drive, end_of_run(drive, None), bounds.MOST_STEPS)
     times = points_of(motion.step_times)
     places, speeds = motion.at(times)
     force, values = motion.forces_at(times), drive.value(times)
@@ -52,7 +53,7 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
         "strobe x": np.float32(x),
         "strobe v": np.float32(v),
     }
-    told: dict[str, Any] = {
+    heading: dict[str, Any] = {
         "status": motion.status,
         "message": motion.message,
         "places": {
@@ -65,20 +66,9 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
         "peak": float(np.abs(values).max()),
         "fired": drive.times.tolist(),
         "steps": motion.steps,
-        "pulse": pulse_of(state),
+        "pulse": pulse_of(state.fired),
     }
-    return frame("motion", serial, arrays, **told), motion
-
-
-def run_of(state: State) -> Motion:
-    """Return the run of a state, given up after `bounds.MOST_STEPS` steps.
-
-    Raises
-    ------
-    InputError
-        As `motion_frame`.
-    """
-    return limited_run(state.changed, state.drive, end_of_run(state.drive, None), bounds.MOST_STEPS)
+    return frame("motion", serial, arrays, **heading), motion
 
 
 def limited_run(
@@ -112,41 +102,36 @@ def points_of(ends: FloatArray) -> FloatArray:
     return np.append(np.repeat(ends[:-1], counts) + part * np.repeat(steps, counts), ends[-1])
 
 
-def pulse_of(state: State) -> dict[str, list[float]]:
+def pulse_of(waveform: Waveform) -> dict[str, list[float]]:
     """Return the curve of one pulse for the waveform editor, s and A or N."""
-    waveform = state.fired
-    tau = np.linspace(0.0, min(waveform.support, _shown(state)), 160)
-    return {"t": tau.tolist(), "value": waveform.value(tau).tolist()}
-
-
-def _shown(state: State) -> float:
-    # An exponential decay goes on far beyond what can be seen.
-    waveform = state.fired
+    shown = waveform.support
     width, decay = getattr(waveform, "width", None), getattr(waveform, "decay", None)
-    if width is None or decay is None:
-        return waveform.support
-    return float(width + 5.0 * decay)
+    # An exponential decay goes on far beyond what can be seen.
+    if width is not None and decay is not None:
+        shown = min(shown, float(width + 5.0 * decay))
+    tau = np.linspace(0.0, shown, 160)
+    return {"t": tau.tolist(), "value": waveform.value(tau).tolist()}
 
 
 def dots_frame(serial: int, motion: Motion) -> bytes:
     """Return what the firings did, and the energies of the run."""
     dots = motion.dots
     struck = [dot for dot in dots if dot.struck]
-    energy = motion.energy
-    told: dict[str, Any] = {
+    forces, flights = [dot.peak_force or 0.0 for dot in struck], [dot.flight_time or 0.0 for dot in struck]
+    heading: dict[str, Any] = {
         "dots": [_fields(dot) for dot in dots],
-        "energy": _fields(energy),
+        "energy": _fields(motion.energy),
         "quality": {
             "fired": len(dots),
             "struck": len(struck),
             "extra": sum(dot.extra_contacts for dot in dots),
-            "force_low": min((dot.peak_force or 0.0 for dot in struck), default=None),
-            "force_high": max((dot.peak_force or 0.0 for dot in struck), default=None),
-            "flight_low": min((dot.flight_time or 0.0 for dot in struck), default=None),
-            "flight_high": max((dot.flight_time or 0.0 for dot in struck), default=None),
+            "force_low": min(forces, default=None),
+            "force_high": max(forces, default=None),
+            "flight_low": min(flights, default=None),
+            "flight_high": max(flights, default=None),
         },
     }
-    return frame("dots", serial, **told)
+    return frame("dots", serial, **heading)
 
 
 def _fields(made: Any) -> dict[str, Any]:

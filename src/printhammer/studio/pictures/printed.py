@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from operator import attrgetter
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.studio import bounds
 from printhammer.studio.frames import frame
-from printhammer.studio.work import Patience, try_through
+from printhammer.studio.work import Patience, try_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,12 +19,10 @@ if TYPE_CHECKING:
     from printhammer.printing.page.pattern import Pattern
     from printhammer.studio.states.state import State
 
+line_key: Final = attrgetter("hammer", "text", "constants", "waveform", "rate", "line")
+"""Returns what the line of a state depends on."""
+
 _TRIED: Final = 16
-
-
-def line_key(state: State) -> tuple[Any, ...]:
-    """Return what the line depends on."""
-    return (state.hammer, state.text, state.constants, state.waveform, state.rate, state.line)
 
 
 def check_line(state: State, pattern: Pattern) -> None:
@@ -35,7 +34,8 @@ def check_line(state: State, pattern: Pattern) -> None:
         It would.
     """
     train = PulseTrain(state.fired, rate=state.rate, pulses=_TRIED, overlap=state.overlap)
-    tried = try_through(state, train, _TRIED / state.rate, f"the first {_TRIED} slots of the line")
+    what = f"the first {_TRIED} slots of the line"
+    tried = try_out(state, train, _TRIED / state.rate, what, through=True)
     runs = int(pattern.dots.any(axis=2).sum())
     steps = runs * pattern.slots * tried.steps / _TRIED
     if steps > bounds.MOST_WORK:
@@ -76,7 +76,7 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
         "extra y": np.float32(page.extra_places[1]),
     }
     force, off = page.force_ratio[page.printed], page.placement_error[page.printed]
-    told = {
+    heading = {
         "wanted": int(page.lost.size),
         "good": int(page.good.sum()),
         "lost": int(page.lost.sum()),
@@ -87,4 +87,4 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
         "placement": [float(off.min()), float(off.max())] if off.size else None,
         "failed": int((page.status != "ok").sum()),
     }
-    return frame("line", serial, arrays, reason="", **told)
+    return frame("line", serial, arrays, reason="", **heading)

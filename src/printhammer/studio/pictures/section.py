@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from printhammer.drive.trains import PulseTrain
 from printhammer.run.problem import TOLERANCE
 from printhammer.studio.frames import frame
-from printhammer.studio.work import try_through
+from printhammer.studio.work import try_out
 
 if TYPE_CHECKING:
     from printhammer.studio.states.state import State
@@ -21,13 +22,11 @@ AT_ONCE: Final = (25, 50, 100)
 LATER: Final = (150, 200, 300, 400)
 """Points that follow where no newer state comes, with the exponent over the later half of them."""
 
+strobe_key: Final = attrgetter("hammer", "text", "constants", "waveform", "rate", "overlap")
+"""Returns what the strobe section of a state depends on."""
+
 VERDICT_WORK: Final = 16.0
 """Work of the verdict in that of all points before it: five times the firings, and the exponent over them."""
-
-
-def strobe_key(state: State) -> tuple[Any, ...]:
-    """Return what the strobe section depends on."""
-    return (state.hammer, state.text, state.constants, state.waveform, state.rate, state.overlap)
 
 
 def check_strobe(state: State) -> None:
@@ -39,13 +38,8 @@ def check_strobe(state: State) -> None:
         They do.
     """
     train = PulseTrain(state.fired, rate=state.rate, pulses=AT_ONCE[0], overlap=state.overlap)
-    try_through(
-        state,
-        train,
-        AT_ONCE[0] / state.rate,
-        f"the first {AT_ONCE[0]} strobe points",
-        TOLERANCE,
-    )
+    what = f"the first {AT_ONCE[0]} strobe points"
+    try_out(state, train, AT_ONCE[0] / state.rate, what, TOLERANCE, through=True)
 
 
 def strobe_frame(
@@ -60,21 +54,15 @@ def strobe_frame(
     """
     from printhammer.chaos.strobe.points import strobe
 
-    found = strobe(
-        state.changed,
-        rate=state.rate,
-        points=points,
-        waveform=state.fired,
-        overlap=state.overlap,
-        verdict=judged,
-    )
-    told: dict[str, Any] = {"status": found.status, "rate": state.rate, "verdict": None, "reason": ""}
-    told["exponent"] = exponent_so_far(state, points) if exponent else None
-    told["last"] = LATER[-1]
-    if found.verdict is not None:
-        told["verdict"] = {**found.verdict.as_dict(), "phrases": found.verdict.phrases}
-    arrays = {"x": np.float32(found.x), "v": np.float32(found.v)}
-    return frame("strobe", serial, arrays, **told)
+    fired: dict[str, Any] = {"waveform": state.fired, "overlap": state.overlap, "rate": state.rate}
+    section = strobe(state.changed, points=points, verdict=judged, **fired)
+    heading: dict[str, Any] = {"status": section.status, "rate": state.rate, "verdict": None, "reason": ""}
+    heading["exponent"] = exponent_so_far(state, points) if exponent else None
+    heading["last"] = LATER[-1]
+    if section.verdict is not None:
+        heading["verdict"] = {**section.verdict.as_dict(), "phrases": section.verdict.phrases}
+    arrays = {"x": np.float32(section.x), "v": np.float32(section.v)}
+    return frame("strobe", serial, arrays, **heading)
 
 
 def exponent_so_far(state: State, points: int) -> dict[str, Any] | None:
@@ -84,12 +72,7 @@ def exponent_so_far(state: State, points: int) -> dict[str, Any] | None:
     period = 1.0 / state.rate
     train = PulseTrain(state.fired, period=period, pulses=points, overlap=state.overlap)
     first = points // 2 + 1
-    found = strobe_exponent(state.changed, train, period, first=first, last=points)
-    if not (found.ok and found.smooth and math.isfinite(found.value)):
+    exponent = strobe_exponent(state.changed, train, period, first=first, last=points)
+    if not (exponent.ok and exponent.smooth and math.isfinite(exponent.value)):
         return None
-    return {"value": found.value, "standard_error": found.standard_error, "firings": [first, points]}
-
-
-def no_section(serial: int, reason: str) -> bytes:
-    """Return a section that there is not, and why."""
-    return frame("strobe", serial, reason=reason, verdict=None)
+    return {"value": exponent.value, "standard_error": exponent.standard_error, "firings": [first, points]}

@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.drive.waveforms.shapes import SHAPES
+from printhammer.hammer.names import range_of
 from printhammer.studio import bounds
 from printhammer.units import from_si
 
@@ -35,31 +36,6 @@ EQUATIONS: Final = {
 }
 """Equations of the laws of the paper; the others are told in the first line of their part."""
 
-_SPANS: Final = {"m": 100e-6, "s": 500e-6, "kg": 1e-3, "N": 10.0}
-_PLACES: Final = ("platen", "pack.front", "backstop.position")
-
-
-def range_of(hammer: Hammer, key: str) -> tuple[float, float]:
-    """Return the range of a constant's control, SI.
-
-    Places on the axis move by half the way from backstop to platen; other constants by the factor
-    `bounds.SPAN` up and down; what is zero has a range of its dimension.
-    """
-    constant = hammer.constants[key]
-    value = constant.si
-    if key in _PLACES:
-        places = [p for p in (hammer.position, hammer.front, hammer.platen) if p is not None]
-        reach = 0.5 * (max(places) - min(places)) or _SPANS["m"]
-        return value - reach, value + reach
-    if value == 0.0:
-        return 0.0, _SPANS.get(constant.si_unit, 1.0)
-    ends = (value / bounds.SPAN, value * bounds.SPAN)
-    low, high = min(ends), max(ends)
-    field = key.rpartition(".")[2]
-    if field == "restitution":
-        high = min(high, 1.0)
-    return low, high
-
 
 def describe(hammer: Hammer) -> dict[str, Any]:
     """Return everything about a hammer that the page shows: constants with range, unit, equation, source.
@@ -74,7 +50,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
     for key, constant in hammer.constants.items():
         if key.startswith("waveform."):
             continue
-        low, high = range_of(hammer, key)
+        span = range_of(hammer, key, bounds.SPAN)
         section = key.partition(".")[0]
         part = hammer.parts.get(section)
         constants.append(
@@ -85,9 +61,9 @@ def describe(hammer: Hammer) -> dict[str, Any]:
                 "meaning": constant.meaning,
                 "value": constant.si,
                 "unit": constant.si_unit,
-                "low": low,
-                "high": high,
-                "log": low > 0.0 and key not in _PLACES,
+                "low": span.low,
+                "high": span.high,
+                "log": span.logarithmic,
                 "status": constant.status,
                 "source": constant.source,
                 "equation": equation_of(section, getattr(part, "law", "")),

@@ -17,6 +17,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import SHAPES, Sampled, Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.hammer.names import range_of
 from printhammer.studio import bounds
 from printhammer.studio.states.shelf import Shelf
 from printhammer.support.constants import quantities
@@ -76,17 +77,17 @@ class State:
         InputError
             There is no such constant, it is too far from the hammer's own, or the hammer would not be one.
         """
-        from printhammer.studio.states.controls import range_of
-
         base = self.base
         for key, value in self.constants:
             constant = base.constants.get(key)
             if constant is None or key.startswith("waveform."):
                 known = ", ".join(name for name in base.constants if not name.startswith("waveform."))
                 raise InputError(f"constants.{key} is not known, expected one of {known}")
-            low, high = range_of(base, key)
-            if not low <= value <= high:
-                raise InputError(f"{key} = {value:.9g} {constant.si_unit}, expected {low:.6g} to {high:.6g}")
+            span = range_of(base, key, bounds.SPAN)
+            if not span.low <= value <= span.high:
+                raise InputError(
+                    f"{key} = {value:.9g} {constant.si_unit}, expected {span.low:.6g} to {span.high:.6g}"
+                )
         return base.replace(dict(self.constants), source="set in the studio") if self.constants else base
 
     @cached_property
@@ -109,6 +110,11 @@ class State:
         if shape == Sampled.shape:
             return Sampled.from_samples(fields["times"], fields["values"], quantity=fields["quantity"])
         return SHAPES[shape](**fields)
+
+    @property
+    def slots(self) -> str:
+        """Which slots are fired: the pattern, or as many as there are pulses."""
+        return self.pattern or "1" * self.pulses
 
     @cached_property
     def drive(self) -> PulseTrain:
@@ -144,12 +150,12 @@ def dropped_hammer(text: str) -> Hammer:
     return hammer
 
 
-def read_state(given: Any, shelf: Shelf | None = None) -> State:
+def read_state(content: Any, shelf: Shelf | None = None) -> State:
     """Read a state from a message.
 
     Parameters
     ----------
-    given
+    content
         What the message holds.
     shelf : Shelf, optional
         The hammers that are offered; by default those that come with the program.
@@ -160,7 +166,7 @@ def read_state(given: Any, shelf: Shelf | None = None) -> State:
         A key is missing, unknown, of the wrong kind or out of bounds: the page would never send it.
     """
     keys = set(State.__dataclass_fields__) - {"shelf"}
-    table = _table(given, "state", keys)
+    table = _table(content, "state", keys)
     missing = keys - set(table)
     if missing:
         raise ProtocolError(f"state.{min(missing)} is missing")
@@ -181,26 +187,26 @@ def read_state(given: Any, shelf: Shelf | None = None) -> State:
     )
 
 
-def _table(given: Any, where: str, known: set[str]) -> dict[str, Any]:
-    if not isinstance(given, dict):
+def _table(content: Any, where: str, known: set[str]) -> dict[str, Any]:
+    if not isinstance(content, dict):
         raise ProtocolError(f"{where} is expected to be a table")
-    for key in given:
+    for key in content:
         if key not in known:
             raise ProtocolError(f"{where} has the unknown key {key[:40]!r}")
-    return given
+    return content
 
 
-def _text(given: Any, where: str, most: int) -> str:
-    if not isinstance(given, str) or len(given) > most:
+def _text(content: Any, where: str, most: int) -> str:
+    if not isinstance(content, str) or len(content) > most:
         raise ProtocolError(f"{where} is expected to be a text of at most {most} characters")
-    return given
+    return content
 
 
-def _number(given: Any, where: str, low: float = -math.inf, high: float = math.inf) -> float:
-    if isinstance(given, bool) or not isinstance(given, int | float):
+def _number(content: Any, where: str, low: float = -math.inf, high: float = math.inf) -> float:
+    if isinstance(content, bool) or not isinstance(content, int | float):
         raise ProtocolError(f"{where} is expected to be a number")
     try:
-        value = float(given)
+        value = float(content)
     except OverflowError:
         value = math.inf
     if not (math.isfinite(value) and low <= value <= high):
@@ -208,65 +214,69 @@ def _number(given: Any, where: str, low: float = -math.inf, high: float = math.i
     return value
 
 
-def _count(given: Any) -> int:
-    if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= bounds.MOST_PULSES:
+def _count(content: Any) -> int:
+    if isinstance(content, bool) or not isinstance(content, int) or not 1 <= content <= bounds.MOST_PULSES:
         raise ProtocolError(f"pulses is expected to be a whole number from 1 to {bounds.MOST_PULSES}")
-    return given
+    return content
 
 
-def _choice(given: Any, where: str, known: tuple[str, ...]) -> Any:
-    if given not in known:
+def _choice(content: Any, where: str, known: tuple[str, ...]) -> Any:
+    if content not in known:
         raise ProtocolError(f"{where} is expected to be one of {', '.join(known)}")
-    return given
+    return content
 
 
-def _pattern(given: Any) -> str:
-    pattern = _text(given, "pattern", bounds.MOST_PULSES)
+def _pattern(content: Any) -> str:
+    pattern = _text(content, "pattern", bounds.MOST_PULSES)
     if pattern and not re.fullmatch(r"[01]*1[01]*", pattern):
         raise ProtocolError("pattern is expected to be of 0 and 1, with at least one 1")
     return pattern
 
 
-def _constants(given: Any) -> tuple[tuple[str, float], ...]:
-    if not isinstance(given, dict) or len(given) > 64:
+def _constants(content: Any) -> tuple[tuple[str, float], ...]:
+    if not isinstance(content, dict) or len(content) > 64:
         raise ProtocolError("constants is expected to be a table of at most 64 numbers")
     return tuple(
-        sorted((_text(key, "constants", 60), _number(value, key[:60])) for key, value in given.items())
+        sorted((_text(key, "constants", 60), _number(value, key[:60])) for key, value in content.items())
     )
 
 
-def _views(given: Any) -> tuple[str, ...]:
-    if not isinstance(given, list) or len(given) > len(VIEWS):
+def _views(content: Any) -> tuple[str, ...]:
+    if not isinstance(content, list) or len(content) > len(VIEWS):
         raise ProtocolError("views is expected to be a list of views")
-    return tuple(_choice(view, "views", VIEWS) for view in given)
+    return tuple(_choice(view, "views", VIEWS) for view in content)
 
 
-def _waveform(given: Any) -> tuple[tuple[str, Any], ...] | None:
-    if given is None:
+def _waveform(content: Any) -> tuple[tuple[str, Any], ...] | None:
+    if content is None:
         return None
-    if not isinstance(given, dict) or not isinstance(given.get("shape"), str) or given["shape"] not in SHAPES:
+    if (
+        not isinstance(content, dict)
+        or not isinstance(content.get("shape"), str)
+        or content["shape"] not in SHAPES
+    ):
         raise ProtocolError(f"waveform.shape is expected to be one of {', '.join(SHAPES)}")
-    shape = given["shape"]
+    shape = content["shape"]
     if shape == Sampled.shape:
-        table = _table(given, "waveform", {"shape", "times", "values", "quantity"})
+        table = _table(content, "waveform", {"shape", "times", "values", "quantity"})
         columns = {name: _samples(table.get(name), f"waveform.{name}") for name in ("times", "values")}
         quantity = _choice(table.get("quantity"), "waveform.quantity", ("current", "force"))
         return (("shape", shape), *columns.items(), ("quantity", quantity))
     fields = quantities(SHAPES[shape])
-    table = _table(given, "waveform", {"shape", "quantity", *fields})
-    found: list[tuple[str, Any]] = [("shape", shape)]
+    table = _table(content, "waveform", {"shape", "quantity", *fields})
+    pairs: list[tuple[str, Any]] = [("shape", shape)]
     for name, note in fields.items():
         if name not in table:
             raise ProtocolError(f"waveform.{name} is missing")
         most = bounds.LARGEST_CURRENT if note.si == "A" else bounds.LONGEST_TIME
-        found.append((name, _number(table[name], f"waveform.{name}", -most, most)))
+        pairs.append((name, _number(table[name], f"waveform.{name}", -most, most)))
     if "quantity" in table:
-        found.append(("quantity", _choice(table["quantity"], "waveform.quantity", ("current", "force"))))
-    return tuple(found)
+        pairs.append(("quantity", _choice(table["quantity"], "waveform.quantity", ("current", "force"))))
+    return tuple(pairs)
 
 
-def _samples(given: Any, where: str) -> tuple[float, ...]:
-    if not isinstance(given, list) or len(given) > bounds.MOST_SAMPLES:
+def _samples(content: Any, where: str) -> tuple[float, ...]:
+    if not isinstance(content, list) or len(content) > bounds.MOST_SAMPLES:
         raise ProtocolError(f"{where} is expected to be a list of at most {bounds.MOST_SAMPLES} numbers")
     most = bounds.LARGEST_CURRENT if where.endswith("values") else bounds.LONGEST_TIME
-    return tuple(_number(value, where, -most, most) for value in given)
+    return tuple(_number(value, where, -most, most) for value in content)

@@ -37,11 +37,8 @@ def python_of(state: State) -> str:
     else:
         lines.append(f"hammer = ph.load({_name(state)!r})")
     if state.constants:
-        lines.append("hammer = hammer.replace(")
-        lines.append("    {")
-        lines += [f"        {key!r}: {value!r}," for key, value in state.constants]
-        lines.append("    }")
-        lines.append(")")
+        changes = [f"        {key!r}: {value!r}," for key, value in state.constants]
+        lines += ["hammer = hammer.replace(", "    {", *changes, "    }", ")"]
     waveform = "hammer.waveform"
     if state.waveform is not None:
         made = state.fired
