@@ -8,7 +8,7 @@ of eight slots; so does the open loop, and both fire two pulses at all distances
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -25,7 +25,7 @@ from printhammer.printing.dots.slots import slots_of
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
-from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.simulate import simulate
@@ -92,27 +92,14 @@ class FeedbackStrategy:
         return [loop.drive(self.controller.driver.edge) for loop in loops]
 
 
-@dataclass(frozen=True)
-class ObservedRun:
-    """One run of the closed loop, and what the controller saw of it.
+class ObservedRun(Declared):
+    """One run of the closed loop, and what the controller saw of it."""
 
-    Attributes
-    ----------
-    pattern : str
-        The slots, 1 where a dot is wanted.
-    motion : Motion
-        The run.
-    times, shown : array
-        Times of the samples that were looked at, s, and what the sensor showed, m.
-    due : array
-        Times at which touches were wanted, s.
-    """
-
-    pattern: str
-    motion: Motion = field(repr=False)
-    times: FloatArray = field(repr=False)
-    shown: FloatArray = field(repr=False)
-    due: FloatArray = field(repr=False)
+    pattern: str = part("the slots, 1 where a dot is wanted")
+    motion: Motion = part("the run", repr=False)
+    times: FloatArray = column("s", "times of the samples that were looked at", "sample")
+    shown: FloatArray = column("m", "what the sensor showed", "sample")
+    due: FloatArray = column("s", "times at which touches were wanted", "dot")
 
 
 _DOTS: Final = "strategy pattern dot"

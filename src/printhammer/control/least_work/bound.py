@@ -14,7 +14,6 @@ fall counts as its positive work, and a backstop gives back less of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -22,6 +21,7 @@ import numpy as np
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.static_force import StaticForce
+from printhammer.results import Declared, scalar
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.ledger import stored_energy
 from printhammer.run.simulate import CYCLE
@@ -38,29 +38,14 @@ _SPEEDS: Final = 32  # Speeds with which an armature is thrown at the backstop
 _STROBES: Final = 4001  # Instants at which it is looked at
 
 
-@dataclass(frozen=True)
-class Bound:
-    """Least positive work of the coil, J.
+class Bound(Declared):
+    """Least positive work of the coil."""
 
-    Attributes
-    ----------
-    first : float
-        For a dot from rest.
-    later : float
-        For each dot after it, thrown from where the armature turned before the pack.
-    bounced : float
-        For each dot after it, thrown after a bounce off the backstop.
-    turn : float
-        Displacement nearest to the paper from which a later dot can be thrown, m.
-    loading : float
-        Loading work of the pack for one dot.
-    """
-
-    first: float
-    later: float
-    bounced: float
-    turn: float
-    loading: float
+    first: float = scalar("J", "for a dot from rest")
+    later: float = scalar("J", "for each dot after it, thrown from where the armature turned before the pack")
+    bounced: float = scalar("J", "for each dot after it, thrown after a bounce off the backstop")
+    turn: float = scalar("m", "displacement nearest to the paper from which a later dot can be thrown")
+    loading: float = scalar("J", "loading work of the pack for one dot")
 
     def burst(self, dots: int) -> float:
         """Return the least positive work of a burst of some dots, J."""

@@ -23,14 +23,13 @@ from printhammer.control.least_work.coil_force import CoilForce
 from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
 from printhammer.control.least_work.slot import Task
-from printhammer.control.least_work.supply import SupplyCheck
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of, rate_of
-from printhammer.results import Result, part, scalar
+from printhammer.results import Declared, Result, column, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
@@ -81,6 +80,22 @@ _SETTLED: Final = 1e-2
 
 class NoBurstError(PrinthammerError):
     """No current within the bounds was found that prints the burst."""
+
+
+class SupplyCheck(Declared):
+    """One burst when the supply gives another current than it was planned for, run by run."""
+
+    changes: FloatArray = column("1", "relative change of every current: 0.03 for 3 % more", "run")
+    adequate: npt.NDArray[np.int64] = column(
+        "1", "number of dots in their slots with the force asked for, and without extra contacts", "run"
+    )
+    weakest: FloatArray = column(
+        "1", "force of the weakest dot, in parts of that of the single pulse; 0 where one is lost", "run"
+    )
+    spread: FloatArray = column(
+        "s", "largest deviation of a touch from its slot", "run", more="NaN where a dot is lost"
+    )
+    status: npt.NDArray[np.str_] = column("", "how the runs ended", "run")
 
 
 class LeastWork(Result, rows="node"):

@@ -7,11 +7,11 @@ second ones, and so on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from printhammer.results import Declared, column
 from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -34,17 +34,13 @@ _AFTER: Final = 1e-9
 """Time after the end of a contact, s, at which the next run begins: outside the pack, and before all else."""
 
 
-@dataclass(frozen=True)
-class ExtraDots:
-    """Extra contacts, E of them."""
+class ExtraDots(Declared):
+    """Extra contacts."""
 
-    member: IntArray = field(repr=False)
-    firing: IntArray = field(repr=False)
-    """To which firing of which member they belong, shape (E,)."""
-    touch: FloatArray = field(repr=False)
-    """Time of touch, s, shape (E,)."""
-    peak_force: FloatArray = field(repr=False)
-    """Largest pack force, N, shape (E,)."""
+    member: IntArray = column("1", "to which member they belong", "extra")
+    firing: IntArray = column("1", "to which firing of it", "extra")
+    touch: FloatArray = column("s", "time of touch", "extra")
+    peak_force: FloatArray = column("N", "largest pack force", "extra")
 
 
 def extra_dots(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import SinglePulse
+from printhammer.results import Declared, column, part
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,35 +25,22 @@ FAULTS: Final = ("not run", "lost", "extra contacts", "force", "arrival")
 """What may be wrong with a wanted dot, in the order in which it is told; "not run": the run ended before."""
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """How far dots are off: arrays of shape (members, firings).
+class Judgement(Declared):
+    """How far dots are off."""
 
-    Attributes
-    ----------
-    wanted : bool array
-        Where a dot is judged; the others are False and NaN in all that follows.
-    run : bool array
-        Whether the run came so far.
-    lost : bool array
-        Whether the firing made no dot.
-    force_deviation : array
-        Peak force less that of the single pulse, in parts of it; NaN for a lost dot.
-    arrival_deviation : array
-        Touch less slot time and single-pulse flight time, s; NaN for a lost dot.
-    extra_contacts : int array
-        Further pack contacts.
-    limits : Limits
-        By which it is judged.
-    """
-
-    wanted: BoolArray
-    run: BoolArray
-    lost: BoolArray
-    force_deviation: FloatArray
-    arrival_deviation: FloatArray
-    extra_contacts: npt.NDArray[np.int64]
-    limits: Limits
+    wanted: BoolArray = column(
+        "1", "where a dot is judged; the others are False and NaN in all that follows", "member firing"
+    )
+    run: BoolArray = column("1", "whether the run came so far", "member firing")
+    lost: BoolArray = column("1", "whether the firing made no dot", "member firing")
+    force_deviation: FloatArray = column(
+        "1", "peak force less that of the single pulse, in parts of it; NaN for a lost dot", "member firing"
+    )
+    arrival_deviation: FloatArray = column(
+        "s", "touch less slot time and single-pulse flight time", "member firing", more="NaN for a lost dot"
+    )
+    extra_contacts: npt.NDArray[np.int64] = column("1", "further pack contacts", "member firing")
+    limits: Limits = part("by which it is judged")
 
     @property
     def faults(self) -> npt.NDArray[np.int64]:

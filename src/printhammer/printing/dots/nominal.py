@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from printhammer.drive.input import read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
+from printhammer.results import Declared, scalar
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
@@ -22,36 +22,20 @@ WAIT: Final = 4e-3
 """Time after the last firing of a run, s, within which its dot and extra contacts are waited for."""
 
 
-@dataclass(frozen=True)
-class SinglePulse:
+class SinglePulse(Declared):
     """The dot of one pulse from rest, as far as dots are judged by it."""
 
-    force: float
-    """Largest pack force, N."""
-    flight_time: float
-    """From firing to touch, s."""
+    force: float = scalar("N", "largest pack force")
+    flight_time: float = scalar("s", "from firing to touch")
 
 
-@dataclass(frozen=True)
 class Nominal(SinglePulse):
-    """What one pulse from rest prints, beside force and flight time.
+    """What one pulse from rest prints."""
 
-    Attributes
-    ----------
-    impact_speed : float
-        At touch, m/s.
-    indentation : float
-        Largest indentation, m.
-    loading_work : float
-        Work done on the pack up to its largest indentation, J.
-    pack_loss : float
-        Energy that the pack keeps, J.
-    """
-
-    impact_speed: float
-    indentation: float
-    loading_work: float
-    pack_loss: float
+    impact_speed: float = scalar("m/s", "at touch")
+    indentation: float = scalar("m", "largest indentation")
+    loading_work: float = scalar("J", "work done on the pack up to its largest indentation")
+    pack_loss: float = scalar("J", "energy that the pack keeps")
 
 
 def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Nominal:

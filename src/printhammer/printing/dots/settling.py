@@ -12,6 +12,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import pulse_of
+from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
 
@@ -31,29 +32,16 @@ _SPACING: Final = 1e-6
 _BISECTIONS: Final = 40
 
 
-@dataclass(frozen=True)
-class Wear:
-    """What the backstop bears.
+class Wear(Declared):
+    """What the backstop bears."""
 
-    Attributes
-    ----------
-    touches : int
-        Number of touches.
-    impulse : float
-        Sum over the touches of the change of momentum of the armature, N s.
-    loss : float
-        Energy that the backstop takes, J.
-    largest_speed : float
-        Largest speed at touch, m/s.
-    largest_force : float or None
-        Largest contact force, N; None on a rigid backstop, where it is not finite.
-    """
-
-    touches: int
-    impulse: float
-    loss: float
-    largest_speed: float
-    largest_force: float | None
+    touches: int = part("number of touches")
+    impulse: float = scalar("N s", "sum over the touches of the change of momentum of the armature")
+    loss: float = scalar("J", "energy that the backstop takes")
+    largest_speed: float = scalar("m/s", "largest speed at touch")
+    largest_force: float | None = scalar(
+        "N", "largest contact force", more="None on a rigid backstop, where it is not finite"
+    )
 
 
 @dataclass(frozen=True)
@@ -70,36 +58,22 @@ class Rebound:
         return self.end - self.start
 
 
-@dataclass(frozen=True)
-class Settling:
-    """What follows a single pulse.
+class Settling(Declared):
+    """What follows a single pulse."""
 
-    Attributes
-    ----------
-    settle_out : float or None
-        Time from the firing until the armature stays within `SETTLED` of the stroke from its rest, s; None
-        where it does not within `CYCLE`.
-    rebounds : int
-        Number of rebounds from the backstop higher than `SETTLED` of the stroke.
-    highest : float
-        Height of the highest rebound, in parts of the stroke; 0 without any.
-    restitution : float or None
-        Speed after the first touch of the backstop over the speed before; None where it does not leave.
-    wear : Wear
-        What the backstop bears until the end of the run.
-    coil_work : float
-        Net work of the coil, J.
-    status : str
-        How the run ended.
-    """
-
-    settle_out: float | None
-    rebounds: int
-    highest: float
-    restitution: float | None
-    wear: Wear
-    coil_work: float
-    status: str
+    settle_out: float | None = scalar(
+        "s",
+        "time from the firing until the armature stays within `SETTLED` of the stroke from its rest",
+        more="None where it does not within `CYCLE`",
+    )
+    rebounds: int = part("number of rebounds from the backstop higher than `SETTLED` of the stroke")
+    highest: float = part("height of the highest rebound, in parts of the stroke; 0 without any")
+    restitution: float | None = part(
+        "speed after the first touch of the backstop over the speed before; None where it does not leave"
+    )
+    wear: Wear = part("what the backstop bears until the end of the run")
+    coil_work: float = scalar("J", "net work of the coil")
+    status: str = part("how the run ended")
 
 
 def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from printhammer.printing.dots.judging import judge
 from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.slots import FIRST_SLOT
 from printhammer.printing.dots.strategy import checked_drives, open_loop
+from printhammer.results import Declared, column, part
 from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -37,28 +37,20 @@ class Case(NamedTuple):
     rate: float
 
 
-@dataclass(frozen=True)
-class Trial:
+class Trial(Declared):
     """What became of all patterns in all cases: members by case first, then by pattern."""
 
-    cases: tuple[Case, ...]
-    """Hammers and rates."""
-    patterns: tuple[tuple[int, ...], ...]
-    """Numbers of the slots at which dots are wanted."""
-    drives: tuple[Drive, ...]
-    """What drove each member."""
-    slots: npt.NDArray[np.int64]
-    """Number of the slot of each firing; -1 where there is none. Shape (members, firings)."""
-    due: FloatArray
-    """Time of that slot, s, shape (members, firings)."""
-    ends: FloatArray
-    """Ends of the runs, s, shape (members,)."""
-    dots: DotTable
-    """What the firings did."""
-    judgement: Judgement
-    """How far off they are."""
-    statuses: tuple[str, ...]
-    """How the runs ended."""
+    cases: tuple[Case, ...] = part("hammers and rates")
+    patterns: tuple[tuple[int, ...], ...] = part("numbers of the slots at which dots are wanted")
+    drives: tuple[Drive, ...] = part("what drove each member")
+    slots: npt.NDArray[np.int64] = column(
+        "1", "number of the slot of each firing; -1 where there is none", "member firing"
+    )
+    due: FloatArray = column("s", "time of that slot", "member firing")
+    ends: FloatArray = column("s", "ends of the runs", "member")
+    dots: DotTable = part("what the firings did")
+    judgement: Judgement = part("how far off they are")
+    statuses: tuple[str, ...] = part("how the runs ended")
 
     @property
     def passed(self) -> npt.NDArray[np.bool_]:

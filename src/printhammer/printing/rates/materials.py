@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
@@ -11,6 +10,7 @@ from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -40,23 +40,12 @@ PACK_DAMPINGS: Final = (0.1, 0.4)
 """Damping ratios of packs of a spring and a dashpot."""
 
 
-@dataclass(frozen=True)
-class Material:
-    """What is other than in the hammer that is studied.
+class Material(Declared):
+    """What is other than in the hammer that is studied."""
 
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    label : str
-        What it is, in a few words.
-    changes : mapping
-        Constants, options and parts as `Hammer.replace` takes them.
-    """
-
-    kind: str
-    label: str
-    changes: Mapping[str, Any]
+    kind: str = part("one of `KINDS`")
+    label: str = part("what it is, in a few words")
+    changes: Mapping[str, Any] = part("constants, options and parts as `Hammer.replace` takes them")
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

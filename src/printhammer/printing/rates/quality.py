@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,7 +16,7 @@ from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.settling import wear_of
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
 from printhammer.printing.dots.strategy import checked_drives, name_of, open_loop
-from printhammer.results import Result, column, derived, part, scalar
+from printhammer.results import Declared, Result, column, derived, part, scalar
 from printhammer.run.coil_work import squared_current
 from printhammer.run.ensemble import DotTable
 from printhammer.run.problem import TOLERANCE
@@ -50,25 +49,14 @@ MOST_SLOTS: Final = 20_000
 """Number of slots above which a pattern is refused."""
 
 
-@dataclass(frozen=True)
-class Spread:
-    """How some numbers are spread.
+class Spread(Declared):
+    """How some numbers are spread; of none, all but their number is NaN."""
 
-    Attributes
-    ----------
-    count : int
-        How many there are.
-    mean, deviation : float
-        Mean, and standard deviation about it; NaN without any.
-    low, high : float
-        Least and largest.
-    """
-
-    count: int
-    mean: float
-    deviation: float
-    low: float
-    high: float
+    count: int = part("how many there are")
+    mean: float = part("mean")
+    deviation: float = part("standard deviation about the mean")
+    low: float = part("least")
+    high: float = part("largest")
 
     @property
     def peak_to_peak(self) -> float:

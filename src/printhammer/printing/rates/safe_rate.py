@@ -11,7 +11,6 @@ hammer settles, so that below that every dot is a single pulse from rest.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.slots import LEAD_IN, SLOTS, cycle_with_lead_in, eight_slot_patterns, slots_of
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case, attempt
-from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
@@ -56,36 +55,23 @@ MOST_RATES: Final = 10_000
 _AT_ONCE: Final = 16
 
 
-@dataclass(frozen=True)
-class Failure:
-    """The dot that is off first at the first rate that does not pass.
+class Failure(Declared):
+    """The dot that is off first at the first rate that does not pass."""
 
-    Attributes
-    ----------
-    rate : float
-        Slots per second, Hz.
-    pattern : str
-        The slots up to this dot, 1 where a dot is wanted; in the cycle the eight slots that end with it.
-    in_cycle : bool
-        Whether it is a dot of the cycle.
-    slot : int
-        Number of its slot; in the cycle counted from the end of the lead-in.
-    fault : str
-        One of `printhammer.printing.dots.judging.FAULTS`.
-    deviation : float
-        Of the force, in parts of the single-pulse force, or of the arrival, s, or number of extra contacts;
-        NaN where the fault is another one.
-    share : float
-        Part of the patterns that do not pass at this rate; of a failure in the cycle, part of its dots.
-    """
-
-    rate: float
-    pattern: str
-    in_cycle: bool
-    slot: int
-    fault: str
-    deviation: float
-    share: float
+    rate: float = scalar("Hz", "slots per second")
+    pattern: str = part(
+        "the slots up to this dot, 1 where a dot is wanted; in the cycle the eight slots that end with it"
+    )
+    in_cycle: bool = part("whether it is a dot of the cycle")
+    slot: int = part("number of its slot; in the cycle counted from the end of the lead-in")
+    fault: str = part("one of `printhammer.printing.dots.judging.FAULTS`")
+    deviation: float = part(
+        "of the force, in parts of the single-pulse force, or of the arrival, s, or number of extra contacts",
+        more="NaN where the fault is another one",
+    )
+    share: float = part(
+        "part of the patterns that do not pass at this rate; of a failure in the cycle, part of its dots"
+    )
 
     @property
     def text(self) -> str:

@@ -7,12 +7,12 @@ and on the number of the sample only, so that a closed loop is the same to the b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.results import Declared, part, scalar
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -45,22 +45,8 @@ class Samples(NamedTuple):
         return Samples(self.times[which], self.shown[which], self.used[which], self.error)
 
 
-@dataclass(frozen=True)
-class PositionSensor:
+class PositionSensor(Declared):
     """A position sensor.
-
-    Attributes
-    ----------
-    noise : float
-        Standard deviation of a sample, in parts of the way from backstop to pack; normal, white.
-    delay : float
-        From the instant of a sample until it can be used, s.
-    interval : float
-        Between samples, s.
-    step : float
-        Quantisation, in parts of the way from backstop to pack; 0 for none.
-    seed : int
-        Of the noise.
 
     Raises
     ------
@@ -68,11 +54,16 @@ class PositionSensor:
         A number is negative or not finite, an interval not positive, or the seed is not a whole number.
     """
 
-    noise: float = 0.01
-    delay: float = 20e-6
-    interval: float = 2e-6
-    step: float = 2.0**-10
-    seed: int = 0
+    noise: float = part(
+        "standard deviation of a sample, in parts of the way from backstop to pack; normal, white",
+        default=0.01,
+    )
+    delay: float = scalar("s", "from the instant of a sample until it can be used", default=20e-6)
+    interval: float = scalar("s", "between samples", default=2e-6)
+    step: float = part(
+        "quantisation, in parts of the way from backstop to pack; 0 for none", default=2.0**-10
+    )
+    seed: int = part("of the noise", default=0)
 
     def __post_init__(self) -> None:
         for name, unit in (("noise", ""), ("delay", " s"), ("interval", " s"), ("step", "")):
