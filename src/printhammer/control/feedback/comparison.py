@@ -20,7 +20,7 @@ from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
-from printhammer.printing.dots.nominal import WAIT, rate_of
+from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.slots import slots_of
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case, attempt
@@ -222,7 +222,7 @@ def feedback(
     InputError
         An argument is not what is described above, or the driver is too weak for the hammer.
     """
-    speed = rate_of(rate)
+    speed = read_positive(rate, "Hz", "rate")
     wide = None if edge is None else read_positive(edge, "s", "edge")
     driver = driver_of(hammer, read_positive(current, "A", "current"), wide)
     seeing = PositionSensor() if sensor is None else sensor

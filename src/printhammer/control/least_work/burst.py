@@ -28,7 +28,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of, rate_of
+from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of
 from printhammer.results import Declared, Result, column, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
@@ -371,7 +371,7 @@ def least_work(
     NoBurstError
         No current within the bounds was found.
     """
-    period = 1.0 / rate_of(rate)
+    period = 1.0 / read_positive(rate, "Hz", "rate")
     count = read_count(dots, "dots")
     if count > MOST_DOTS:
         raise InputError(f"dots = {count}, expected at most {MOST_DOTS}")

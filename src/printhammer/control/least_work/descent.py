@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 LOST: Final = 25.0  # What a run that failed counts as, in parts of the tolerances
-MISSED: Final = 0.05  # Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`
-SLACK: Final = 8e-3  # Lack of force up to which a dot has the force asked for, in `FORCE`
+_MISSED: Final = 0.05  # Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`
+_SLACK: Final = 8e-3  # Lack of force up to which a dot has the force asked for, in `FORCE`
 ARRIVAL: Final = 20e-6  # Tolerance by which a time of arrival is measured, s
 FORCE: Final = 0.05  # Tolerance by which a force is measured, relative
 _DIFFERENCE: Final = 1e-5  # Difference from which derivatives are taken
@@ -72,6 +72,19 @@ def descend(
         constraints=asked,
     )
     return np.asarray(found.x, dtype=np.float64), float(found.fun)
+
+
+def deviations(late: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return missed arrivals and spare forces, in parts of the tolerances.
+
+    Of dots that come `late`, s, not finite where there is none, with a `force` in parts of that asked for.
+    """
+    return np.where(np.isfinite(late), late / ARRIVAL, LOST), (force - 1.0) / FORCE
+
+
+def met(missed: float, spare: float) -> bool:
+    """Return whether a dot of such deviations does."""
+    return abs(missed) < _MISSED and spare > -_SLACK
 
 
 def best_of(

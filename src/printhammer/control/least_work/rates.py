@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.control.least_work.burst import NoBurstError, least_work
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.dots.nominal import rate_of
 from printhammer.results import Result, column, coordinate, part, scalar
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def least_work_rates(
     """
     if isinstance(rates, str) or not len(rates):
         raise InputError(f"rates = {rates!r}, expected at least one rate in a sequence")
-    asked = np.array([rate_of(rate) for rate in rates])
+    asked = np.array([read_positive(rate, "Hz", "rate") for rate in rates])
     rows: list[tuple[float, float, float, float, int, str]] = []
     for number, rate in enumerate(asked.tolist()):
         try:

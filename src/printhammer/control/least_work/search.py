@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.least_work.descent import (
-    ARRIVAL,
-    FORCE,
-    LOST,
-    MISSED,
-    SLACK,
-    best_of,
-    descend,
-    sobol,
-)
+from printhammer.control.least_work.descent import best_of, descend, deviations, met, sobol
 from printhammer.control.least_work.slot import RELOADING, SlotState, node_times
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Sampled
@@ -113,8 +104,7 @@ def printing_current(
     """
 
     def asked(found: Outcomes) -> tuple[FloatArray, FloatArray]:
-        missed = np.where(np.isnan(found.arrival), LOST, (found.arrival - arrival) / ARRIVAL)
-        return missed, (found.force / task.force - 1.0) / FORCE
+        return deviations(found.arrival - arrival, found.force / task.force)
 
     def measured(currents: FloatArray) -> FloatArray:
         found = task.run(begin, currents, duration, task.tolerance)
@@ -124,7 +114,7 @@ def printing_current(
         found = task.run(begin, currents[np.newaxis], duration, task.tolerance)
         missed, above = asked(found)
         clean = found.ok[0] and found.extra_contacts[0] == 0 and found.reloading[0] < _LAGS * RELOADING
-        return bool(clean and abs(missed[0]) < MISSED and above[0] > -SLACK)
+        return bool(clean and met(missed[0], above[0]))
 
     def attempt(start: FloatArray, rounds: int = _ROUNDS) -> tuple[float, FloatArray] | None:
         currents, cost = _descend(task, measured, begin.current, start, duration, rounds, printing=True)

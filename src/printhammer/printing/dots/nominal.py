@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from printhammer.drive.input import read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.results import Declared, scalar
@@ -107,14 +106,3 @@ def pulse_of(hammer: Hammer, waveform: Waveform | None = None) -> Waveform:
     if pulse is None:
         raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")
     return pulse
-
-
-def rate_of(value: float | str, name: str = "rate") -> float:
-    """Read slots per second, Hz, or text with a unit.
-
-    Raises
-    ------
-    InputError
-        Not a positive number or rate.
-    """
-    return read_positive(value, "Hz", name)

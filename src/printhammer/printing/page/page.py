@@ -17,11 +17,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.extra_dots import extra_dots
 from printhammer.printing.dots.judging import FAULTS
 from printhammer.printing.dots.limits import PRESETS, Limits
-from printhammer.printing.dots.nominal import Nominal, nominal, rate_of
+from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.slots import slots_of
 from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
 from printhammer.printing.dots.trial import Case, Trial, attempt
@@ -272,7 +273,7 @@ def print_page(
     pattern = Pattern.from_text(what) if isinstance(what, str) else what
     if not isinstance(pattern, Pattern):
         raise InputError(f"{what!r} is expected to be a pattern or a text")
-    often = rate_of(rate)
+    often = read_positive(rate, "Hz", "rate")
     if pattern.wanted > _MOST_DOTS:
         raise InputError(f"{pattern.wanted} dots are wanted, expected {_MOST_DOTS} at most")
     used = head_of(pattern.wires) if head is None else head

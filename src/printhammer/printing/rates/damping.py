@@ -20,8 +20,7 @@ from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
 from printhammer.printing.dots.settling import settle
 from printhammer.printing.rates.materials import Material, materials
 from printhammer.printing.rates.perturbation import changed
-from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_grid
-from printhammer.printing.rates.safe_rates import safe_rates
+from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_grid, safe_rates
 from printhammer.results import Result, column, derived, part, scalar
 from printhammer.results.declare import columns_of
 from printhammer.run.ensemble import DISPLAY_TOLERANCE

@@ -11,7 +11,7 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.judging import FAULTS, judge
 from printhammer.printing.dots.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
-from printhammer.printing.dots.nominal import WAIT, rate_of
+from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.settling import wear_of
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
@@ -266,7 +266,7 @@ def quality(
         An argument is not what is described above; a hammer whose single pulse makes no dot; a strategy whose
         drives do not fit.
     """
-    often = rate_of(rate)
+    often = read_positive(rate, "Hz", "rate")
     apart = read_positive(pitch, "m", "pitch")
     wanted = cycle_with_lead_in() if pattern is None else pattern_of(pattern)
     judged_from = LEAD_IN if pattern is None else 0

@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
 
-from printhammer.drive.input import read_count
+from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.names import unknown
 from printhammer.printing.dots.limits import Limits
-from printhammer.printing.dots.nominal import nominal, rate_of, single_pulses
+from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case
 from printhammer.printing.rates.perturbation import changed
-from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_grid
-from printhammer.printing.rates.safe_rates import all_pass, safe_rates
+from printhammer.printing.rates.safe_rate import FIRST, LAST, all_pass, grid_notes, rate_grid, safe_rates
 from printhammer.results import Result, column, derived, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
@@ -202,7 +201,7 @@ def tolerance_yield(
         raise InputError(f"number = {count}, expected at most {MOST} hammers")
     if judged_by not in get_args(Judged):
         raise InputError(f"judged_by = {judged_by!r}, expected one of {', '.join(get_args(Judged))}")
-    grid = rate_grid(first, last, step) if rate is None else np.array([rate_of(rate)])
+    grid = rate_grid(first, last, step) if rate is None else np.array([read_positive(rate, "Hz", "rate")])
     bounds = Limits() if limits is None else limits
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     spread = spreads_of(hammer, spreads)
