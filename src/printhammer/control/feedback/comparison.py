@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.control.feedback.closed_loop import closed_loops
+from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.driver import LARGEST_CURRENT, driver_of
 from printhammer.control.feedback.estimator.sensor import PositionSensor
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.feedback.driver import Driver
-    from printhammer.control.feedback.loop import Loop
-    from printhammer.drive.sequence import PulseSequence
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
     from printhammer.printing.dots.strategy import Strategy
@@ -49,47 +47,6 @@ BURST: Final = "11101101"  # Pattern of the run that is shown
 MOST_GAPS: Final = 500  # Number of gaps above which a double-pulse test is refused
 # First and last gap of the double-pulse test, in flight times of the single pulse, and their number
 _GAPS: Final = (1.5, 6.0, 46)
-
-
-class FeedbackStrategy:
-    """Feedback as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`.
-
-    Parameters
-    ----------
-    controller : Controller
-        Made for the nominal hammer.
-    sensor : PositionSensor, optional
-        What it sees of the hammer that is driven.
-    tolerance : float, optional
-        Of the closed loop.
-    threads : int, optional
-        By default as many as there are cores; the drives do not depend on it.
-    """
-
-    name = "feedback"
-
-    def __init__(
-        self,
-        controller: Controller,
-        sensor: PositionSensor | None = None,
-        *,
-        tolerance: float = DISPLAY_TOLERANCE,
-        threads: int | None = None,
-    ) -> None:
-        self.controller = controller
-        self.sensor = PositionSensor() if sensor is None else sensor
-        self._options: dict[str, Any] = {"tolerance": tolerance, "threads": threads}
-
-    def loops(self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Loop]:
-        """Run the closed loop on a hammer for each pattern."""
-        return closed_loops(hammer, self.controller, self.sensor, patterns, rate, **self._options)
-
-    def __call__(
-        self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
-    ) -> list[PulseSequence]:
-        """Run the closed loop on a hammer, and return the drive that it gave each pattern."""
-        loops = self.loops(hammer, patterns, rate) if patterns else []
-        return [loop.drive(self.controller.driver.edge) for loop in loops]
 
 
 class ObservedRun(Declared):

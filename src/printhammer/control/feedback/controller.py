@@ -104,7 +104,6 @@ class Controller:
             missing = "pack" if hammer.front is None else "backstop"
             raise InputError(f"{hammer.path}: the hammer has no {missing}, expected one")
         self.limits = Limits() if limits is None else limits
-        self.leads = LEADS
         self.plant = plant = Plant(hammer, driver, nominal(hammer), threads)
         self.hammer, self.driver = hammer, driver
         self.single, self.stroke = plant.single, plant.stroke

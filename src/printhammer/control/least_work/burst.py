@@ -29,6 +29,7 @@ from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of
+from printhammer.printing.dots.settling import settled_from
 from printhammer.results import Declared, Result, column, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
@@ -213,8 +214,8 @@ class LeastWork(Result, rows="node"):
         rest = stored_energy(hammer, rest_state(hammer))
         stored = np.array([stored_energy(hammer, x) for x in motion.x.tolist()])
         energy = 0.5 * hammer.mass * motion.v**2 + stored - rest
-        moving = np.flatnonzero(energy > _SETTLED * self.single.pack_loss)
-        return float(motion.t[min(int(moving[-1]) + 1, motion.t.size - 1)]) if moving.size else 0.0
+        place = settled_from(energy > _SETTLED * self.single.pack_loss)
+        return float(motion.t[min(place, motion.t.size - 1)])
 
     def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
         """Run the same drive, in one ensemble, with every current larger or smaller by given parts of it.

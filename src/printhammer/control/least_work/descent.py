@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 LOST: Final = 25.0  # What a run that failed counts as, in parts of the tolerances
 _MISSED: Final = 0.05  # Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`
-_SLACK: Final = 8e-3  # Lack of force up to which a dot has the force asked for, in `FORCE`
+_SLACK: Final = 8e-3  # Lack of force up to which a dot has the force asked for, in `_FORCE`
 ARRIVAL: Final = 20e-6  # Tolerance by which a time of arrival is measured, s
-FORCE: Final = 0.05  # Tolerance by which a force is measured, relative
+_FORCE: Final = 0.05  # Tolerance by which a force is measured, relative
 _DIFFERENCE: Final = 1e-5  # Difference from which derivatives are taken
 _ENDS_AT: Final = 1e-5  # Change of the cost at which a descent ends
 
@@ -79,7 +79,7 @@ def deviations(late: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatAr
 
     Of dots that come `late`, s, not finite where there is none, with a `force` in parts of that asked for.
     """
-    return np.where(np.isfinite(late), late / ARRIVAL, LOST), (force - 1.0) / FORCE
+    return np.where(np.isfinite(late), late / ARRIVAL, LOST), (force - 1.0) / _FORCE
 
 
 def met(missed: float, spare: float) -> bool:

@@ -12,6 +12,7 @@ from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Chain
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
+from printhammer.printing.dots.settling import settled_from
 from printhammer.printing.dots.slots import slot_times
 
 if TYPE_CHECKING:
@@ -81,8 +82,8 @@ def fading(pulse: Waveform, share: float) -> float:
     """Return the time, s, after its width in which a pulse has faded to a share of its peak for good."""
     own: Any = pulse
     times = np.linspace(own.width, max(pulse.support, own.width), _SAMPLES)
-    loud = np.flatnonzero(np.abs(pulse.value(times)) > share * pulse.peak)
-    return float(times[min(loud[-1] + 1, _SAMPLES - 1)] - own.width) if loud.size else 0.0
+    place = settled_from(np.abs(pulse.value(times)) > share * pulse.peak)
+    return float(times[min(place, _SAMPLES - 1)] - own.width)
 
 
 def clearance(pulse: Waveform, width: float, largest: float) -> float:

@@ -6,7 +6,6 @@ read back is the same table to the last bit; in the C header they are whole nano
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 from typing import TYPE_CHECKING, Any, Final
@@ -27,6 +26,7 @@ from printhammer.control.table.histories import (
 )
 from printhammer.errors import InputError
 from printhammer.support.constants import shown
+from printhammer.support.sheets import sheet_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -78,12 +78,8 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
         first = shown(lines[0] if lines else "")
         raise InputError(f"first line = {first}, expected {_FIRST!r}")
     head: Head = {}
-    body = []
     for line in lines[1:]:
-        if not line.startswith("#"):
-            body.append(line)
-            continue
-        if _ATTRIBUTE.match(line):
+        if not line.startswith("#") or _ATTRIBUTE.match(line):
             continue
         key, mark, value = line[1:].partition("=")
         if not mark:
@@ -96,7 +92,7 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
             raise InputError(f"{key.strip()} = {shown(value.strip())}: expected a text or a number") from None
     _check_head(head)
     gaps, wanted = head["gaps"], columns(head["gaps"])
-    table = [row for row in csv.reader(body) if row]
+    table = [cells for _line, cells in sheet_of(text, "table", gaps=True).rows]
     if not table or table[0] != wanted:
         raise InputError(
             f"columns = {shown(','.join(table[0]) if table else '')}, expected {','.join(wanted)}"

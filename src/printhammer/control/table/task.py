@@ -14,6 +14,7 @@ from printhammer.drive.waveforms.chain import TAIL
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import Nominal, nominal
+from printhammer.printing.dots.settling import settled_from, touches
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import simulate
 
@@ -59,16 +60,15 @@ def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
     times = np.arange(0.0, _LONGEST, _SAMPLE)
     motion = simulate(hammer, PulseTrain(pulse), duration=_LONGEST, times=times, tolerance=tolerance)
     dot = next(contact for contact in motion.contacts if contact.surface == "pack")
-    back = any(contact.surface == "backstop" and not contact.initial for contact in motion.contacts)
     rest, front = rest_state(hammer), hammer.front
     assert front is not None
-    away = np.flatnonzero(np.abs(motion.x - rest) > QUIET * (front - rest))
-    if dot.t_out is None or not back or not motion.ok or away[-1] == len(motion.x) - 1:
+    place = settled_from(np.abs(motion.x - rest) > QUIET * (front - rest))
+    if dot.t_out is None or not touches(motion) or not motion.ok or place == len(motion.x):
         raise InputError(
             f"{hammer.path}: the hammer is not at rest {1e3 * _LONGEST:g} ms after a single pulse, expected"
             " one that settles on its backstop"
         )
-    return Single(known, float(dot.t_out), float(motion.t[away[-1] + 1]))
+    return Single(known, float(dot.t_out), float(motion.t[place]))
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Contact
@@ -138,14 +140,20 @@ def rebounds(motion: Motion, position: float) -> list[Rebound]:
     return found
 
 
+def settled_from(away: npt.NDArray[np.bool_]) -> int:
+    """Return the number of the first sample from which on none is away; that of all where the last one is."""
+    places = np.flatnonzero(away)
+    return int(places[-1]) + 1 if places.size else 0
+
+
 def _settled(motion: Motion, rest: float, limit: float) -> float | None:
     """Return the last time at which the armature is farther from its rest than a limit, s."""
     count = round((motion.end - motion.start) / _SPACING) + 1
     grid = np.union1d(np.linspace(motion.start, motion.end, count), motion.maxima[0])
-    away = np.flatnonzero(np.abs(motion.at(grid)[0] - rest) > limit)
-    if not away.size or away[-1] == grid.size - 1:
+    place = settled_from(np.abs(motion.at(grid)[0] - rest) > limit)
+    if place in (0, grid.size):
         return None
-    low, high = float(grid[away[-1]]), float(grid[away[-1] + 1])
+    low, high = float(grid[place - 1]), float(grid[place])
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         if abs(float(motion.at(middle)[0][0]) - rest) > limit:
