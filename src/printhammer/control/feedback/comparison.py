@@ -157,8 +157,8 @@ def feedback(
         Largest current of the driver to either side, A.
     edge : float or str, optional
         Time constant of the driver, s; by default that with which the hammer's own waveform decays.
-    limits : Limits, optional
-        How far dots may be off.
+    limits, threads
+        As for `printhammer.safe_rate`.
     beside : sequence of Strategy, optional
         Further ways to drive, for instance a compensation table.
     gaps : array, optional
@@ -166,8 +166,6 @@ def feedback(
         times the flight time of the single pulse.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores; the result does not depend on it.
 
     Returns
     -------

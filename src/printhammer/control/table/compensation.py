@@ -270,19 +270,9 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
 
 class TableStrategy:
-    """A compensation table as a way to drive a hammer.
+    """A compensation table as a way to drive a hammer, as `CompensationTable.strategy` makes it.
 
-    Parameters
-    ----------
-    table : CompensationTable
-        The table.
-    hammer : Hammer
-        The hammer it is made for, whose waveform gets other widths.
-
-    Raises
-    ------
-    InputError
-        A pulse of the table peaks above its largest current.
+    The waveform of the hammer it is made for gets other widths.
     """
 
     name = "table"
@@ -314,17 +304,7 @@ class TableStrategy:
 
 
 def load_table(path: str | Path) -> CompensationTable:
-    """Read a compensation table that was written as CSV or JSON.
-
-    Parameters
-    ----------
-    path : str or Path
-        Its file.
-
-    Returns
-    -------
-    CompensationTable
-        The same, to the last bit.
+    """Read a compensation table that was written as CSV or JSON; it is the same to the last bit.
 
     Raises
     ------

@@ -101,20 +101,14 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
     for number, cells in enumerate(table[1:], 1):
         if len(cells) != len(wanted):
             raise InputError(f"row {number}: {len(cells)} cells, expected {len(wanted)}")
-        texts = {"rate": cells[0], **dict(zip((*COLUMNS, DEVIATION), cells[1 + gaps :], strict=True))}
-        values = {
-            name: _csv_number(cell, f"row {number}: {name}") if cell or name != DEVIATION else None
-            for name, cell in texts.items()
-        }
-        rows.append({"gaps": cells[1 : 1 + gaps], **values})
+        row: dict[str, Any] = {"gaps": cells[1 : 1 + gaps]}
+        for name, cell in zip(("rate", *COLUMNS, DEVIATION), (cells[0], *cells[1 + gaps :]), strict=True):
+            try:
+                row[name] = float(cell) if cell or name != DEVIATION else None
+            except ValueError:
+                raise InputError(f"row {number}: {name} = {shown(cell)}, expected a number") from None
+        rows.append(row)
     return head, rows
-
-
-def _csv_number(text: str, where: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{where} = {shown(text)}, expected a number") from None
 
 
 def _of_json(text: str) -> tuple[Head, Rows]:

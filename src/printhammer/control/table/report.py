@@ -144,14 +144,12 @@ def judge_table(
         that lie between them.
     perturbations : sequence of Perturbation, optional
         How the hammers differ; by default `PERTURBATIONS`.
-    limits : Limits, optional
-        How far a dot may be off.
+    limits, threads
+        As for `printhammer.safe_rate`.
     seed : int, optional
         Of the random patterns.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores.
     progress : callable, optional
         Called now and then with the number of trials done and of all.
 

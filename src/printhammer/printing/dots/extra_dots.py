@@ -52,19 +52,9 @@ def extra_dots(
     tolerance: float,
     threads: int | None = None,
 ) -> ExtraDots:
-    """Find the extra contacts of an ensemble that started from rest.
+    """Find the extra contacts of an ensemble that started from rest, by what its firings did.
 
-    Parameters
-    ----------
-    hammer, drives, ends, tolerance, threads
-        Those of the ensemble; `ends` in s.
-    dots : DotTable
-        What its firings did.
-
-    Returns
-    -------
-    ExtraDots
-        At most `MOST` of a firing, in the order of members, firings and times.
+    There are at most `MOST` of a firing, in the order of members, firings and times; `ends` are in s.
     """
     assert hammer.front is not None
     member, firing = np.nonzero(dots.extra_contacts > 0)

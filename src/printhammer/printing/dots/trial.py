@@ -71,25 +71,8 @@ def attempt(
 ) -> Trial:
     """Print all of some patterns in all of some cases, from rest.
 
-    Parameters
-    ----------
-    cases : sequence of Case
-        Hammers and rates.
-    patterns : sequence of tuple of int
-        Numbers of the slots at which dots are wanted, at least one each.
-    strategy : Strategy, optional
-        How the hammers are driven.
-    limits : Limits
-        How far a dot may be off.
-    judged_from : int, optional
-        First slot that is judged; those before are a lead-in.
-    tolerance, threads, progress
-        As for `Ensemble` and its `run`.
-
-    Returns
-    -------
-    Trial
-        With a status for each member; a run that could not go on is no exception, and does not pass.
+    Patterns are numbers of the slots at which dots are wanted, at least one each; slots before `judged_from`
+    are a lead-in. Each member has a status: a run that could not go on is no exception, and does not pass.
 
     Raises
     ------

@@ -41,18 +41,7 @@ def broken(text: str, columns: int = COLUMNS) -> list[str]:
 def lettered(
     text: str, wires: int = matrix_font.WIRES, font: str | Path | None = None, columns: int = COLUMNS
 ) -> npt.NDArray[np.bool_]:
-    """Set a text in dots, as `Pattern.from_text` does.
-
-    Returns
-    -------
-    bool array, shape (lines, wires, slots)
-        True where a dot is wanted.
-
-    Raises
-    ------
-    InputError
-        No text, characters that the font lacks, no font, fewer than 1 character in a line.
-    """
+    """Set a text in dots, shape (lines, wires, slots), as `Pattern.from_text` does."""
     if columns < 1:
         raise InputError(f"columns = {columns}, expected 1 or more characters in a line")
     if not text.strip():

@@ -38,16 +38,7 @@ def standard_font() -> Path:
 
 
 class OutlineFont:
-    """A TrueType or OpenType font at the size that fits a number of wires.
-
-    Parameters
-    ----------
-    path : path
-        The font file.
-    wires : int
-        Number of wires.
-    text : str, optional
-        Characters that are to fit beside those of ASCII.
+    """A TrueType or OpenType font at the size at which ASCII and a text fit a number of wires.
 
     Raises
     ------

@@ -246,16 +246,12 @@ def print_page(
     rate : float or str
         Slots per second, Hz, or text with a unit: how often a wire may be fired. The carriage moves one pitch
         in a slot.
-    strategy : Strategy, optional
-        How the hammer is driven; by default `printhammer.printing.dots.strategy.open_loop`.
+    strategy, limits, threads
+        As for `printhammer.safe_rate`.
     head : Head, optional
         Where the wires are, and how thick; by default `printhammer.printing.page.head.head_of` their number.
-    limits : Limits, optional
-        How far a dot may be off; by default those by which drives are compared.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores; the page does not depend on it.
     progress : callable, optional
         Called now and then with the number of runs done and of all.
 

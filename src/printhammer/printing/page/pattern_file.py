@@ -50,19 +50,9 @@ _MOST_PIXELS: Final = 50_000_000
 
 
 def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, npt.NDArray[np.bool_]]:
-    """Read a pattern file or a bitmap, as `Pattern.load` does.
+    """Read name and dots, shape (lines, wires, slots), as `Pattern.load` does.
 
-    Returns
-    -------
-    name : str
-        What it is; of a bitmap the name of the file, without its end.
-    dots : bool array, shape (lines, wires, slots)
-        Where dots are wanted.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or is no such file; the sentence names file, key and value.
+    The name of a bitmap is that of the file, without its end.
     """
     source = Path(path)
     suffix = source.suffix.lower()
@@ -77,7 +67,7 @@ def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, npt.N
 
 
 def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, npt.NDArray[np.bool_]]:
-    """Read the text of a pattern file; returns and errors as for `read_pattern`."""
+    """Read the text of a pattern file; the sentence of an error names key and value."""
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:

@@ -152,15 +152,11 @@ def damping_study(
         What is exchanged; by default those of `printhammer.printing.rates.materials.materials`.
     current : float or str, optional
         Largest current allowed, A, or text with a unit.
-    limits : Limits, optional
-        How far a dot may be off, for the safe rates; by default 10 % of the force, 50 us, no extra contacts.
-    first, last, step : float or str, optional
-        The grid of rates, Hz.
+    limits, first, last, step, threads
+        As for `printhammer.safe_rate`.
     tolerance : float, optional
         As for `printhammer.simulate`, of print forces and safe rates; by default that for pictures. Settling
         is always computed with the default one of `printhammer.simulate`.
-    threads : int, optional
-        By default as many as there are cores; the result does not depend on it.
     progress : callable, optional
         Called now and then with the number of materials done and of all.
 

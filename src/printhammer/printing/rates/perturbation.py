@@ -106,21 +106,10 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
 def changed(
     hammer: Hammer, changes: Iterable[tuple[Mapping[str, Any], str]]
 ) -> tuple[list[Hammer], list[str]]:
-    """Return hammers with other constants, and what becomes of each.
+    """Return hammers with other constants, and what becomes of each: "ok", "no hammer" or "does not rest".
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer that all of them come from.
-    changes : iterable of (mapping, str)
-        For each what `Hammer.replace` takes, and its source; without changes it is the hammer itself.
-
-    Returns
-    -------
-    hammers : list of Hammer
-        One for each; the hammer itself where there is none with these constants.
-    status : list of str
-        "ok", "no hammer" or "does not rest".
+    For each there is what `Hammer.replace` takes, and its source. Where there are no changes, or there is no
+    hammer with these constants, it is the hammer itself.
     """
     made, status = [], []
     for change, source in changes:

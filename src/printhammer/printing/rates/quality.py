@@ -244,16 +244,10 @@ def quality(
         The slots: text such as "10110111", 1 where a dot is wanted; a number of dots without a gap; or truth
         values. By default once around the binary de Bruijn cycle of order 8, in which every word of eight
         slots occurs once, after 64 slots of it that are not judged.
-    strategy : Strategy, optional
-        How it is driven; by default open loop.
-    limits : Limits, optional
-        By which dots are judged; by default 10 % of the force, 50 us, no extra contacts.
-    nominal : Nominal, optional
-        The single-pulse dot by which the others are judged; by default that of the hammer.
+    strategy, limits, nominal, tolerance
+        As for `printhammer.safe_rate`.
     pitch : float or str, optional
         Distance of neighbouring slots on the paper, m, or text with a unit.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
 
     Returns
     -------

@@ -285,11 +285,8 @@ def grid_notes(grid: FloatArray) -> dict[str, float]:
 def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     """Return the patterns of eight slots, by the numbers of the slots at which dots are wanted.
 
-    Parameters
-    ----------
-    every : bool
-        Whether to return all 255, or only the 128 that begin with a dot: in an open loop from rest the others
-        are some of these, later.
+    That is `every` one of the 255, or only the 128 that begin with a dot: in an open loop from rest the
+    others are some of these, later.
     """
     found = [slots_of(row) for row in eight_slot_patterns()]
     return [slots for slots in found if every or slots[0] == 0]

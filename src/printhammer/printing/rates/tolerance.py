@@ -172,16 +172,10 @@ def tolerance_yield(
     judged_by : str, optional
         "own": the dots of a hammer are judged by its own single pulse, as if each were adjusted; "design": by
         that of the design.
-    strategy : Strategy, optional
-        How they are driven; by default open loop.
-    limits : Limits, optional
-        How far a dot may be off; by default 10 % of the force, 50 us, no extra contacts.
-    first, last, step : float or str, optional
-        The grid of rates, Hz, on which safe rates are looked for.
+    strategy, limits, first, last, step, threads
+        As for `printhammer.safe_rate`.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores; the result does not depend on it.
     progress : callable, optional
         Called now and then with the number of hammers done and of all.
 
