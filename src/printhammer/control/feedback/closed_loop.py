@@ -131,12 +131,12 @@ class FeedbackStrategy(Declared):
                 starts=starts[group],
                 tolerance=self.tolerance,
             ).run(strobes=strobes, threads=self.threads)
-            found = result.strobes
-            assert found is not None
-            states = np.stack([found.x, found.v, found.branch, found.memory], axis=2)
+            sampled = result.strobes
+            assert sampled is not None
+            states = np.stack([sampled.x, sampled.v, sampled.branch, sampled.memory], axis=2)
             for row, (k, loop) in enumerate(zip(group.tolist(), own, strict=True)):
                 moments = strobes[row]
-                x[k, used[k]] = found.x[row, np.searchsorted(moments[:-1], times[k][used[k]])]
+                x[k, used[k]] = sampled.x[row, np.searchsorted(moments[:-1], times[k][used[k]])]
                 loop.alive, loop.time = bool(result.ok[row]), float(ends[k])
                 loop.state = states[row, len(moments) - 1]
         used &= np.isfinite(x)

@@ -329,15 +329,15 @@ class Controller:
         """Return release, begin and width of the brake pulse for some touches."""
         below, share = between(self.fronts.table, kind, speed)
         nearer, farther = between_fronts(front)
-        found = []
+        settings = []
         for name in ("release", "brake", "width"):
             tables = np.array([getattr(landing, name) for landing in self.fronts.landings])
             near, far = (
                 blend_known(tables[number, below], tables[number, below + 1], share)
                 for number in (nearer, nearer + 1)
             )
-            found.append(blend_known(near, far, farther))
-        return found
+            settings.append(blend_known(near, far, farther))
+        return settings
 
     @property
     def _rest(self) -> float:

@@ -75,9 +75,9 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
         key = int(row), float(table.release[row, way]), float(table.back[way])
         which[row, way] = keys.setdefault(key, len(keys))
     # From where the nominal hammer touches its pack.
-    found = released_forces(farther, table.forces, list(keys))
+    forces = released_forces(farther, table.forces, list(keys))
     nominal = np.array([table.forces.force_at(*key) for key in keys])
-    slopes = np.append(np.nan_to_num((found - nominal) / OFFSETS[-1]), 0.0)
+    slopes = np.append(np.nan_to_num((forces - nominal) / OFFSETS[-1]), 0.0)
     values: FloatArray = slopes[which]
     return values
 

@@ -23,8 +23,8 @@ def place_of(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArra
 
 def blend(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
     """Return values between two, nearer the second one the larger its share."""
-    found: FloatArray = (1.0 - share) * low + share * high
-    return found
+    mixed: FloatArray = (1.0 - share) * low + share * high
+    return mixed
 
 
 def bilinear(table: FloatArray, i: IntArray, p: FloatArray, j: IntArray, q: FloatArray) -> FloatArray:

@@ -84,7 +84,7 @@ class Policy:
     def ahead(self, kind: IntArray, late: FloatArray, speed: FloatArray, costs: FloatArray) -> FloatArray:
         """Return the cost of a touch and all that follows it."""
         kinds, lates, speeds = np.broadcast_arrays(kind, late, speed)
-        found = np.full(kinds.shape, NEVER)
+        total = np.full(kinds.shape, NEVER)
         end = self._late[-1]
         for number, rows in enumerate(self._rows):
             nodes = self.table.speed[rows]
@@ -94,10 +94,10 @@ class Policy:
                 continue
             off = lates[inside]
             places = place_of(speeds[inside], nodes), place_of(np.clip(off, -end, end), self._late)
-            found[inside] = bilinear(costs[rows], *places[0], *places[1])
+            total[inside] = bilinear(costs[rows], *places[0], *places[1])
             # Too late is worse the later it is, so that lost time is made up for.
-            found[inside] += NEVER * np.maximum(np.abs(off) - end, 0.0) / self.limits.arrival
-        return found
+            total[inside] += NEVER * np.maximum(np.abs(off) - end, 0.0) / self.limits.arrival
+        return total
 
     def best(
         self,
@@ -149,7 +149,7 @@ class Policy:
         table between the speeds says little.
         """
         table = self.table
-        found = np.zeros(table.next_touch.shape)
+        doubts = np.zeros(table.next_touch.shape)
         for rows in self._rows:
             speeds, touch = table.speed[rows], table.next_touch[rows]
             slope = np.abs(np.gradient(touch, speeds, axis=0))
@@ -158,8 +158,8 @@ class Policy:
             around = np.vstack([steepest, steepest[-1:]])
             # At the end of what is possible there is no slope to either side.
             slope = np.nan_to_num(np.maximum(slope, around), nan=_STEEPEST)
-            found[rows] = np.square(slope * _SPEED_DOUBT / self.limits.arrival)
-        return found
+            doubts[rows] = np.square(slope * _SPEED_DOUBT / self.limits.arrival)
+        return doubts
 
     def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
         """Return what it costs some touches that the front of the pack is known only so well, (M, A)."""
@@ -240,7 +240,7 @@ class Choice:
         """Interpolate arrays (T, A) of all maps to (M, A), or to (M,) for one way each."""
         tables = [getattr(table, name) for table in self._fronts.maps]
         shape = (len(self.below), tables[MIDDLE].shape[1]) if way is None else (len(self.below),)
-        found = np.empty(shape)
+        values = np.empty(shape)
         for number, (near, far) in enumerate(itertools.pairwise(tables)):
             rows = np.flatnonzero(self.nearer == number)
             own: Any = slice(None) if way is None else way[rows]
@@ -248,8 +248,8 @@ class Choice:
             if way is None:
                 share, farther = share[:, np.newaxis], farther[:, np.newaxis]
             low, high = (blend(table[below, own], table[below + 1, own], share) for table in (near, far))
-            found[rows] = blend(low, high, farther)
-        return found
+            values[rows] = blend(low, high, farther)
+        return values
 
 
 def between(table: ImpactMap, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -93,5 +93,5 @@ def _left(
     ok, dots, strobes = plant.run(drives, float(watched[-1]), states, [watched] * len(drives))
     # An armature that hovers between backstop and pack is slow too, but not at rest.
     away = np.abs(strobes.x - rest_state(plant.hammer)) / (_FALL * scale)
-    found = np.maximum(np.abs(strobes.v), away).max(axis=1)
-    return np.where(ok & (dots.extra_contacts[:, 0] == 0), found, np.inf).reshape(tried.shape[:2])
+    remaining = np.maximum(np.abs(strobes.v), away).max(axis=1)
+    return np.where(ok & (dots.extra_contacts[:, 0] == 0), remaining, np.inf).reshape(tried.shape[:2])

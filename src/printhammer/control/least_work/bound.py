@@ -63,8 +63,8 @@ def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Boun
     thrown = _strongest(static, x, largest)
     # Trapezoidal rule from every place to the last one.
     parts = 0.5 * float(x[1] - x[0]) * (thrown[1:] + thrown[:-1])
-    given = np.append(np.cumsum(parts[::-1])[::-1], 0.0)
-    enough = np.flatnonzero(given >= loading)
+    supplied = np.append(np.cumsum(parts[::-1])[::-1], 0.0)
+    enough = np.flatnonzero(supplied >= loading)
     # The place after it, so that the bound errs on the safe side by a step.
     turn = min(float(x[enough[-1] + 1]), static.front) if enough.size else float(x[0])
     # Where the energy has a crest on the way, it is best to turn on it.
@@ -105,12 +105,12 @@ def _given_back(hammer: Hammer, most: float) -> float:
     never = PulseTrain(hammer.waveform, at=[2.0 * CYCLE])
     grid = np.linspace(0.0, CYCLE, _STROBES)
     states = np.stack([np.full(_SPEEDS, bottom), -speeds], axis=1)
-    found = Ensemble(hammer, never, CYCLE, states=states).run(strobes=[grid] * _SPEEDS).strobes
-    assert found is not None
+    strobes = Ensemble(hammer, never, CYCLE, states=states).run(strobes=[grid] * _SPEEDS).strobes
+    assert strobes is not None
     places = np.linspace(bottom, front, _POINTS)
     stored = np.array([stored_energy(hammer, place) for place in places.tolist()])
-    energy = 0.5 * hammer.mass * found.v**2 + np.interp(found.x, places, stored - stored[0])
-    rising = (found.v > 0.0) & (found.x >= bottom) & (found.x <= front)
+    energy = 0.5 * hammer.mass * strobes.v**2 + np.interp(strobes.x, places, stored - stored[0])
+    rising = (strobes.v > 0.0) & (strobes.x >= bottom) & (strobes.x <= front)
     return float(energy[rising].max(initial=0.0))
 
 

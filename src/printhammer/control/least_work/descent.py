@@ -49,8 +49,8 @@ def descend(
         if key not in known:
             known.clear()
             side = np.where((place < 0.5) | (not inward), _DIFFERENCE, -_DIFFERENCE)
-            found = np.nan_to_num(measured(np.vstack([place, place + np.diag(side)])), nan=LOST)
-            known[key] = found[:, 0], (found[:, 1:] - found[:, :1]) / side
+            rows = np.nan_to_num(measured(np.vstack([place, place + np.diag(side)])), nan=LOST)
+            known[key] = rows[:, 0], (rows[:, 1:] - rows[:, :1]) / side
         return known[key]
 
     def row(number: int) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def descend(
     if conditions:
         asked += [{"type": "eq", **row(1)}, {"type": "ineq", **row(2)}]
     minimize: Any = optimize.minimize
-    found = minimize(
+    optimum = minimize(
         **row(0),
         x0=start,
         bounds=[bounds] * start.size,
@@ -71,7 +71,7 @@ def descend(
         options={"maxiter": rounds, "ftol": _ENDS_AT},
         constraints=asked,
     )
-    return np.asarray(found.x, dtype=np.float64), float(found.fun)
+    return np.asarray(optimum.x, dtype=np.float64), float(optimum.fun)
 
 
 def deviations(late: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -102,9 +102,9 @@ def best_of(
     for number, start in enumerate(np.argsort(badness, kind="stable")[: most or tries].tolist()):
         if number >= tries and best is not None:
             break
-        found = attempt(start)
-        if found is not None and (best is None or found[0] < best[0]):
-            best = found
+        outcome = attempt(start)
+        if outcome is not None and (best is None or outcome[0] < best[0]):
+            best = outcome
     return None if best is None else best[1]
 
 

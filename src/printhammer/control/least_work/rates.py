@@ -83,12 +83,12 @@ def least_work_rates(
     rows: list[tuple[float, float, float, float, int, str]] = []
     for number, rate in enumerate(asked.tolist()):
         try:
-            found = least_work(hammer, rate, dots=dots, **options)
+            burst = least_work(hammer, rate, dots=dots, **options)
         except NoBurstError:
             rows.append((np.nan, np.nan, np.nan, np.nan, 0, NOT_FOUND))
         else:
-            ratios = found.net_ratio, found.positive_ratio, found.bound_ratio
-            rows.append((*ratios, found.work.squared_current, found.adequate, FOUND))
+            ratios = burst.net_ratio, burst.positive_ratio, burst.bound_ratio
+            rows.append((*ratios, burst.work.squared_current, burst.adequate, FOUND))
         if progress is not None:
             progress(number + 1, asked.size)
     net, positive, least, squared, adequate, status = zip(*rows, strict=True)

@@ -219,13 +219,13 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         """Return the arrays over the histories that differ, the gaps as text such as "1-2-rest"."""
         every = histories(self.gaps, self.reach)
         numbers = [number_of(history, self.reach) for history in every]
-        found = {
+        arrays = {
             name: (note, values[:, numbers] if note.kind == "column" else values)
             for name, (note, values) in super().entries().items()
         }
         meaning = "gaps to the dots before in slots, the latest first"
         note = Column("", meaning, ("history",), "coordinate", name="history")
-        return {**found, "history": (note, np.array([history_text(history) for history in every]))}
+        return {**arrays, "history": (note, np.array([history_text(history) for history in every]))}
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return a row for each rate and history, the gaps of the history in columns of their own."""

@@ -154,13 +154,13 @@ class Draft:
             slots_of_all[place, : len(times)] = times
             asked[place, : len(times)] = same
         last = np.arange(len(drives)), [len(times) - 1 for times in due]
-        found = []
+        deviations = []
         for hammer in task.hammers:
             off, crowded = task.deviations(hammer, drives, slots_of_all, ends)
             off = np.where(asked[:, :, np.newaxis], np.abs(off), 0.0).max(axis=1) if whole else off[last]
             off[crowded.any(axis=1)] = np.nan
-            found.append(off.reshape(len(cells), len(shifts), most, 2))
-        return np.concatenate(found, axis=2).reshape(len(cells), len(shifts), -1)
+            deviations.append(off.reshape(len(cells), len(shifts), most, 2))
+        return np.concatenate(deviations, axis=2).reshape(len(cells), len(shifts), -1)
 
 
 def blank(task: Task, rates: FloatArray) -> Draft:

@@ -181,12 +181,12 @@ def _check_head(head: Mapping[str, Any]) -> None:
         raise InputError(f"largest_current = {head['largest_current']!r} A, expected a positive number")
 
 
-def _check_keys(given: Mapping[str, Any], wanted: Sequence[str], where: str) -> None:
-    for key in given:
+def _check_keys(entry: Mapping[str, Any], wanted: Sequence[str], where: str) -> None:
+    for key in entry:
         if key not in wanted:
             raise InputError(f"{where}{shown(key)} is not known, expected one of {', '.join(wanted)}")
     for key in wanted:
-        if key not in given:
+        if key not in entry:
             raise InputError(f"{where}{key} is missing")
 
 
@@ -218,8 +218,8 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
                 " for it"
             )
     shared = shared_numbers(gaps, reach)
-    given = {**head, "largest_current": float(head["largest_current"])}
-    return {**given, "rates": rates, **{name: values[:, shared] for name, values in arrays.items()}}
+    arguments = {**head, "largest_current": float(head["largest_current"])}
+    return {**arguments, "rates": rates, **{name: values[:, shared] for name, values in arrays.items()}}
 
 
 def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
@@ -231,10 +231,10 @@ def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
             raise InputError(
                 f"{where}gap = {shown(text)}, expected 'rest' or a whole number from 1 to {reach}"
             )
-    found = tuple(known[text] for text in texts)
-    if found != plain(found):
+    history = tuple(known[text] for text in texts)
+    if history != plain(history):
         raise InputError(f"{where}gaps = {'-'.join(texts)}, expected only rest after a rest")
-    return found
+    return history
 
 
 def header_text(head: Mapping[str, Any], rates: FloatArray, times: Mapping[str, FloatArray]) -> str:

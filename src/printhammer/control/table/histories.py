@@ -89,11 +89,11 @@ def histories_of(slots: Sequence[int], gaps: int, reach: int) -> npt.NDArray[np.
     if (steps < 1).any():
         raise InputError(f"slots = {tuple(slots)}, expected ascending numbers")
     recent = [REST] * gaps
-    found = [number_of(recent, reach)]
+    numbers = [number_of(recent, reach)]
     for step in steps.tolist():
         recent = [step if step <= reach else REST, *recent[:-1]]
-        found.append(number_of(recent, reach))
-    return np.array([*found, number_of([REST] * gaps, reach)], np.int64)
+        numbers.append(number_of(recent, reach))
+    return np.array([*numbers, number_of([REST] * gaps, reach)], np.int64)
 
 
 def gap_text(gap: int) -> str:

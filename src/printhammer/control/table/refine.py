@@ -57,16 +57,16 @@ def _halfway(draft: Draft, lower: IntArray) -> Draft:
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     settings = np.array([table.at(float(rate)) for rate in rates])
     values = np.concatenate([settings, np.zeros_like(settings[:, :1])], axis=1).transpose(1, 0, 2)
-    found = Draft(draft.task, rates, values)
-    found.judge()
-    return found
+    halfway = Draft(draft.task, rates, values)
+    halfway.judge()
+    return halfway
 
 
 def _tuned(draft: Draft, lower: IntArray, report: Callable[[], None]) -> Draft:
     """Return tuned rows halfway between some rates and those above them."""
     task = draft.task
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
-    found = Draft(task, rates, draft.values[:, lower])
+    halfway = Draft(task, rates, draft.values[:, lower])
     for gap in range(1, task.reach + 1):
         periods = gap / rates
         near = np.flatnonzero(periods <= task.single.settled)
@@ -87,6 +87,6 @@ def _tuned(draft: Draft, lower: IntArray, report: Callable[[], None]) -> Draft:
                 more = searched(task, float(periods[row]))
                 if more.size and more.cost.min() < cost[place].min():
                     best = more.take([int(more.cost.argmin())])
-            found.values[:4, row, column] = best.settings[:, 0]
-    polish(found, report)
-    return found
+            halfway.values[:4, row, column] = best.settings[:, 0]
+    polish(halfway, report)
+    return halfway

@@ -190,18 +190,20 @@ def judge_table(
                     tolerance=tolerance,
                     threads=threads,
                 )
-                found, count = trial.judgement, len(patterns)
+                judgement, count = trial.judgement, len(patterns)
                 for c in range(len(driven)):
                     rows = slice(c * count, (c + 1) * count)
                     place = s, c, r, p
-                    good[place] = found.good[rows].sum() / found.wanted[rows].sum()
-                    force[place] = _largest(found.force_deviation[rows])
-                    arrival[place] = _largest(found.arrival_deviation[rows])
-                    lost[place] = found.lost[rows].sum()
-                    extra[place] = found.extra_contacts[rows].sum()
+                    good[place] = judgement.good[rows].sum() / judgement.wanted[rows].sum()
+                    force[place] = _largest(judgement.force_deviation[rows])
+                    arrival[place] = _largest(judgement.arrival_deviation[rows])
+                    lost[place] = judgement.lost[rows].sum()
+                    extra[place] = judgement.extra_contacts[rows].sum()
                 if p == 1 and r == 0:
-                    wanted = found.wanted[0]
-                    deviations.append((found.force_deviation[0][wanted], found.arrival_deviation[0][wanted]))
+                    wanted = judgement.wanted[0]
+                    deviations.append(
+                        (judgement.force_deviation[0][wanted], judgement.arrival_deviation[0][wanted])
+                    )
                 done += 1
                 if progress is not None:
                     progress(done, len(strategies) * len(sets) * asked.size)

@@ -86,8 +86,8 @@ def chosen(task: Task, periods: FloatArray, report: Callable[[], None]) -> tuple
     there = [group for group in groups if group.size]
     every = joined(there)
     ends = np.cumsum([group.size for group in there])
-    found = every.take(_path(every, np.split(np.arange(every.size), ends[:-1]) if there else []))
-    return found.period, found
+    best = every.take(_path(every, np.split(np.arange(every.size), ends[:-1]) if there else []))
+    return best.period, best
 
 
 def spaced(periods: FloatArray, spacing: float) -> list[float]:
@@ -118,7 +118,7 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: C
     hope = [row for row, cost in enumerate(least) if not cost <= BAD and cost <= _FAR]
     nodes = spaced(periods[hope], _CLOSE)
     begin, narrowest = task.brake_from, _LEAST_BRAKE * task.width
-    found = []
+    closer = []
     for node in nodes:
         known = groups[int(np.searchsorted(periods, node))]
         known = known.take(known.brake > 0.0)
@@ -129,12 +129,12 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: C
             for later in _LATER
             for wider in _WIDER
         ]
-        found.append(_kept(task, solved(task, ways_of(cells))))
+        closer.append(_kept(task, solved(task, ways_of(cells))))
         report()
     tried = []
     for row in hope:
         period = float(periods[row])
-        near = [ways for node, ways in zip(nodes, found, strict=True) if abs(node - period) <= _CLOSE]
+        near = [ways for node, ways in zip(nodes, closer, strict=True) if abs(node - period) <= _CLOSE]
         tried.append(_distinct(joined(ways.at(period) for ways in near)))
     for row, group in zip(hope, _valued(task, tried), strict=True):
         groups[row] = joined([groups[row], group])
@@ -180,11 +180,11 @@ def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
     return _kept(task, solved(task, cells.take(np.array(starts, dtype=np.int64))))
 
 
-def _kept(task: Task, found: Ways) -> Ways:
+def _kept(task: Task, ways: Ways) -> Ways:
     """Return the best of some ways that are solved, the best one first."""
-    found = _distinct(found._replace(cost=costs(task, found)))
-    best = np.argsort(found.cost, kind="stable")[:_KEPT]
-    return found.take(best[np.isfinite(found.cost[best])])
+    ways = _distinct(ways._replace(cost=costs(task, ways)))
+    best = np.argsort(ways.cost, kind="stable")[:_KEPT]
+    return ways.take(best[np.isfinite(ways.cost[best])])
 
 
 def _distinct(ways: Ways) -> Ways:

@@ -154,11 +154,11 @@ def tune(
 
 def _spread(hammer: Hammer) -> list[Hammer]:
     """Return the hammers that differ a little, as far as the laws of the hammer let them."""
-    found = []
+    hammers = []
     for by in SPREAD:
         with suppress(InputError):
-            found.append(perturbed(hammer, by))
-    return found
+            hammers.append(perturbed(hammer, by))
+    return hammers
 
 
 def _counter(progress: Callable[[int, int], None] | None, total: int) -> Callable[[], None]:
@@ -182,10 +182,10 @@ def _all_rates(single: Single) -> FloatArray:
 def _given_rates(asked: Sequence[float | str]) -> FloatArray:
     if isinstance(asked, str) or len(asked) == 0:
         raise InputError(f"rates = {asked!r}, expected a list of rates, at least one")
-    found = np.array([read_positive(rate, "Hz", "rate") for rate in asked])
-    if (np.diff(found) <= 0.0).any():
+    rates = np.array([read_positive(rate, "Hz", "rate") for rate in asked])
+    if (np.diff(rates) <= 0.0).any():
         raise InputError(f"rates = {list(asked)!r}, expected ascending rates")
-    return found
+    return rates
 
 
 def _tune_again(draft: Draft, report: Callable[[], None]) -> None:
@@ -231,13 +231,13 @@ def _tuned(
                 draft.deviation[row, columns] = np.inf
             else:
                 draft.values[:4, row, columns] = settings[:, [place]]
-    found = np.flatnonzero(np.isfinite(draft.worst))
+    complete = np.flatnonzero(np.isfinite(draft.worst))
     if open_ended:
-        found = found[found == np.arange(found.size)]
-    if found.size:
-        good = draft.rows(found)
+        complete = complete[complete == np.arange(complete.size)]
+    if complete.size:
+        good = draft.rows(complete)
         polish(good, report)
-        draft.values[:, found] = good.values
+        draft.values[:, complete] = good.values
     return draft
 
 

@@ -123,7 +123,7 @@ def costs(task: Task, ways: Ways) -> FloatArray:
     the second dot right is put behind others. Infinite where a dot is lost, or the pulses do not fit between
     each other.
     """
-    found = np.full(ways.size, np.inf)
+    cost = np.full(ways.size, np.inf)
     some = np.flatnonzero(fits(task, ways))
     if some.size:
         part = ways.take(some)
@@ -132,8 +132,8 @@ def costs(task: Task, ways: Ways) -> FloatArray:
         worst = NOMINAL * largest_of(own)
         for hammer in task.spread:
             worst = np.maximum(worst, largest_of(_deviations(task, hammer, part, drives)))
-        found[some] = worst + np.where(largest_of(own[:, 1]) > _RIGHT, _WRONG, 0.0)
-    return found
+        cost[some] = worst + np.where(largest_of(own[:, 1]) > _RIGHT, _WRONG, 0.0)
+    return cost
 
 
 def seconds(task: Task, ways: Ways) -> FloatArray:

@@ -61,15 +61,15 @@ def extra_dots(
     begin = _leaving(dots, member, firing)
     known = np.isfinite(begin)
     member, firing, begin = member[known], firing[known], begin[known]
-    found: list[ExtraDots] = []
+    rounds: list[ExtraDots] = []
     if not member.size:
-        return _joined(found)
+        return _joined(rounds)
     involved, row = np.unique(member, return_inverse=True)
-    whole = Ensemble(hammer, [drives[one] for one in involved.tolist()], ends[involved], tolerance=tolerance)
+    whole = Ensemble(hammer, [drives[k] for k in involved.tolist()], ends[involved], tolerance=tolerance)
     state = _states(whole, [begin[row == number] for number in range(involved.size)], threads)
     end = [
-        _window_end(drives[one], shot, float(ends[one]))
-        for one, shot in zip(member.tolist(), firing.tolist(), strict=True)
+        _window_end(drives[k], shot, float(ends[k]))
+        for k, shot in zip(member.tolist(), firing.tolist(), strict=True)
     ]
     some = _Windows(member, firing, begin, np.array(end), state)
 
@@ -92,7 +92,7 @@ def extra_dots(
         assert table is not None
         here = np.arange(some.member.size), some.firing
         struck = table.struck[here]
-        found.append(
+        rounds.append(
             ExtraDots(
                 some.member[struck],
                 some.firing[struck],
@@ -106,7 +106,7 @@ def extra_dots(
         if some.member.size:
             state = _states(run(some), [np.array([moment]) for moment in after], threads)
             some = some._replace(begin=after, state=state)
-    return _joined(found)
+    return _joined(rounds)
 
 
 class _Windows(NamedTuple):
@@ -124,10 +124,10 @@ class _Windows(NamedTuple):
         return _Windows(member[kept], firing[kept], begin[kept], end[kept], state[kept])
 
 
-def _joined(found: Sequence[ExtraDots]) -> ExtraDots:
+def _joined(parts: Sequence[ExtraDots]) -> ExtraDots:
     """Return contacts found round by round, in the order of members, firings and times."""
     none = np.zeros(0, np.int64)
-    rounds = [ExtraDots(none, none, np.zeros(0), np.zeros(0)), *found]
+    rounds = [ExtraDots(none, none, np.zeros(0), np.zeros(0)), *parts]
     member = np.concatenate([part.member for part in rounds])
     firing = np.concatenate([part.firing for part in rounds])
     touch = np.concatenate([part.touch for part in rounds])

@@ -45,7 +45,7 @@ class Judgement(Declared):
     @property
     def faults(self) -> npt.NDArray[np.int64]:
         """Number of the first fault of each wanted dot in `FAULTS`; -1 for a good one and an unwanted one."""
-        found = np.full(self.wanted.shape, -1)
+        first = np.full(self.wanted.shape, -1)
         # Compared the other way round, a NaN would pass.
         with np.errstate(invalid="ignore"):
             wrong = (
@@ -56,8 +56,8 @@ class Judgement(Declared):
                 ~(np.abs(self.arrival_deviation) <= self.limits.arrival),
             )
         for number in range(len(wrong) - 1, -1, -1):
-            found[self.wanted & wrong[number]] = number
-        return found
+            first[self.wanted & wrong[number]] = number
+        return first
 
     @property
     def good(self) -> BoolArray:
@@ -118,8 +118,8 @@ def judge(
         run[early, last[early]] = False
     struck = dots.struck & run & asked
     single = [nominal] if isinstance(nominal, SinglePulse) else nominal
-    single_force = np.array([one.force for one in single])[:, np.newaxis]
-    single_flight = np.array([one.flight_time for one in single])[:, np.newaxis]
+    single_force = np.array([pulse.force for pulse in single])[:, np.newaxis]
+    single_flight = np.array([pulse.flight_time for pulse in single])[:, np.newaxis]
     force = np.where(struck, dots.peak_force / single_force - 1.0, np.nan)
     arrival = dots.fired_at + dots.flight_time - (slot_times + single_flight)
     return Judgement(

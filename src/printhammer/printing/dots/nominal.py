@@ -54,10 +54,10 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     dot = motion.dots[0]
     values = (dot.peak_force, dot.flight_time, dot.impact_speed, dot.indentation)
     energies = (dot.loading_work, dot.net_loss)
-    found = [value for value in (*values, *energies) if value is not None]
-    if len(found) < len(values) + len(energies) or not found[0] > 0.0:
+    known = [value for value in (*values, *energies) if value is not None]
+    if len(known) < len(values) + len(energies) or not known[0] > 0.0:
         raise InputError(f"{hammer.path}: a single pulse makes no dot, expected a hammer that prints")
-    return Nominal(*found)
+    return Nominal(*known)
 
 
 def single_pulses(

@@ -95,7 +95,9 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
     top = motion.peak_after(0)
     stroke = (rest if top is None else top[1]) - hammer.position
     limit = SETTLED * max(stroke, 0.0)
-    heights = [one.height / stroke for one in rebounds(motion, hammer.position) if one.height > limit]
+    heights = [
+        rebound.height / stroke for rebound in rebounds(motion, hammer.position) if rebound.height > limit
+    ]
     first = next(iter(touches(motion)), None)
     left = None if first is None or first.v_out is None or first.v_in == 0.0 else -first.v_out / first.v_in
     return Settling(
@@ -116,14 +118,14 @@ def touches(motion: Motion) -> list[Contact]:
 
 def wear_of(motion: Motion) -> Wear:
     """Return what the backstop bears in a motion."""
-    mass, found = motion.hammer.mass, touches(motion)
-    forces = [contact.peak_force for contact in found if contact.peak_force is not None]
+    mass, contacts = motion.hammer.mass, touches(motion)
+    forces = [contact.peak_force for contact in contacts if contact.peak_force is not None]
     return Wear(
-        touches=len(found),
+        touches=len(contacts),
         # Of a contact that is still open the armature is at rest in the end.
-        impulse=sum(mass * ((contact.v_out or 0.0) - contact.v_in) for contact in found),
+        impulse=sum(mass * ((contact.v_out or 0.0) - contact.v_in) for contact in contacts),
         loss=sum(contact.loss for contact in motion.contacts if contact.surface == "backstop"),
-        largest_speed=max((-contact.v_in for contact in found), default=0.0),
+        largest_speed=max((-contact.v_in for contact in contacts), default=0.0),
         largest_force=max(forces) if forces else None,
     )
 
@@ -131,13 +133,13 @@ def wear_of(motion: Motion) -> Wear:
 def rebounds(motion: Motion, position: float) -> list[Rebound]:
     """List the intervals above a backstop at a position, m, between touches."""
     times, x = motion.maxima
-    found = []
+    intervals = []
     for before, after in itertools.pairwise(touches(motion)):
         if before.t_out is not None:
             inside = (times >= before.t_out) & (times <= after.t_in)
             height = float(x[inside].max()) - position if inside.any() else 0.0
-            found.append(Rebound(before.t_out, after.t_in, height))
-    return found
+            intervals.append(Rebound(before.t_out, after.t_in, height))
+    return intervals
 
 
 def settled_from(away: npt.NDArray[np.bool_]) -> int:

@@ -76,9 +76,9 @@ def de_bruijn(order: int = SLOTS) -> npt.NDArray[np.bool_]:
             word.pop()
         if word:
             word[-1] = 1
-    found = np.array(cycle, dtype=np.bool_)
-    found.setflags(write=False)
-    return found
+    whole = np.array(cycle, dtype=np.bool_)
+    whole.setflags(write=False)
+    return whole
 
 
 def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> npt.NDArray[np.bool_]:

@@ -47,12 +47,12 @@ class Head(Declared):
     )
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            value = getattr(self, one.name)
-            least = 0.0 if one.name == "line_gap" else math.ulp(0.0)
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            least = 0.0 if entry.name == "line_gap" else math.ulp(0.0)
             if isinstance(value, bool) or not (value >= least and math.isfinite(value)):
                 expected = "a positive number" if least else "a number not below 0"
-                raise InputError(f"head: {one.name} = {value!r}, expected {expected}")
+                raise InputError(f"head: {entry.name} = {value!r}, expected {expected}")
 
     @property
     def line_pitch(self) -> float:

@@ -28,14 +28,14 @@ def broken(text: str, columns: int = COLUMNS) -> list[str]:
 
     Line ends in the text stay, and so do empty lines.
     """
-    found: list[str] = []
+    lines: list[str] = []
     for line in text.splitlines():
         kept = line.rstrip()
         cut = textwrap.wrap(
             kept, columns, replace_whitespace=False, expand_tabs=False, break_on_hyphens=False
         )
-        found += cut if len(kept) > columns else [kept]
-    return found
+        lines += cut if len(kept) > columns else [kept]
+    return lines
 
 
 def lettered(

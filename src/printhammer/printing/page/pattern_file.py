@@ -125,8 +125,8 @@ def _bitmap(path: Path, wires: int) -> npt.NDArray[np.bool_]:
         if isinstance(error, InputError):
             raise
         reason = getattr(error, "strerror", None)
-        told = f" ({reason})" if reason else ""
-        raise InputError(f"{path}: expected a bitmap that can be read{told}") from None
+        why = f" ({reason})" if reason else ""
+        raise InputError(f"{path}: expected a bitmap that can be read{why}") from None
     dark = (pixels[:, :, 0] < 128) & (pixels[:, :, 1] >= 128)
     lines = -(-len(dark) // wires)
     dots = np.zeros((lines * wires, dark.shape[1]), np.bool_)

@@ -111,13 +111,13 @@ class DampingStudy(Result):
     @derived("", "what is exchanged", "material")
     def kind(self) -> list[str]:
         """What is exchanged, one of `printhammer.printing.rates.materials.KINDS` each."""
-        return [one.kind for one in self.materials]
+        return [material.kind for material in self.materials]
 
     @property
     @derived("", "for what", "material")
     def label(self) -> list[str]:
         """For what it is exchanged, in a few words each."""
-        return [one.label for one in self.materials]
+        return [material.label for material in self.materials]
 
     @property
     def best(self) -> int | None:
@@ -194,9 +194,9 @@ def damping_study(
     left = np.flatnonzero(status == "ok")
     driven = [_driven(made[k], values["amplitude"][k]) for k in left]
     dots = single_pulses(driven, tolerance=tolerance, threads=threads)
-    for k, one, dot in zip(left.tolist(), driven, dots, strict=True):
+    for k, exchanged, dot in zip(left.tolist(), driven, dots, strict=True):
         # At the default tolerance: energies of single runs are not worth a risk.
-        settling = settle(one)
+        settling = settle(exchanged)
         wear = settling.wear
         if settling.status != "ok" or dot is None:
             status[k] = settling.status if settling.status != "ok" else "force not reached"
@@ -248,7 +248,7 @@ def tuned(
         NaN where there is none; good to 1e-6.
     """
     scales = np.tile(np.linspace(LEAST, MOST, _COARSE), (len(hammers), 1))
-    found = np.full(len(hammers), np.nan)
+    factors = np.full(len(hammers), np.nan)
     alive = np.arange(len(hammers))
     for last in [False] * _ROUNDS + [True]:
         if not alive.size:
@@ -273,9 +273,9 @@ def tuned(
         low, high = scales[rows, place], scales[rows, place + 1]
         if last:
             below, above = forces[rows, place], forces[rows, place + 1]
-            found[alive] = low + (high - low) * (force - below) / (above - below)
+            factors[alive] = low + (high - low) * (force - below) / (above - below)
         scales = np.linspace(low, high, _FINE, axis=1)
-    return found
+    return factors
 
 
 def _driven(hammer: Hammer, factor: float) -> Hammer:

@@ -59,21 +59,21 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
     packs are softer and harder ones of equation (5), and springs with a dashpot, the spring such that the
     loading work of the single-pulse dot presses it with the force of that dot.
     """
-    found = [Material("as it is", "as it is", {})]
+    listed = [Material("as it is", "as it is", {})]
     backstop, pack = hammer.backstop, hammer.pack
     hard = backstop if isinstance(backstop, HertzBackstop) else None
     if hard is not None and hard.damping is not None and hard.stiffness is not None:
         k, damping = hard.stiffness, hard.damping
-        found += [
+        listed += [
             # The rebound depends on l v / k alone: with both a factor larger, only the duration changes.
             Material(
                 "hard", f"k and l x {f:.2g}", {"backstop.stiffness": f * k, "backstop.damping": f * damping}
             )
             for f in STIFFNESSES
         ]
-        found += [Material("hard", f"l x {f:g}", {"backstop.damping": f * damping}) for f in DAMPINGS]
+        listed += [Material("hard", f"l x {f:g}", {"backstop.damping": f * damping}) for f in DAMPINGS]
     if hammer.position is not None:
-        found += [
+        listed += [
             Material(
                 "elastomer",
                 f"k {1e-6 * stiffness:g} MN/m^1.5, A {1e6 * time:g} us",
@@ -87,12 +87,12 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
             for time in RELAXATIONS
         ]
     if isinstance(pack, PowerPack):
-        found += [
+        listed += [
             Material("pack", f"stiffness x {f:g}", {"pack.stiffness": f * pack.stiffness}) for f in PACKS
         ]
         stiff = 0.5 * single.force**2 / single.loading_work
         critical = 2.0 * math.sqrt(stiff * hammer.mass)
-        found += [
+        listed += [
             Material(
                 "pack",
                 f"dashpot, {ratio:g} of critical",
@@ -100,4 +100,4 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
             )
             for ratio in PACK_DAMPINGS
         ]
-    return found
+    return listed

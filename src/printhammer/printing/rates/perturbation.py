@@ -47,12 +47,12 @@ class Perturbation(Declared):
     @property
     def name(self) -> str:
         """In words, such as "current +3 %, travel -10 µm"; "nominal" where nothing differs."""
-        told = [
+        words = [
             f"{key} {1e6 * value:+.3g} µm" if key == "travel" else f"{key} {100.0 * value:+.3g} %"
             for key, value in asdict(self).items()
             if value
         ]
-        return ", ".join(told) or "nominal"
+        return ", ".join(words) or "nominal"
 
 
 def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
@@ -113,12 +113,12 @@ def changed(
     """
     made, status = [], []
     for change, source in changes:
-        one, fate = hammer, "no hammer"
+        other, fate = hammer, "no hammer"
         with suppress(InputError):
-            one = hammer.replace(change, source=source) if change else hammer
+            other = hammer.replace(change, source=source) if change else hammer
             fate = "does not rest"
-            rest_state(one)
+            rest_state(other)
             fate = "ok"
-        made.append(one)
+        made.append(other)
         status.append(fate)
     return made, status

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.judging import Judgement
     from printhammer.printing.dots.nominal import Nominal
     from printhammer.printing.dots.settling import Wear
     from printhammer.printing.dots.strategy import Strategy
@@ -273,8 +272,8 @@ def quality(
     motion = simulate(hammer, drive, duration=end, points=2, tolerance=tolerance)
     dots = dot_table(motion.dots, drive.times)
     judged = np.asarray(slots) >= judged_from
-    found: Judgement = judge(dots, judged[np.newaxis], due[np.newaxis], single, bounds, np.array([motion.ok]))
-    run = found.run[0, judged]
+    judgement = judge(dots, judged[np.newaxis], due[np.newaxis], single, bounds, np.array([motion.ok]))
+    run = judgement.run[0, judged]
     return Quality(
         hammer=hammer,
         strategy=name_of(strategy),
@@ -288,10 +287,10 @@ def quality(
         flight_time=np.where(run, dots.flight_time[0, judged], np.nan),
         force=np.where(run, dots.peak_force[0, judged], np.nan),
         indentation=np.where(run, dots.indentation[0, judged], np.nan),
-        arrival_deviation=found.arrival_deviation[0, judged],
-        lost=found.lost[0, judged],
-        extra_contacts=found.extra_contacts[0, judged],
-        fault=found.faults[0, judged],
+        arrival_deviation=judgement.arrival_deviation[0, judged],
+        lost=judgement.lost[0, judged],
+        extra_contacts=judgement.extra_contacts[0, judged],
+        fault=judgement.faults[0, judged],
         wear=wear_of(motion),
         energy=motion.energy,
         heat=_heat(hammer, drive, motion.end),
@@ -302,7 +301,7 @@ def quality(
     )
 
 
-def pattern_of(given: str | int | npt.ArrayLike) -> npt.NDArray[np.bool_]:
+def pattern_of(pattern: str | int | npt.ArrayLike) -> npt.NDArray[np.bool_]:
     """Read a pattern as `quality` takes it: where dots are wanted, slot by slot.
 
     Raises
@@ -310,21 +309,21 @@ def pattern_of(given: str | int | npt.ArrayLike) -> npt.NDArray[np.bool_]:
     InputError
         It is none of these, wants no dot, or is too long.
     """
-    if isinstance(given, str):
-        if not given or set(given) - {"0", "1"}:
-            raise InputError(f"pattern = {given!r}, expected slots such as '10110111'")
-        found = np.array([letter == "1" for letter in given])
-    elif isinstance(given, int) and not isinstance(given, bool):
-        if not 1 <= given <= MOST_SLOTS:
-            raise InputError(f"pattern = {given!r}, expected 1 to {MOST_SLOTS} dots")
-        found = np.ones(given, dtype=np.bool_)
+    if isinstance(pattern, str):
+        if not pattern or set(pattern) - {"0", "1"}:
+            raise InputError(f"pattern = {pattern!r}, expected slots such as '10110111'")
+        wanted = np.array([letter == "1" for letter in pattern])
+    elif isinstance(pattern, int) and not isinstance(pattern, bool):
+        if not 1 <= pattern <= MOST_SLOTS:
+            raise InputError(f"pattern = {pattern!r}, expected 1 to {MOST_SLOTS} dots")
+        wanted = np.ones(pattern, dtype=np.bool_)
     else:
-        found = np.asarray(given)
-        if found.dtype != np.bool_ or found.ndim != 1:
+        wanted = np.asarray(pattern)
+        if wanted.dtype != np.bool_ or wanted.ndim != 1:
             raise InputError("pattern: expected text, a number of dots, or truth values in one row")
-    if not found.any() or len(found) > MOST_SLOTS:
+    if not wanted.any() or len(wanted) > MOST_SLOTS:
         raise InputError(f"pattern: expected at least one dot and at most {MOST_SLOTS} slots")
-    return found
+    return wanted
 
 
 def _heat(hammer: Hammer, drive: Drive, end: float) -> float | None:

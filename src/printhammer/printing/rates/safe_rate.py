@@ -288,8 +288,8 @@ def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     That is `every` one of the 255, or only the 128 that begin with a dot: in an open loop from rest the
     others are some of these, later.
     """
-    found = [slots_of(row) for row in eight_slot_patterns()]
-    return [slots for slots in found if every or slots[0] == 0]
+    patterns = [slots_of(row) for row in eight_slot_patterns()]
+    return [slots for slots in patterns if every or slots[0] == 0]
 
 
 class _Runs(NamedTuple):
@@ -366,15 +366,15 @@ def all_pass(
     options: dict[str, Any] = {"limits": limits, "tolerance": tolerance, "threads": threads}
     patterns = from_rest(every=strategy is not open_loop)
     cycle = [slots_of(cycle_with_lead_in())]
-    found = np.zeros(len(cases), dtype=np.bool_)
+    passed = np.zeros(len(cases), dtype=np.bool_)
     for begin in range(0, len(cases), _HAMMERS_AT_ONCE):
         some = cases[begin : begin + _HAMMERS_AT_ONCE]
-        found[begin : begin + len(some)] = attempt(some, patterns, strategy, **options).passed
-    left = np.flatnonzero(found)
+        passed[begin : begin + len(some)] = attempt(some, patterns, strategy, **options).passed
+    left = np.flatnonzero(passed)
     if left.size:
         some = [cases[k] for k in left.tolist()]
-        found[left] = attempt(some, cycle, strategy, judged_from=LEAD_IN, **options).passed
-    return found
+        passed[left] = attempt(some, cycle, strategy, judged_from=LEAD_IN, **options).passed
+    return passed
 
 
 def safe_rates(
@@ -398,14 +398,14 @@ def safe_rates(
     array, shape (hammers,)
         NaN where not even the first rate of the grid passes; its last one where all pass.
     """
-    found = np.full(len(hammers), np.nan)
+    rates = np.full(len(hammers), np.nan)
     alive = np.arange(len(hammers))
     for rate in grid.tolist():
         cases = [Case(hammers[k], singles[k], rate) for k in alive.tolist()]
         alive = alive[all_pass(cases, strategy, limits=limits, tolerance=tolerance, threads=threads)]
-        found[alive] = rate
+        rates[alive] = rate
         if progress is not None:
             progress(len(hammers) - alive.size, len(hammers))
         if not alive.size:
             break
-    return found
+    return rates

@@ -208,12 +208,12 @@ def tolerance_yield(
     resting = np.flatnonzero(status == "ok")
     force, flight = np.full(count, np.nan), np.full(count, np.nan)
     alone = single_pulses([made[k] for k in resting], tolerance=tolerance, threads=threads)
-    for k, one in zip(resting.tolist(), alone, strict=True):
-        if one is None:
+    for k, dot in zip(resting.tolist(), alone, strict=True):
+        if dot is None:
             status[k] = "makes no dot"
         else:
-            force[k], flight[k] = one.force, one.flight_time
-    singles = [one for one in alone if one is not None]
+            force[k], flight[k] = dot.force, dot.flight_time
+    singles = [dot for dot in alone if dot is not None]
     left = np.flatnonzero(status == "ok")
     hammers = [made[k] for k in left]
     judges = [design] * len(left) if judged_by == "design" else singles
@@ -222,7 +222,7 @@ def tolerance_yield(
         rates[left] = safe_rates(hammers, judges, grid, strategy, progress=progress, **options)
         passed = ~np.isnan(rates)
     elif left.size:
-        cases = [Case(one, judge, float(grid[0])) for one, judge in zip(hammers, judges, strict=True)]
+        cases = [Case(other, judge, float(grid[0])) for other, judge in zip(hammers, judges, strict=True)]
         passed[left] = all_pass(cases, strategy, **options)
         if progress is not None:
             progress(count, count)
@@ -245,7 +245,7 @@ def tolerance_yield(
     )
 
 
-def spreads_of(hammer: Hammer, given: float | Mapping[str, float]) -> dict[str, float]:
+def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, float]:
     """Return the spread of each constant of a hammer that varies.
 
     Raises
@@ -255,21 +255,21 @@ def spreads_of(hammer: Hammer, given: float | Mapping[str, float]) -> dict[str, 
     """
     constants = hammer.constants
     wanted: dict[str, Any]
-    if isinstance(given, Mapping):
-        wanted = dict(given)
+    if isinstance(asked, Mapping):
+        wanted = dict(asked)
     else:
         wanted = {
-            key: given for key, constant in constants.items() if key not in FIXED and constant.si != 0.0
+            key: asked for key, constant in constants.items() if key not in FIXED and constant.si != 0.0
         }
     for key, value in wanted.items():
         if key not in constants:
             raise unknown(key, constants, f"{hammer.path}: spread")
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1.0:
             raise InputError(f"spread of {key} = {value!r} is expected to be from 0 to below 1")
-    found = {key: float(value) for key, value in wanted.items() if value > 0.0}
-    if not found:
+    varying = {key: float(value) for key, value in wanted.items() if value > 0.0}
+    if not varying:
         raise InputError("spreads: expected at least one constant that varies")
-    return found
+    return varying
 
 
 def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:

@@ -87,19 +87,19 @@ class PositionSensor(Declared):
         """
         last = np.floor((until - self.delay) / self.interval + _SLACK).astype(np.int64)
         first = np.ceil(since / self.interval - _SLACK).astype(np.int64)
-        found = last[:, np.newaxis] - np.arange(most - 1, -1, -1)
-        return np.where(found >= np.maximum(first, 0)[:, np.newaxis], found, -1)
+        latest = last[:, np.newaxis] - np.arange(most - 1, -1, -1)
+        return np.where(latest >= np.maximum(first, 0)[:, np.newaxis], latest, -1)
 
     def read(self, x: FloatArray, numbers: npt.NDArray[np.int64], runs: Words, stroke: float) -> FloatArray:
         """Return what the sensor shows of true displacements (M, N), m, at samples of some numbers (M, N).
 
         `runs` (M,) tell the noise of one run from that of another; `stroke` is the way from backstop to pack.
         """
-        seen = x + self.noise * stroke * normal(self.seed, runs[:, np.newaxis], numbers)
+        shown = x + self.noise * stroke * normal(self.seed, runs[:, np.newaxis], numbers)
         if self.step > 0.0:
             quantum = self.step * stroke
-            seen = quantum * np.round(seen / quantum)
-        return seen
+            shown = quantum * np.round(shown / quantum)
+        return shown
 
 
 def normal(seed: int, runs: Words, numbers: npt.NDArray[np.int64]) -> FloatArray:
