@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.results.result import Entries
     from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 BURST: Final = "11101101"  # Pattern of the run that is shown
 MOST_GAPS: Final = 500  # Number of gaps above which a double-pulse test is refused
@@ -73,9 +73,7 @@ class Feedback(Result, rows=_DOTS):
     single: Nominal = part("the single-pulse dot of the nominal hammer, by which all are judged")
     rate: float = scalar("Hz", "slots per second")
     strategies: tuple[str, ...] = coordinate("", "name of the way to drive", "strategy", name="strategy")
-    passed: npt.NDArray[np.bool_] = column(
-        "1", "whether all dots are within limits", "strategy pattern", dtype=np.int8
-    )
+    passed: BoolArray = column("1", "whether all dots are within limits", "strategy pattern", dtype=np.int8)
     force: FloatArray = column(
         "1",
         "force less that of the single pulse, in parts of it",
@@ -85,8 +83,8 @@ class Feedback(Result, rows=_DOTS):
     arrival: FloatArray = column(
         "s", "arrival less slot time and single-pulse flight time", _DOTS, more="nan likewise"
     )
-    lost: npt.NDArray[np.int64] = column("1", "lost dots", "strategy", dtype=np.int32)
-    extra_contacts: npt.NDArray[np.int64] = column("1", "extra contacts", "strategy", dtype=np.int32)
+    lost: IntArray = column("1", "lost dots", "strategy", dtype=np.int32)
+    extra_contacts: IntArray = column("1", "extra contacts", "strategy", dtype=np.int32)
     peak_current: FloatArray = column("A", "largest absolute value of the current", "strategy")
     gaps: FloatArray = coordinate("s", "time between two slots", "gap", name="gap")
     gap_force: FloatArray = column("1", "likewise of the second of two dots", "strategy gap")

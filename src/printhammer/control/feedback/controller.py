@@ -30,11 +30,10 @@ if TYPE_CHECKING:
 
     from printhammer.control.feedback.driver import Driver
     from printhammer.control.feedback.estimator.sensor import PositionSensor, Samples
-    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.control.feedback.loop import Loop
     from printhammer.control.feedback.policy import Choice
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
 """Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,

@@ -18,11 +18,10 @@ from printhammer.control.feedback.soft_landing import soft_landing
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.impact_map import ForceMap, ImpactMap
-    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.control.feedback.launch import Launch
     from printhammer.control.feedback.plant import Plant
     from printhammer.control.feedback.soft_landing import Landing
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)
 """By how much the fronts of the maps lie farther from the armature, in parts of the way to the pack; evenly

@@ -16,10 +16,9 @@ import numpy as np
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.driver import Driver
-    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.control.feedback.plant import Plant
     from printhammer.drive.waveforms.shapes import Switched
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 AHEAD: Final = 1e-6  # Time before the touch at which the runs of a map begin, s
 PUSHED, FREE = 0, 1

@@ -7,11 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
-
-    IntArray = npt.NDArray[np.int64]
+    from printhammer.support.arrays import FloatArray, IntArray
 
 
 def place_of(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArray]:

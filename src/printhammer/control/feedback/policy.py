@@ -23,9 +23,8 @@ from printhammer.control.feedback.interpolation import bilinear, blend, place_of
 if TYPE_CHECKING:
     from printhammer.control.feedback.fronts import Fronts
     from printhammer.control.feedback.impact_map import ImpactMap
-    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.printing.dots.limits import Limits
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 NEVER: Final = 50.0  # Cost of what leads nowhere
 # Standard deviation of the front, in parts of the way to the pack, above which it counts as not known

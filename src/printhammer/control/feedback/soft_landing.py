@@ -17,9 +17,8 @@ from printhammer.hammer.equilibrium import rest_state
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.impact_map import ForceMap
-    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.control.feedback.plant import Plant
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 # Beginnings and widths of the brake pulses of the first grid, in flight times of the single pulse
 _STARTS: Final = np.linspace(0.85, 1.75, 28)

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from printhammer.run.contacts import Contact
     from printhammer.run.ledger import Ledger
     from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 FORCE: Final = 0.9  # Least force of an adequate dot, in parts of that of the single pulse
 SPACING: Final = 0.6
@@ -87,7 +87,7 @@ class SupplyCheck(Declared):
     """One burst when the supply gives another current than it was planned for, run by run."""
 
     changes: FloatArray = column("1", "relative change of every current: 0.03 for 3 % more", "run")
-    adequate: npt.NDArray[np.int64] = column(
+    adequate: IntArray = column(
         "1", "number of dots in their slots with the force asked for, and without extra contacts", "run"
     )
     weakest: FloatArray = column(
@@ -96,7 +96,7 @@ class SupplyCheck(Declared):
     spread: FloatArray = column(
         "s", "largest deviation of a touch from its slot", "run", more="NaN where a dot is lost"
     )
-    status: npt.NDArray[np.str_] = column("", "how the runs ended", "run")
+    status: TextArray = column("", "how the runs ended", "run")
 
 
 class LeastWork(Result, rows="node"):

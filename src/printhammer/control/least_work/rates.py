@@ -14,10 +14,8 @@ from printhammer.results import Result, column, coordinate, part, scalar
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 FOUND = "ok"
 NOT_FOUND = "no current found"
@@ -33,8 +31,8 @@ class LeastWorkRates(Result):
     positive_ratio: FloatArray = column("1", "positive work over what the pack absorbs", "rate")
     bound_ratio: FloatArray = column("1", "least positive work of any current, likewise", "rate")
     squared_current: FloatArray = column("A^2 s", "integral of the squared current", "rate")
-    adequate: npt.NDArray[np.int64] = column("1", "number of adequate dots", "rate")
-    status: npt.NDArray[np.str_] = column(
+    adequate: IntArray = column("1", "number of adequate dots", "rate")
+    status: TextArray = column(
         "", "whether a current was found", "rate", more="no current found is no proof that there is none"
     )
 

@@ -18,11 +18,9 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.control.least_work.coil_force import CoilForce
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _SAMPLES: Final = 301  # Instants of a slot at which power and motion are looked at
 _IN_PACK: Final = {
@@ -104,11 +102,11 @@ class Outcomes:
     squared_current: FloatArray  # Integral of the squared current, A^2 s
     force: FloatArray  # Largest force of the first dot, N; 0 without one
     arrival: FloatArray  # Time of its touch since the slot began, s; NaN without one
-    extra_contacts: npt.NDArray[np.int64]  # Further contacts
+    extra_contacts: IntArray  # Further contacts
     # How far the armature lagged, m, in the contact with which the slot begins: by which way it left
     # the pack slower than `_LEAST_SPEED`, once clear of where it turned, or went into it again
     reloading: FloatArray
-    ok: npt.NDArray[np.bool_]  # Whether the run went as asked
+    ok: BoolArray  # Whether the run went as asked
 
 
 def node_times(duration: float, nodes: int) -> FloatArray:

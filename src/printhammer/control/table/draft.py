@@ -23,18 +23,15 @@ from printhammer.control.table.histories import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.control.table.histories import History
     from printhammer.control.table.task import Task
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
     Cells = Sequence[tuple[int, History]]
     """Entries by row and history."""
 
-    IntArray = npt.NDArray[np.int64]
 
 VALUES: Final = (*COLUMNS, "deviation")  # Names of the arrays of a table
 # Length of the row of dots in every slot before a history, where it has to be right in long patterns too
@@ -131,7 +128,7 @@ class Draft:
         most = max(map(len, gaps))
         drives: list[Drive] = []
         due: list[FloatArray] = []
-        alike: list[npt.NDArray[np.bool_]] = []
+        alike: list[BoolArray] = []
         known: dict[tuple[float, float, float], Waveform] = {}
         for (row, history), value, before in zip(cells, values, gaps, strict=True):
             settings, rate = Settings(*self.values[:4, row]), float(self.rates[row])

@@ -13,11 +13,9 @@ from printhammer.control.table.newton import solve
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy.typing as npt
-
-    from printhammer.control.table.draft import Cells, Draft, IntArray
+    from printhammer.control.table.draft import Cells, Draft
     from printhammer.control.table.histories import History
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 GOOD: Final = 1e-4  # Deviation, in parts of the limits, from which on an entry is left as it is
 LEAST_OF_WIDEST: Final = 0.3  # Least width, in parts of the largest one
@@ -88,7 +86,7 @@ def _solve(draft: Draft, cells: Cells, report: Callable[[], None], *, dense: boo
         report()
         return off
 
-    def bounded(now: FloatArray, active: IntArray, stepped: npt.NDArray[np.bool_]) -> None:
+    def bounded(now: FloatArray, active: IntArray, stepped: BoolArray) -> None:
         on = active[stepped]
         now[on, 0] = np.clip(now[on, 0], -task.latest(now[on, 1]), gap[on] - first[on])
 

@@ -15,7 +15,7 @@ from printhammer.control.table.ways import costs, solved, ways_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.control.table.draft import IntArray
+    from printhammer.support.arrays import IntArray
 
 HALVINGS: Final = 3  # How often the step between two rates is halved at most
 # Deviation between two rates, in parts of the limits, from which on there is one more between them

@@ -32,10 +32,8 @@ from printhammer.control.table.ways import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy.typing as npt
-
     from printhammer.control.table.task import Task
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 # Between the times at which all ways are looked for; between them those of the neighbours are tried, s
 SPACING: Final = 30e-6
@@ -197,7 +195,7 @@ def _distinct(ways: Ways) -> Ways:
     return ways.take(np.array(kept, dtype=np.int64))
 
 
-def _path(ways: Ways, groups: Sequence[npt.NDArray[np.int64]]) -> npt.NDArray[np.int64]:
+def _path(ways: Ways, groups: Sequence[IntArray]) -> IntArray:
     """Choose one of each group so that the sum of the costs and of the changes of way is least.
 
     Between two times a table is interpolated where the way is the same.

@@ -21,13 +21,11 @@ from printhammer.run.simulate import simulate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.limits import Limits
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 # Distance from rest below which the hammer counts as settled, in parts of the way to the pack
 QUIET: Final = 2e-4
@@ -127,7 +125,7 @@ class Task:
 
     def deviations(
         self, hammer: Hammer, drives: Sequence[Drive], slots: FloatArray, ends: FloatArray
-    ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    ) -> tuple[FloatArray, BoolArray]:
         """Run drives, and compare all dots with that of the single pulse.
 
         The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN beyond the last

@@ -17,14 +17,10 @@ from printhammer.run.ensemble import Ensemble
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.ensemble import DotTable
-    from printhammer.support.arrays import FloatArray
-
-    IntArray = npt.NDArray[np.int64]
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 20
 """Extra contacts of one firing that are looked at; what a hammer that chatters on the pack adds is next to
@@ -118,7 +114,7 @@ class _Windows(NamedTuple):
     end: FloatArray
     state: FloatArray
 
-    def where(self, kept: npt.NDArray[np.bool_]) -> _Windows:
+    def where(self, kept: BoolArray) -> _Windows:
         """Return some of the windows."""
         member, firing, begin, end, state = self
         return _Windows(member[kept], firing[kept], begin[kept], end[kept], state[kept])

@@ -13,13 +13,9 @@ from printhammer.results import Declared, column, part
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.printing.dots.limits import Limits
     from printhammer.run.ensemble import DotTable
-    from printhammer.support.arrays import FloatArray
-
-    BoolArray = npt.NDArray[np.bool_]
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 FAULTS: Final = ("not run", "lost", "extra contacts", "force", "arrival")
 """What may be wrong with a wanted dot, in the order in which it is told; "not run": the run ended before."""
@@ -39,11 +35,11 @@ class Judgement(Declared):
     arrival_deviation: FloatArray = column(
         "s", "touch less slot time and single-pulse flight time", "member firing", more="NaN for a lost dot"
     )
-    extra_contacts: npt.NDArray[np.int64] = column("1", "further pack contacts", "member firing")
+    extra_contacts: IntArray = column("1", "further pack contacts", "member firing")
     limits: Limits = part("by which it is judged")
 
     @property
-    def faults(self) -> npt.NDArray[np.int64]:
+    def faults(self) -> IntArray:
         """Number of the first fault of each wanted dot in `FAULTS`; -1 for a good one and an unwanted one."""
         first = np.full(self.wanted.shape, -1)
         # Compared the other way round, a NaN would pass.

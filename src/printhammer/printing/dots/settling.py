@@ -17,12 +17,11 @@ from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Contact
     from printhammer.run.motion import Motion
+    from printhammer.support.arrays import BoolArray
 
 SETTLED: Final = 0.01
 """Distance from rest, in parts of the stroke, within which the armature counts as settled."""
@@ -142,7 +141,7 @@ def rebounds(motion: Motion, position: float) -> list[Rebound]:
     return intervals
 
 
-def settled_from(away: npt.NDArray[np.bool_]) -> int:
+def settled_from(away: BoolArray) -> int:
     """Return the number of the first sample from which on none is away; that of all where the last one is."""
     places = np.flatnonzero(away)
     return int(places[-1]) + 1 if places.size else 0

@@ -16,8 +16,6 @@ from printhammer.run.ensemble import Ensemble
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.judging import Judgement
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.nominal import SinglePulse
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.run.ensemble import DotTable
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
 
 
@@ -43,7 +41,7 @@ class Trial(Declared):
     cases: tuple[Case, ...] = part("hammers and rates")
     patterns: tuple[tuple[int, ...], ...] = part("numbers of the slots at which dots are wanted")
     drives: tuple[Drive, ...] = part("what drove each member")
-    slots: npt.NDArray[np.int64] = column(
+    slots: IntArray = column(
         "1", "number of the slot of each firing; -1 where there is none", "member firing"
     )
     due: FloatArray = column("s", "time of that slot", "member firing")
@@ -53,7 +51,7 @@ class Trial(Declared):
     statuses: tuple[str, ...] = part("how the runs ended")
 
     @property
-    def passed(self) -> npt.NDArray[np.bool_]:
+    def passed(self) -> BoolArray:
         """Whether every pattern passes, for each case."""
         return np.asarray(self.judgement.passed.reshape(len(self.cases), -1).all(axis=1))
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray
 
 COLUMNS: Final = 40
 """Characters of a print line unless told otherwise."""
@@ -40,13 +40,13 @@ def broken(text: str, columns: int = COLUMNS) -> list[str]:
 
 def lettered(
     text: str, wires: int = matrix_font.WIRES, font: str | Path | None = None, columns: int = COLUMNS
-) -> npt.NDArray[np.bool_]:
+) -> BoolArray:
     """Set a text in dots, shape (lines, wires, slots), as `Pattern.from_text` does."""
     if columns < 1:
         raise InputError(f"columns = {columns}, expected 1 or more characters in a line")
     if not text.strip():
         raise InputError(f"text = {text!r}, expected something to print")
-    glyph: Callable[[str], npt.NDArray[np.bool_]]
+    glyph: Callable[[str], BoolArray]
     lines = broken(text, columns)
     if font is None and wires == matrix_font.WIRES:
         known = matrix_font.glyphs()

@@ -16,7 +16,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray
 
 NAME: Final = "nine-wire"
 WIRES: Final = 9
@@ -29,7 +29,7 @@ _DOT: Final = "#"
 
 
 @cache
-def glyphs() -> Mapping[str, npt.NDArray[np.bool_]]:
+def glyphs() -> Mapping[str, BoolArray]:
     """Return the dots of every character of the font: arrays (9, 6), wires from the top by columns."""
     text = (files("printhammer.printing.page") / "fonts" / "nine-wire.txt").read_text("utf-8")
     drawn = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}

@@ -19,8 +19,9 @@ import numpy as np
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     from PIL.ImageFont import FreeTypeFont
+
+    from printhammer.support.arrays import BoolArray
 
 _STANDARD: Final = "mpl-data/fonts/ttf/DejaVuSansMono.ttf"
 _ASCII: Final = string.digits + string.ascii_letters + string.punctuation
@@ -59,7 +60,7 @@ class OutlineFont:
         known = _characters(self.path)
         return [mark for mark in dict.fromkeys(text) if ord(mark) not in known]
 
-    def glyph(self, mark: str) -> npt.NDArray[np.bool_]:
+    def glyph(self, mark: str) -> BoolArray:
         """Return the dots of one character, wires from the top by columns; at least one column."""
         from PIL import Image, ImageDraw
 

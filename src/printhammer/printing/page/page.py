@@ -36,11 +36,8 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
     from printhammer.support.threads import Progress
-
-    IntArray = npt.NDArray[np.int64]
-    BoolArray = npt.NDArray[np.bool_]
 
 _HEAD: Final = ("wire_pitch", "pitch", "line_pitch", "wire_diameter", "density")
 _FAULTS: Final = np.array([*FAULTS, "none"], "U16")
@@ -87,7 +84,7 @@ class Page(Result, rows="dot"):
         "1", "print line of the run", "member", more="a wire without a wanted dot in a line has none"
     )
     run_wire: IntArray = column("1", "wire of the run", "member")
-    status: npt.NDArray[np.str_] = column("1", "how the run ended", "member")
+    status: TextArray = column("1", "how the run ended", "member")
     tolerance: float = part("error allowed in one step of the integration")
 
     @property

@@ -15,7 +15,7 @@ from printhammer.printing.page.pattern_file import read_pattern, write_pattern
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray
 
 MOST_WIRES: Final = 1000
 MOST_CELLS: Final = 50_000_000
@@ -43,7 +43,7 @@ class Pattern:
     """
 
     name: str
-    dots: npt.NDArray[np.bool_] = field(repr=False)
+    dots: BoolArray = field(repr=False)
 
     def __post_init__(self) -> None:
         dots = np.array(self.dots, dtype=np.bool_)

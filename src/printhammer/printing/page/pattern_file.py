@@ -35,7 +35,7 @@ from printhammer.support.outputs import write_file
 from printhammer.support.sheets import read_text
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray
 
 FORMAT: Final = 1
 """Version of the pattern file format."""
@@ -49,7 +49,7 @@ _DOT, _EMPTY = "#", "."
 _MOST_PIXELS: Final = 50_000_000
 
 
-def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, npt.NDArray[np.bool_]]:
+def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, BoolArray]:
     """Read name and dots, shape (lines, wires, slots), as `Pattern.load` does.
 
     The name of a bitmap is that of the file, without its end.
@@ -66,7 +66,7 @@ def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, npt.N
     return name, dots
 
 
-def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, npt.NDArray[np.bool_]]:
+def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArray]:
     """Read the text of a pattern file; the sentence of an error names key and value."""
     try:
         data = tomllib.loads(text)
@@ -93,7 +93,7 @@ def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, npt.NDAr
     return name, _marked(rows, wires, source)
 
 
-def _marked(rows: list[str], wires: int, source: str) -> npt.NDArray[np.bool_]:
+def _marked(rows: list[str], wires: int, source: str) -> BoolArray:
     """Return the dots of rows of marks, print line by print line."""
     if len(rows) % wires:
         raise InputError(f"{source}: rows has {len(rows)} rows, expected a multiple of wires = {wires}")
@@ -109,7 +109,7 @@ def _marked(rows: list[str], wires: int, source: str) -> npt.NDArray[np.bool_]:
     return dots.reshape(-1, wires, len(rows[0]))
 
 
-def _bitmap(path: Path, wires: int) -> npt.NDArray[np.bool_]:
+def _bitmap(path: Path, wires: int) -> BoolArray:
     from PIL import Image
 
     if wires < 1:
@@ -134,7 +134,7 @@ def _bitmap(path: Path, wires: int) -> npt.NDArray[np.bool_]:
     return dots.reshape(lines, wires, -1)
 
 
-def pattern_toml(name: str, dots: npt.NDArray[np.bool_]) -> str:
+def pattern_toml(name: str, dots: BoolArray) -> str:
     """Return the text of a pattern file; reading it back gives the same name and dots."""
     _lines, wires, slots = dots.shape
     marks = np.where(dots.reshape(-1, slots), _DOT, _EMPTY)
@@ -143,7 +143,7 @@ def pattern_toml(name: str, dots: npt.NDArray[np.bool_]) -> str:
     return f"format = {FORMAT}\nname = {title}\nwires = {wires}\nrows = [\n{rows}\n]\n"
 
 
-def write_pattern(path: str | Path, name: str, dots: npt.NDArray[np.bool_]) -> None:
+def write_pattern(path: str | Path, name: str, dots: BoolArray) -> None:
     """Write a pattern file or a bitmap, as `Pattern.save` does."""
     target = Path(path)
     suffix = target.suffix.lower()

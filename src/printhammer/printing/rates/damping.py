@@ -28,11 +28,9 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, TextArray
     from printhammer.support.threads import Progress
 
 CURRENT: Final = 2.0
@@ -61,7 +59,7 @@ class DampingStudy(Result):
     current_limit: float = scalar("A", "largest current allowed")
     nominal: Nominal = part("single-pulse dot of the hammer", more="its force is kept")
     materials: tuple[Material, ...] = part("what is exchanged")
-    status: npt.NDArray[np.str_] = column(
+    status: TextArray = column(
         "",
         "what became of it",
         "material",

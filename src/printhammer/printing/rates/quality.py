@@ -34,10 +34,7 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.run.contacts import Dot
     from printhammer.run.ledger import Ledger
-    from printhammer.support.arrays import FloatArray
-
-    BoolArray = npt.NDArray[np.bool_]
-    IntArray = npt.NDArray[np.int64]
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 PITCH: Final = 25.4e-3 / 60.0
 """Distance of neighbouring slots on the paper, m, unless told otherwise: sixty to the inch."""
@@ -301,7 +298,7 @@ def quality(
     )
 
 
-def pattern_of(pattern: str | int | npt.ArrayLike) -> npt.NDArray[np.bool_]:
+def pattern_of(pattern: str | int | npt.ArrayLike) -> BoolArray:
     """Read a pattern as `quality` takes it: where dots are wanted, slot by slot.
 
     Raises

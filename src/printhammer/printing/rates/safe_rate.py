@@ -35,11 +35,8 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.nominal import SinglePulse
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.printing.dots.trial import Trial
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
-
-    BoolArray = npt.NDArray[np.bool_]
-    IntArray = npt.NDArray[np.int64]
 
 FIRST: Final = 100.0
 """First rate of the grid, Hz."""
@@ -358,7 +355,7 @@ def all_pass(
     limits: Limits,
     tolerance: float,
     threads: int | None = None,
-) -> npt.NDArray[np.bool_]:
+) -> BoolArray:
     """Return whether all patterns from rest, and the cycle, are within limits, for each hammer at a rate.
 
     Arguments as for `printhammer.printing.dots.trial.attempt`.

@@ -23,14 +23,10 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.strategy import Strategy
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, TextArray
     from printhammer.support.threads import Progress
-
-    BoolArray = npt.NDArray[np.bool_]
 
 SPREAD: Final = 0.01
 """Relative spread of a constant, to either side, unless told otherwise."""
@@ -65,7 +61,7 @@ class ToleranceYield(Result):
         name="factor",
     )
     judged_by: Judged = scalar("", '"own" or "design"', more="whose single-pulse dot is the measure")
-    status: npt.NDArray[np.str_] = column(
+    status: TextArray = column(
         "1",
         "what became of the hammer",
         "member",

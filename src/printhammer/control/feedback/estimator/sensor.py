@@ -17,7 +17,7 @@ from printhammer.results import Declared, part, scalar
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
     Words = npt.NDArray[np.uint64]
 
@@ -37,7 +37,7 @@ class Samples(NamedTuple):
 
     times: FloatArray
     shown: FloatArray
-    used: npt.NDArray[np.bool_]
+    used: BoolArray
     error: float
 
     def take(self, which: Any) -> Samples:
@@ -79,7 +79,7 @@ class PositionSensor(Declared):
         """Standard deviation of a sample, in parts of the way from backstop to pack."""
         return max(float(np.hypot(self.noise, self.step / np.sqrt(12.0))), _LEAST_ERROR)
 
-    def numbers(self, since: FloatArray, until: FloatArray, most: int) -> npt.NDArray[np.int64]:
+    def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
         """Return the numbers of the latest samples in some spans of time (M,), s, shape (M, most).
 
         `until` is the instant at which the samples are needed: what is in by then was taken the delay before.
@@ -90,7 +90,7 @@ class PositionSensor(Declared):
         latest = last[:, np.newaxis] - np.arange(most - 1, -1, -1)
         return np.where(latest >= np.maximum(first, 0)[:, np.newaxis], latest, -1)
 
-    def read(self, x: FloatArray, numbers: npt.NDArray[np.int64], runs: Words, stroke: float) -> FloatArray:
+    def read(self, x: FloatArray, numbers: IntArray, runs: Words, stroke: float) -> FloatArray:
         """Return what the sensor shows of true displacements (M, N), m, at samples of some numbers (M, N).
 
         `runs` (M,) tell the noise of one run from that of another; `stroke` is the way from backstop to pack.
@@ -102,7 +102,7 @@ class PositionSensor(Declared):
         return shown
 
 
-def normal(seed: int, runs: Words, numbers: npt.NDArray[np.int64]) -> FloatArray:
+def normal(seed: int, runs: Words, numbers: IntArray) -> FloatArray:
     """Return normally distributed numbers that depend on seed, run and number only.
 
     The bits are those of the generator splitmix64 (G. L. Steele, D. Lea, C. H. Flood, OOPSLA 2014), whose
