@@ -63,9 +63,13 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
     rates: FloatArray = coordinate("Hz", "slots per second", "rate", name="rate", more="ascending")
     gaps: int = scalar("1", "number of gaps in a history")
     reach: int = scalar("1", "longest gap that counts, slots", more="a longer one is rest")
-    advance: FloatArray = column("s", "how long before its slot a dot is fired", _CELLS)
+    advance: FloatArray = column(
+        "s", "how long before its slot a dot is fired", _CELLS, more="negative: after it"
+    )
     width: FloatArray = column("s", "width of its pulse", _CELLS)
-    brake_delay: FloatArray = column("s", "from the slot of the dot before to the brake pulse", _CELLS)
+    brake_delay: FloatArray = column(
+        "s", "from the slot of the dot before to the brake pulse", _CELLS, more="0 without one"
+    )
     brake_width: FloatArray = column("s", "width of the brake pulse, 0 for none", _CELLS)
     deviation: FloatArray = column(
         "1",

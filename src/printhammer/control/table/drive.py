@@ -33,18 +33,9 @@ _WAIT: Final = 1e-6  # Step of the wait after a brake pulse, s
 
 
 class Settings(NamedTuple):
-    """What a table says at one rate: arrays of shape (entries,), over the numbers of the histories.
+    """What a `CompensationTable` says at one rate: arrays of shape (entries,), over the numbers of histories.
 
-    Attributes
-    ----------
-    advance : array
-        How long before its slot a dot is fired, s; negative: after it.
-    width : array
-        Width of its pulse, s.
-    brake_delay : array
-        From the slot of the dot before to the brake pulse in the gap before this dot, s; 0 without one.
-    brake_width : array
-        Width of that brake pulse, s; 0 for none.
+    Meanings and units are those of the columns of the table.
     """
 
     advance: FloatArray

@@ -190,10 +190,9 @@ def judge_table(
                     tolerance=tolerance,
                     threads=threads,
                 )
-                judgement, count = trial.judgement, len(patterns)
+                judgement = trial.judgement
                 for c in range(len(driven)):
-                    rows = slice(c * count, (c + 1) * count)
-                    place = s, c, r, p
+                    rows, place = trial.rows(c), (s, c, r, p)
                     good[place] = judgement.good[rows].sum() / judgement.wanted[rows].sum()
                     force[place] = _largest(judgement.force_deviation[rows])
                     arrival[place] = _largest(judgement.arrival_deviation[rows])

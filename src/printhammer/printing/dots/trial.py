@@ -55,6 +55,10 @@ class Trial(Declared):
         """Whether every pattern passes, for each case."""
         return np.asarray(self.judgement.passed.reshape(len(self.cases), -1).all(axis=1))
 
+    def rows(self, case: int) -> slice:
+        """Return the places of the members of a case, by its number."""
+        return slice(case * len(self.patterns), (case + 1) * len(self.patterns))
+
 
 def attempt(
     cases: Sequence[Case],

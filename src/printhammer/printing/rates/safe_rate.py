@@ -11,7 +11,7 @@ hammer settles, so that below that every dot is a single pulse from rest.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -210,7 +210,8 @@ def safe_rate(
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     rows: list[dict[str, Any]] = []
     failure: Failure | None = None
-    safe, best = math.nan, list[_Runs]()
+    safe = math.nan
+    best: list[tuple[Trial, int]] = []
     for begin in range(0, len(grid), _AT_ONCE):
         cases = [Case(hammer, single, rate) for rate in grid[begin : begin + _AT_ONCE].tolist()]
         trial = attempt(cases, patterns, strategy, **options)
@@ -221,9 +222,9 @@ def safe_rate(
         if cycle and good.size:
             around = attempt([cases[k] for k in good], around_it, strategy, judged_from=LEAD_IN, **options)
         for k, case in enumerate(cases):
-            runs = [_Runs(trial, k)]
+            runs = [(trial, k)]
             if around is not None and k in good:
-                runs.append(_Runs(around, int(np.searchsorted(good, k))))
+                runs.append((around, int(np.searchsorted(good, k))))
             rows.append(_row(runs))
             if failure is None and rows[-1]["passed"]:
                 safe, best = case.rate, runs
@@ -245,7 +246,7 @@ def safe_rate(
         rates=grid[: len(rows)],
         # Dear where pulses overlap, so only of the rate that is found.
         peak_drive=max(
-            (drive.peak for runs in best for drive in runs.trial.drives[runs.rows]), default=math.nan
+            (drive.peak for trial, case in best for drive in trial.drives[trial.rows(case)]), default=math.nan
         ),
         step=read_positive(step, "Hz", "step"),
         tolerance=tolerance,
@@ -289,30 +290,19 @@ def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     return [slots for slots in patterns if every or slots[0] == 0]
 
 
-class _Runs(NamedTuple):
-    """The runs of one case of a trial."""
-
-    trial: Trial
-    case: int
-
-    @property
-    def rows(self) -> slice:
-        """Their places among all runs of the trial."""
-        count = len(self.trial.patterns)
-        return slice(self.case * count, (self.case + 1) * count)
-
-
-def _row(parts: Sequence[_Runs]) -> dict[str, Any]:
-    """Return what a safe rate tells of one rate, by the names of its fields."""
+def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
+    """Return what a safe rate says of one rate, by the names of its fields, from the runs of some cases."""
 
     def joined(name: str) -> npt.NDArray[Any]:
-        return np.concatenate([getattr(part.trial.judgement, name)[part.rows].ravel() for part in parts])
+        return np.concatenate(
+            [getattr(trial.judgement, name)[trial.rows(case)].ravel() for trial, case in runs]
+        )
 
     row: dict[str, Any] = {
         "passed": bool(joined("passed").all()),
         "lost": int(joined("lost").sum()),
         "extra_contacts": int(joined("extra_contacts").sum()),
-        "cycle_run": len(parts) > 1,
+        "cycle_run": len(runs) > 1,
     }
     for name in ("force", "arrival"):
         values = joined(f"{name}_deviation")
@@ -325,7 +315,7 @@ def _row(parts: Sequence[_Runs]) -> dict[str, Any]:
 
 def _failure(trial: Trial, case: int, *, in_cycle: bool) -> Failure:
     """Return the failure that comes in the earliest slot, of several that of the first pattern."""
-    rows, judgement = _Runs(trial, case).rows, trial.judgement
+    rows, judgement = trial.rows(case), trial.judgement
     faults, slots = judgement.faults[rows], trial.slots[rows]
     wrong = faults >= 0
     row, dot = np.unravel_index(int(np.argmin(np.where(wrong, slots, np.iinfo(np.int64).max))), slots.shape)
