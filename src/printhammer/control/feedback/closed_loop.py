@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from printhammer.control.feedback.controller import LEADS
+from printhammer.control.feedback.controller import CONTACT, LEADS, WINDOW
 from printhammer.control.feedback.estimator.sensor import PositionSensor, Samples, run_key
 from printhammer.control.feedback.loop import Loop
 from printhammer.hammer.equilibrium import rest_state
@@ -108,8 +108,8 @@ class FeedbackStrategy(Declared):
             [(loop.touched.start, loop.touched.end) if loop.touched else (1.0, 0.0) for loop in loops]
         )
         until = np.minimum(spans[:, 1] + sensor.delay, ends)
-        contacts = sensor.numbers(spans[:, 0], until, controller.contact_samples(sensor))
-        flights = sensor.numbers(since, ends, controller.samples(sensor))
+        contacts = sensor.numbers(spans[:, 0], until, sensor.count(CONTACT * controller.single.flight_time))
+        flights = sensor.numbers(since, ends, sensor.count(WINDOW))
         numbers = np.concatenate([contacts, flights], axis=1)
         used = numbers >= 0
         times: FloatArray = (numbers * sensor.interval).astype(np.float64)

@@ -175,33 +175,33 @@ def feedback(
     InputError
         An argument is not what is described above, or the driver is too weak for the hammer.
     """
-    speed = read_positive(rate, "Hz", "rate")
-    wide = None if edge is None else read_positive(edge, "s", "edge")
-    driver = driver_of(hammer, read_positive(current, "A", "current"), wide)
-    seeing = PositionSensor() if sensor is None else sensor
+    slot_rate = read_positive(rate, "Hz", "rate")
+    time_constant = None if edge is None else read_positive(edge, "s", "edge")
+    driver = driver_of(hammer, read_positive(current, "A", "current"), time_constant)
+    position_sensor = PositionSensor() if sensor is None else sensor
     bounds = Limits() if limits is None else limits
-    real = hammer if driven is None else driven
+    actual = hammer if driven is None else driven
     between = None if gaps is None else _checked_gaps(gaps)
     controller = Controller(hammer, driver, bounds, threads=threads)
-    own = FeedbackStrategy(controller, seeing, tolerance=tolerance, threads=threads)
+    own = FeedbackStrategy(controller, position_sensor, tolerance=tolerance, threads=threads)
     every: list[Strategy] = [open_loop, *beside, own]
     if between is None:
         between = np.linspace(*_GAPS) * controller.single.flight_time
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     patterns = from_rest(every=False)
     single = controller.single
-    trials = [attempt([Case(real, single, speed)], patterns, way, **options) for way in every]
-    cases = [Case(real, single, 1.0 / gap) for gap in between.tolist()]
+    trials = [attempt([Case(actual, single, slot_rate)], patterns, way, **options) for way in every]
+    cases = [Case(actual, single, 1.0 / gap) for gap in between.tolist()]
     doubles = [attempt(cases, [(0, 1)], way, **options) for way in every]
     judged = [trial.judgement for trial in trials]
     return Feedback(
         hammer=hammer,
-        driven=real,
+        driven=actual,
         driver=driver,
-        sensor=seeing,
+        sensor=position_sensor,
         limits=bounds,
         single=single,
-        rate=speed,
+        rate=slot_rate,
         strategies=tuple(name_of(way) for way in every),
         passed=np.array([judgement.passed for judgement in judged]),
         force=np.array([judgement.force_deviation for judgement in judged]),
@@ -212,7 +212,7 @@ def feedback(
         gaps=between,
         gap_force=np.array([double.judgement.force_deviation[:, 1] for double in doubles]),
         gap_arrival=np.array([double.judgement.arrival_deviation[:, 1] for double in doubles]),
-        run=_observed(real, own, speed, tolerance),
+        run=_observed(actual, own, slot_rate, tolerance),
         tolerance=read_number(tolerance, "1", "tolerance"),
     )
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
 
-LARGEST_CURRENT: Final = 2.0  # Largest current unless told otherwise, A
+LARGEST_CURRENT: Final = 2.0  # Largest current by default, A
 FASTEST: Final = 1e-6  # Least time constant of a driver, s; a shorter one of a hammer counts as this
 STANDARD: Final = 20e-6  # Time constant where the waveform of a hammer has no decay, s
 

@@ -77,8 +77,7 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
     forces = released_forces(farther, table.forces, list(keys))
     nominal = np.array([table.forces.force_at(*key) for key in keys])
     slopes = np.append(np.nan_to_num((forces - nominal) / OFFSETS[-1]), 0.0)
-    values: FloatArray = slopes[which]
-    return values
+    return np.asarray(slopes[which])
 
 
 def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -19,8 +19,7 @@ def place_of(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArra
 
 def blend(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
     """Return values between two, nearer the second one the larger its share."""
-    mixed: FloatArray = (1.0 - share) * low + share * high
-    return mixed
+    return np.asarray((1.0 - share) * low + share * high)
 
 
 def bilinear(table: FloatArray, i: IntArray, p: FloatArray, j: IntArray, q: FloatArray) -> FloatArray:

@@ -71,14 +71,13 @@ class Policy:
     def dot_cost(self, force: FloatArray, late: FloatArray) -> FloatArray:
         """Return the cost of a dot: force in parts of the single-pulse force, lateness in s."""
         a, b = (force - 1.0) / self.limits.force, late / self.limits.arrival
-        cost: FloatArray = a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4)
-        return cost
+        return np.asarray(a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4))
 
     def effort(self, release: FloatArray) -> FloatArray:
         """Return what it costs to pull back, where it is not needed: a hard landing wears the backstop."""
         table = self.table
-        cost: FloatArray = _EFFORT * np.square(table.back / table.driver.current) * (table.fire - release)
-        return cost / self.period
+        cost = _EFFORT * np.square(table.back / table.driver.current) * (table.fire - release)
+        return np.asarray(cost / self.period)
 
     def ahead(self, kind: IntArray, late: FloatArray, speed: FloatArray, costs: FloatArray) -> FloatArray:
         """Return the cost of a touch and all that follows it."""
@@ -114,7 +113,7 @@ class Policy:
         The touches come by `kind`, `late`, s, and `speed`, m/s. The next dot is to come after `wait`, s, and
         `after` dots follow between that one and a rest. The front of the pack lies farther away by `front`,
         known to `front_error`, in parts of the way from backstop to pack. Where the throw alone is to be
-        decided, `done` tells what has been done by then.
+        decided, `done` says what has been done by then.
         """
         choice = Choice(self.fronts, kind, speed, front)
         if done is not None:

@@ -60,14 +60,14 @@ if TYPE_CHECKING:
 
 FORCE: Final = 0.9  # Least force of an adequate dot, in parts of that of the single pulse
 SPACING: Final = 0.6
-"""Time between the nodes of the current unless told otherwise, in parts of the time in which a single pulse
+"""Time between the nodes of the current by default, in parts of the time in which a single pulse
 indents the pack; a period holds a whole number of them."""
 
 MOST_DOTS: Final = 1000  # Number of dots above which a burst is refused
 Least = Literal["positive work", "heat"]
 # What is made least: the positive work of the coil, or its heat, which goes by the squared current
 LEASTS: Final = get_args(Least)
-# Relative changes of the current under which a burst is looked at unless told otherwise
+# Relative changes of the current under which a burst is looked at by default
 SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
 Shape = Literal["free", "pulses"]
 # What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths

@@ -35,7 +35,7 @@ def descend(
 ) -> tuple[FloatArray, float]:
     """Minimise the first row that `measured` returns; of two more the first is 0, the second not negative.
 
-    `measured` returns rows (1 or 3, places) of many places (places, n); `conditions` tells whether there are
+    `measured` returns rows (1 or 3, places) of many places (places, n); `conditions` says whether there are
     the two more. `bounds` hold for every number of a place. `linear`, an offset and a matrix, are further
     numbers that are not to be negative. With `inward`, differences are taken away from the nearer of the
     bounds 0 and 1. Returns the place, and the first row there.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 WIDEST: Final = 2.0  # Largest width of a pulse, in parts of that of the hammer's own
-LARGEST_CURRENT: Final = 2.0  # Largest current in any drive unless told otherwise, A
+LARGEST_CURRENT: Final = 2.0  # Largest current in any drive by default, A
 # Part of the largest current that a single pulse stays below it, for what is left of a brake pulse
 MARGIN: Final = 1e-3
 ROUNDING: Final = 1e-9  # Part by which rounding may go beyond a bound

@@ -15,7 +15,7 @@ from printhammer.printing.dots.strategy import open_loop
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import from_rest
-from printhammer.results import Result, column, coordinate, derived, part, scalar
+from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
@@ -29,18 +29,11 @@ if TYPE_CHECKING:
 
 PERTURBATIONS: Final = (
     Perturbation(),
-    Perturbation(current=0.03),
-    Perturbation(current=-0.03),
-    Perturbation(current=0.1),
-    Perturbation(current=-0.1),
-    Perturbation(travel=10e-6),
-    Perturbation(travel=-10e-6),
-    Perturbation(forms=0.1),
-    Perturbation(forms=-0.1),
-    Perturbation(magnet=0.01),
-    Perturbation(magnet=-0.01),
-    Perturbation(damping=0.2),
-    Perturbation(damping=-0.2),
+    *(Perturbation(current=share) for share in (0.03, -0.03, 0.1, -0.1)),
+    *(Perturbation(travel=way) for way in (10e-6, -10e-6)),
+    *(Perturbation(forms=share) for share in (0.1, -0.1)),
+    *(Perturbation(magnet=share) for share in (0.01, -0.01)),
+    *(Perturbation(damping=share) for share in (0.2, -0.2)),
 )
 """Hammers on which a table is judged: supply, wire travel, number of forms, drift of magnet and damping."""
 
@@ -87,23 +80,13 @@ class TableReport(Result, rows=_AXES):
     arrival_deviation: FloatArray = part("likewise, s", repr=False)
     seed: int = scalar("1", "seed of the random patterns")
     tolerance: float = part("error allowed in one step")
+    strategy: tuple[str, ...] = coordinate("", "way to drive", "strategy", default=STRATEGIES)
+    patterns: tuple[str, ...] = coordinate("", "set of patterns", "patterns", default=SETS)
 
     @property
     def passed(self) -> Any:
         """Whether all dots are within limits, bool array of shape (strategies, hammers, rates)."""
         return (self.good == 1.0).all(axis=3)
-
-    @property
-    @derived("", "way to drive", "strategy", kind="coordinate")
-    def strategy(self) -> tuple[str, ...]:
-        """Names of the ways to drive."""
-        return STRATEGIES
-
-    @property
-    @derived("", "set of patterns", "patterns", kind="coordinate")
-    def patterns(self) -> tuple[str, ...]:
-        """Names of the sets of patterns."""
-        return SETS
 
     @property
     def title(self) -> str:

@@ -32,10 +32,8 @@ if TYPE_CHECKING:
 FIRST: Final = 100.0  # Lowest rate of a table over all rates, Hz: every dot is printed from rest
 STEP: Final = 5.0  # Step between the rates of such a table, Hz
 SPREAD: Final = (
-    Perturbation(current=0.03),
-    Perturbation(current=-0.03),
-    Perturbation(travel=10e-6),
-    Perturbation(travel=-10e-6),
+    *(Perturbation(current=share) for share in (0.03, -0.03)),
+    *(Perturbation(travel=way) for way in (10e-6, -10e-6)),
 )
 """By how much the hammers differ on which ways to fire a dot are compared, and a robust table is tuned."""
 
@@ -162,7 +160,7 @@ def _spread(hammer: Hammer) -> list[Hammer]:
 
 
 def _counter(progress: Callable[[int, int], None] | None, total: int) -> Callable[[], None]:
-    """Return what tells how far the work is, each time that it is called."""
+    """Return a function that reports one more step of the work each time that it is called."""
     steps = iter(range(1, total + 1))
 
     def count() -> None:

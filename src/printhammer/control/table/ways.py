@@ -34,7 +34,7 @@ class Ways(NamedTuple):
     """Ways to fire a dot: arrays of shape (ways,), times after the slot of the dot before, s.
 
     The dot is due at `period`. A brake pulse of width `brake` begins at `delay`, both 0 without one; the dot
-    is `fired` with a pulse of `width`. `cost` tells how far a row of such dots is off, see `costs`.
+    is `fired` with a pulse of `width`. `cost` says how far a row of such dots is off, see `costs`.
     """
 
     period: FloatArray

@@ -63,8 +63,9 @@ def extra_dots(
     involved, row = np.unique(member, return_inverse=True)
     whole = Ensemble(hammer, [drives[k] for k in involved.tolist()], ends[involved], tolerance=tolerance)
     state = _states(whole, [begin[row == number] for number in range(involved.size)], threads)
+    # Up to the next firing, or the end of the run.
     end = [
-        _window_end(drives[k], shot, float(ends[k]))
+        float(drives[k].times[shot + 1] if shot + 1 < drives[k].times.size else ends[k])
         for k, shot in zip(member.tolist(), firing.tolist(), strict=True)
     ]
     some = _Windows(member, firing, begin, np.array(end), state)
@@ -144,9 +145,3 @@ def _states(ensemble: Ensemble, moments: Sequence[FloatArray], threads: int | No
     assert kept is not None
     asked = np.isfinite(kept.t)
     return np.column_stack([kept.x[asked], kept.v[asked]])
-
-
-def _window_end(drive: Drive, firing: int, end: float) -> float:
-    """Return the next firing after one, or the end of the run."""
-    times = drive.times
-    return float(times[firing + 1]) if firing + 1 < times.size else end

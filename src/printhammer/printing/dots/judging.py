@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 FAULTS: Final = ("not run", "lost", "extra contacts", "force", "arrival")
-"""What may be wrong with a wanted dot, in the order in which it is told; "not run": the run ended before."""
+"""What may be wrong with a wanted dot, in the order of the search; "not run": the run ended before."""
 
 
 class Judgement(Declared):

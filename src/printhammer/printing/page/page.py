@@ -266,15 +266,15 @@ def print_page(
     pattern = Pattern.from_text(what) if isinstance(what, str) else what
     if not isinstance(pattern, Pattern):
         raise InputError(f"{what!r} is expected to be a pattern or a text")
-    often = read_positive(rate, "Hz", "rate")
+    slot_rate = read_positive(rate, "Hz", "rate")
     if pattern.wanted > _MOST_DOTS:
         raise InputError(f"{pattern.wanted} dots are wanted, expected {_MOST_DOTS} at most")
-    used = head_of(pattern.wires) if head is None else head
-    if used.wires != pattern.wires:
-        raise InputError(f"head: {used.wires} wires, expected {pattern.wires} as the pattern has")
-    by = PRESETS["slots"] if limits is None else limits
+    print_head = head_of(pattern.wires) if head is None else head
+    if print_head.wires != pattern.wires:
+        raise InputError(f"head: {print_head.wires} wires, expected {pattern.wires} as the pattern has")
+    bounds = PRESETS["slots"] if limits is None else limits
     single = nominal(hammer, tolerance=tolerance)
-    options: dict[str, Any] = {"limits": by, "tolerance": tolerance, "threads": threads}
+    options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     run_line, run_wire = np.nonzero(pattern.dots.any(axis=2))
     rows = [slots_of(row) for row in pattern.dots[run_line, run_wire]]
     pieces = []
@@ -285,7 +285,11 @@ def print_page(
                 progress(begun + done, len(rows))
 
         trial = attempt(
-            [Case(hammer, single, often)], rows[first : first + _PIECE], strategy, progress=tell, **options
+            [Case(hammer, single, slot_rate)],
+            rows[first : first + _PIECE],
+            strategy,
+            progress=tell,
+            **options,
         )
         pieces.append(_dots_of(trial, options))
     counts = np.array([len(slots) for slots in rows])
@@ -296,11 +300,11 @@ def print_page(
     return Page(
         hammer=hammer,
         pattern=pattern,
-        head=used,
-        rate=often,
+        head=print_head,
+        rate=slot_rate,
         strategy=name_of(strategy),
         nominal=single,
-        limits=by,
+        limits=bounds,
         line=np.repeat(run_line, counts),
         wire=np.repeat(run_wire, counts),
         slot=np.concatenate([np.asarray(slots) for slots in rows]),

@@ -97,7 +97,7 @@ class Pattern:
     def load(cls, path: str | Path, wires: int | None = None) -> Self:
         """Read a pattern file (.toml) or a bitmap (.png, .pbm, .bmp).
 
-        The format is told in `printhammer.printing.page.pattern_file`.
+        The format is described in `printhammer.printing.page.pattern_file`.
 
         Parameters
         ----------

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from printhammer.support.threads import Progress
 
 CURRENT: Final = 2.0
-"""Largest current, A, unless told otherwise."""
+"""Largest current by default, A."""
 
 STEP: Final = 25.0
-"""Step of the grid of rates, Hz, unless told otherwise."""
+"""Step of the grid of rates by default, Hz."""
 
 LEAST: Final = 0.6
 MOST: Final = 1.6
@@ -190,7 +190,10 @@ def damping_study(
     status[resting[np.isnan(factors)]] = "force not reached"
     values["peak_current"] = pulse.peak * values["amplitude"]
     left = np.flatnonzero(status == "ok")
-    driven = [_driven(made[k], values["amplitude"][k]) for k in left]
+    driven = []
+    for k, factor in zip(left.tolist(), values["amplitude"][left].tolist(), strict=True):
+        larger = pulse_of(made[k]).scaled(factor)
+        driven.append(made[k].replace("waveform", larger, source="the same print force"))
     dots = single_pulses(driven, tolerance=tolerance, threads=threads)
     for k, exchanged, dot in zip(left.tolist(), driven, dots, strict=True):
         # At the default tolerance: energies of single runs are not worth a risk.
@@ -274,8 +277,3 @@ def tuned(
             factors[alive] = low + (high - low) * (force - below) / (above - below)
         scales = np.linspace(low, high, _FINE, axis=1)
     return factors
-
-
-def _driven(hammer: Hammer, factor: float) -> Hammer:
-    """Return the hammer with its waveform a factor larger."""
-    return hammer.replace("waveform", pulse_of(hammer).scaled(float(factor)), source="the same print force")

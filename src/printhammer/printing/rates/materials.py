@@ -27,7 +27,7 @@ DAMPINGS: Final = (0.25, 0.5, 2.0, 4.0, 16.0)
 """Factors on stiffness and damping of a hard backstop."""
 
 ELASTOMERS: Final = (8e7, 8e8)
-"""Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about what the paper tells of them, and ten times
+"""Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about what the paper says of them, and ten times
 that."""
 
 RELAXATIONS: Final = (0.0, 10e-6, 30e-6, 100e-6, 300e-6)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 PITCH: Final = 25.4e-3 / 60.0
-"""Distance of neighbouring slots on the paper, m, unless told otherwise: sixty to the inch."""
+"""Distance of neighbouring slots on the paper by default, m: sixty to the inch."""
 
 _SPREADS: Final = {"flight_time": "s", "force": "N", "indentation": "m", "arrival": "s", "placement": "m"}
 
@@ -171,7 +171,7 @@ class Quality(Result):
     def dot_matrix(self) -> bool:
         """Whether no dot is lost and arrivals vary by 200 us at most, what dot matrix printing bears.
 
-        Where every dot is fired at its slot they vary as the flight times do, of which the paper tells.
+        Where every dot is fired at its slot they vary as the flight times do, which are those of the paper.
         """
         return self._within(DOT_MATRIX_SPREAD)
 
@@ -256,26 +256,30 @@ def quality(
         An argument is not what is described above; a hammer whose single pulse makes no dot; a strategy whose
         drives do not fit.
     """
-    often = read_positive(rate, "Hz", "rate")
-    apart = read_positive(pitch, "m", "pitch")
+    slot_rate = read_positive(rate, "Hz", "rate")
+    slot_pitch = read_positive(pitch, "m", "pitch")
     wanted = cycle_with_lead_in() if pattern is None else pattern_of(pattern)
     judged_from = LEAD_IN if pattern is None else 0
     bounds = Limits() if limits is None else limits
     single = single_pulse(hammer, tolerance=tolerance) if nominal is None else nominal
     slots = slots_of(wanted)
-    drive = checked_drives(strategy, hammer, [slots], often)[0]
-    due = slot_times(slots, often)
+    drive = checked_drives(strategy, hammer, [slots], slot_rate)[0]
+    due = slot_times(slots, slot_rate)
     end = max(float(due[-1]), float(drive.times[-1])) + WAIT
     motion = simulate(hammer, drive, duration=end, points=2, tolerance=tolerance)
     dots = dot_table(motion.dots, drive.times)
     judged = np.asarray(slots) >= judged_from
     judgement = judge(dots, judged[np.newaxis], due[np.newaxis], single, bounds, np.array([motion.ok]))
     run = judgement.run[0, judged]
+    heat = None
+    if hammer.coil_resistance is not None:
+        squared = squared_current(drive, 0.0, motion.end) if drive.quantity == "current" else 0.0
+        heat = hammer.coil_resistance * squared
     return Quality(
         hammer=hammer,
         strategy=name_of(strategy),
         drive=drive,
-        rate=often,
+        rate=slot_rate,
         wanted=wanted,
         judged_from=judged_from,
         limits=bounds,
@@ -290,9 +294,9 @@ def quality(
         fault=judgement.faults[0, judged],
         wear=wear_of(motion),
         energy=motion.energy,
-        heat=_heat(hammer, drive, motion.end),
+        heat=heat,
         fired=len(motion.dots),
-        pitch=apart,
+        pitch=slot_pitch,
         status=motion.status,
         tolerance=tolerance,
     )
@@ -321,14 +325,6 @@ def pattern_of(pattern: str | int | npt.ArrayLike) -> BoolArray:
     if not wanted.any() or len(wanted) > MOST_SLOTS:
         raise InputError(f"pattern: expected at least one dot and at most {MOST_SLOTS} slots")
     return wanted
-
-
-def _heat(hammer: Hammer, drive: Drive, end: float) -> float | None:
-    """Return the heat of the coil up to the end of a run, J."""
-    if hammer.coil_resistance is None:
-        return None
-    squared = squared_current(drive, 0.0, end) if drive.quantity == "current" else 0.0
-    return hammer.coil_resistance * squared
 
 
 def spread_of(values: FloatArray) -> Spread:

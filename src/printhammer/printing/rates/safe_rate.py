@@ -4,7 +4,7 @@ R(limits) is the largest rate of a grid such that at it and at every rate of the
 within limits: those of all 255 patterns of eight slots from rest, and those of the binary de Bruijn cycle of
 order 8, in which every word of eight slots occurs once, after 64 slots of it.
 
-The grid begins at 100 Hz unless told otherwise: ten milliseconds are several times the time in which such a
+By default the grid begins at 100 Hz: ten milliseconds are several times the time in which such a
 hammer settles, so that below that every dot is a single pulse from rest.
 """
 
@@ -377,8 +377,8 @@ def safe_rates(
 ) -> FloatArray:
     """Return the safe rates of some hammers on a grid of ascending rates, Hz; arguments as for `all_pass`.
 
-    Each hammer is judged by its own one of `singles`; `progress` is told the number of hammers whose rate is
-    found, and of all.
+    Each hammer is judged by its own one of `singles`; `progress` is called with the number of hammers whose
+    rate is found, and of all.
 
     Returns
     -------

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from printhammer.support.threads import Progress
 
 SPREAD: Final = 0.01
-"""Relative spread of a constant, to either side, unless told otherwise."""
+"""Relative spread of a constant, to either side, by default."""
 
 STEP: Final = 25.0
-"""Step of the grid of rates, Hz, unless told otherwise: coarser than that of one safe rate."""
+"""Step of the grid of rates by default, Hz: coarser than that of one safe rate."""
 
 MOST: Final = 100_000
 """Number of hammers above which a yield is refused."""

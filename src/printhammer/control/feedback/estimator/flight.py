@@ -79,7 +79,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight as the samples tell it."""
+    """A flight as estimated from samples."""
 
     # Time, s, and speed, m/s, of the coming touch, (M,)
     touch: FloatArray
@@ -110,13 +110,13 @@ class Flight:
         carry[:, 0, 1] = way
         carry[:, 0, 2] = (more_twice[:, 0] - twice[:, 0]) / _SCALE_STEP
         carry[:, 1, 2] = (more_once[:, 0] - once[:, 0]) / _SCALE_STEP
-        return moved, _sandwich(carry, self.covariance)
+        return moved, np.einsum("mij,mjk,mlk->mil", carry, self.covariance, carry, optimize=False)
 
 
 def flight_from_samples(
     samples: Samples, expected: Expected, front: FloatArray, accelerations: Accelerations
 ) -> Flight:
-    """Return what samples tell of flights and the coming touches of the pack, whose front is at `front`, m.
+    """Estimate flights and the coming touches of the pack from samples; its front is at `front`, m.
 
     `accelerations` of a flying armature are a function of displacements, m, times, s, and scales, all of
     shape (M, K) or such that they broadcast to it, in m/s².
@@ -192,12 +192,6 @@ def least_squares(
             precision[:, i, j] += np.where(weight > 0.0, weight * slope * other, 0.0).sum(axis=1)
     step = np.linalg.solve(precision, pull[..., np.newaxis])[..., 0]
     return np.asarray(step, np.float64), precision
-
-
-def _sandwich(carry: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return J C J^T for each member."""
-    carried: FloatArray = np.einsum("mij,mjk,mlk->mil", carry, covariance, carry, optimize=False)
-    return carried
 
 
 def _integrated(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -79,6 +79,10 @@ class PositionSensor(Declared):
         """Standard deviation of a sample, in parts of the way from backstop to pack."""
         return max(float(np.hypot(self.noise, self.step / np.sqrt(12.0))), _LEAST_ERROR)
 
+    def count(self, time: float) -> int:
+        """Return the number of samples within a time, s; at least one."""
+        return max(1, round(time / self.interval))
+
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
         """Return the numbers of the latest samples in some spans of time (M,), s, shape (M, most).
 
@@ -93,7 +97,7 @@ class PositionSensor(Declared):
     def read(self, x: FloatArray, numbers: IntArray, runs: Words, stroke: float) -> FloatArray:
         """Return what the sensor shows of true displacements (M, N), m, at samples of some numbers (M, N).
 
-        `runs` (M,) tell the noise of one run from that of another; `stroke` is the way from backstop to pack.
+        `runs` (M,) are the keys of the noise, one a run; `stroke` is the way from backstop to pack.
         """
         shown = x + self.noise * stroke * normal(self.seed, runs[:, np.newaxis], numbers)
         if self.step > 0.0:
@@ -115,12 +119,11 @@ def normal(seed: int, runs: Words, numbers: IntArray) -> FloatArray:
     state = _mixed(state ^ numbers.astype(np.uint64))
     # The middle of one of 2**53 equal intervals, so that neither 0 nor 1 occurs.
     share = ((state >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
-    values: FloatArray = ndtri(share)
-    return values
+    return np.asarray(ndtri(share))
 
 
 def run_key(slots: tuple[int, ...], rate: float) -> int:
-    """Return what tells the noise of a pattern at a rate from that of others."""
+    """Return the key by which the noise of a pattern at a rate differs from that of others."""
     import hashlib
 
     text = f"{rate!r} {slots!r}".encode()
