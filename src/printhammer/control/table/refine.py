@@ -13,8 +13,6 @@ from printhammer.control.table.search import BAD, searched
 from printhammer.control.table.ways import costs, solved, ways_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from printhammer.support.arrays import IntArray
 
 HALVINGS: Final = 3  # How often the step between two rates is halved at most
@@ -22,12 +20,11 @@ HALVINGS: Final = 3  # How often the step between two rates is halved at most
 BETWEEN: Final = 0.5
 
 
-def refined(draft: Draft, report: Callable[[], None]) -> Draft:
+def refined(draft: Draft) -> Draft:
     """Put rates between those of a table where it is not good enough halfway between two of them.
 
     Such places are where the way to fire a dot changes. The new entries follow that of the rate below or that
-    of the rate above, whichever is the better one; where neither is good, another one is looked for. `report`
-    is called after each step of the work.
+    of the rate above, whichever is the better one; where neither is good, another one is looked for.
     """
     # Rates at which every dot is printed from rest need nothing.
     lower = np.flatnonzero(1.0 / draft.rates[1:] <= draft.task.single.settled)
@@ -38,11 +35,11 @@ def refined(draft: Draft, report: Callable[[], None]) -> Draft:
         if not lower.size:
             break
         halfway = _halfway(draft, lower)
-        report()
+        draft.task.report()
         lower = lower[~(halfway.worst <= BETWEEN)]
         if not lower.size:
             break
-        more = _tuned(draft, lower, report)
+        more = _tuned(draft, lower)
         wanted = {*draft.rates[lower].tolist(), *more.rates.tolist()}
         rates = np.concatenate([draft.rates, more.rates])
         order = np.argsort(rates, kind="stable")
@@ -62,7 +59,7 @@ def _halfway(draft: Draft, lower: IntArray) -> Draft:
     return halfway
 
 
-def _tuned(draft: Draft, lower: IntArray, report: Callable[[], None]) -> Draft:
+def _tuned(draft: Draft, lower: IntArray) -> Draft:
     """Return tuned rows halfway between some rates and those above them."""
     task = draft.task
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
@@ -88,5 +85,5 @@ def _tuned(draft: Draft, lower: IntArray, report: Callable[[], None]) -> Draft:
                 if more.size and more.cost.min() < cost[place].min():
                     best = more.take([int(more.cost.argmin())])
             halfway.values[:4, row, column] = best.settings[:, 0]
-    polish(halfway, report)
+    polish(halfway)
     return halfway

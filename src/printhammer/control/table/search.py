@@ -30,7 +30,7 @@ from printhammer.control.table.ways import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from printhammer.control.table.task import Task
     from printhammer.support.arrays import FloatArray, IntArray
@@ -61,26 +61,25 @@ _SAME: Final = 1e-6  # Difference of firing times up to which ways with the same
 _ROUNDING: Final = 1e-12
 
 
-def chosen(task: Task, periods: FloatArray, report: Callable[[], None]) -> tuple[FloatArray, Ways]:
+def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
     """Choose a way for each of some times after a dot, from slot to slot, s, ascending.
 
-    Returns the times at which there is a way at all, and one for each of these. `report` is called after each
-    step of the work.
+    Returns the times at which there is a way at all, and one for each of these.
     """
     nodes = spaced(periods, SPACING)
     known = []
     for node in nodes:
         known.append(searched(task, node))
-        report()
+        task.report()
     tried = []
     for period in periods.tolist():
         place = int(np.searchsorted(nodes, period))
         near = known[max(0, place - 1) : place + (2 if nodes[place] == period else 1)]
         tried.append(_distinct(joined(ways.at(period) for ways in near)))
     groups = _valued(task, tried)
-    report()
+    task.report()
     if task.brake:
-        _look_closely(task, periods, groups, report)
+        _look_closely(task, periods, groups)
     there = [group for group in groups if group.size]
     every = joined(there)
     ends = np.cumsum([group.size for group in there])
@@ -106,7 +105,7 @@ def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
     return [group.take(np.isfinite(group.cost)) for group in groups]
 
 
-def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: Callable[[], None]) -> None:
+def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
     """Look for more ways, with brake pulses between those tried before, where the best is not good enough.
 
     Adds to the groups of ways that are known at each of the times from slot to slot.
@@ -128,7 +127,7 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: C
             for wider in _WIDER
         ]
         closer.append(_kept(task, solved(task, ways_of(cells))))
-        report()
+        task.report()
     tried = []
     for row in hope:
         period = float(periods[row])

@@ -19,7 +19,7 @@ from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
@@ -75,6 +75,7 @@ class Task:
 
     It is tuned on `hammers`, the one it is made for first; those of `spread` differ a little from that one.
     No pulse is wider than `widest`, and none begins earlier than `wait` after a brake pulse, s.
+    `report` is called after each step of the work.
     """
 
     gaps: int
@@ -90,6 +91,7 @@ class Task:
     brake: bool
     tolerance: float
     threads: int | None
+    report: Callable[[], None]
 
     @property
     def width(self) -> float:

@@ -120,7 +120,7 @@ def tune(
     grid = _all_rates(single) if asked is None else _given_rates(asked)
     nodes = len(spaced(_periods(grid, far, single), SPACING))
     # Once a time at which ways are looked for, once a step of Newton's method, with and without long rows.
-    report = _counter(progress, nodes + 3 + 2 * (ROUNDS + 1) * gaps)
+    steps = nodes + 3 + 2 * (ROUNDS + 1) * gaps
     task = Task(
         gaps=gaps,
         reach=far,
@@ -135,11 +135,12 @@ def tune(
         brake=brake,
         tolerance=tolerance,
         threads=threads,
+        report=_counter(progress, steps),
     )
-    draft = _tuned(task, grid, report, open_ended=asked is None)
+    draft = _tuned(task, grid, open_ended=asked is None)
     if asked is None:
-        return refined(draft.rows(np.arange(_usable(draft))), report).table()
-    _tune_again(draft, report)
+        return refined(draft.rows(np.arange(_usable(draft)))).table()
+    _tune_again(draft)
     lost = np.flatnonzero(~np.isfinite(draft.worst))
     if lost.size:
         speed = float(grid[lost[0]])
@@ -186,28 +187,23 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
     return rates
 
 
-def _tune_again(draft: Draft, report: Callable[[], None]) -> None:
+def _tune_again(draft: Draft) -> None:
     """Tune rates once more that are not good enough, with ways from times around theirs; changes the rows."""
     poor = np.flatnonzero(~(draft.worst <= _POOR))
     if not poor.size:
         return
-    again = _tuned(draft.task, draft.rates[poor], report, around=_AROUND)
+    again = _tuned(draft.task, draft.rates[poor], around=_AROUND)
     better = again.worst < draft.worst[poor]
     draft.values[:, poor[better]] = again.values[:, better]
 
 
 def _tuned(
-    task: Task,
-    rates: FloatArray,
-    report: Callable[[], None],
-    *,
-    open_ended: bool = False,
-    around: FloatArray | None = None,
+    task: Task, rates: FloatArray, *, open_ended: bool = False, around: FloatArray | None = None
 ) -> Draft:
     """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
 
-    `report` is called after each step of the work. An `open_ended` table ends below the first rate at which
-    no pulse comes near. `around` is how far from the times between dots ways are looked for as well, s.
+    An `open_ended` table ends below the first rate at which no pulse comes near. `around` is how far from the
+    times between dots ways are looked for as well, s.
     """
     draft = blank(task, rates)
     draft.timing[1] = task.width
@@ -217,7 +213,7 @@ def _tuned(
         others = (periods[:, np.newaxis] + around).ravel()
         longest, shortest = task.single.settled, periods.min(initial=np.inf) + around.min()
         periods = np.unique([*periods, *others[(others <= longest) & (others > max(shortest, 0.0))]])
-    there, ways = chosen(task, periods, report)
+    there, ways = chosen(task, periods)
     settings = ways.settings
     for gap in range(1, task.reach + 1):
         columns = [number_of(each, task.reach) for each in histories(task.gaps, task.reach) if each[0] == gap]
@@ -234,7 +230,7 @@ def _tuned(
         complete = complete[complete == np.arange(complete.size)]
     if complete.size:
         good = draft.rows(complete)
-        polish(good, report)
+        polish(good)
         draft.values[:, complete] = good.values
     return draft
 
