@@ -30,7 +30,7 @@ from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of
 from printhammer.printing.dots.settling import settled_from
-from printhammer.results import Declared, Result, column, part, scalar
+from printhammer.results import Declared, Result, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
@@ -84,19 +84,17 @@ class NoBurstError(PrinthammerError):
 
 
 class SupplyCheck(Declared):
-    """One burst when the supply gives another current than it was planned for, run by run."""
+    """A burst when the supply gives another current than it was planned for: arrays of shape (n,)."""
 
-    changes: FloatArray = column("1", "relative change of every current: 0.03 for 3 % more", "run")
-    adequate: IntArray = column(
-        "1", "number of dots in their slots with the force asked for, and without extra contacts", "run"
+    changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
+    adequate: IntArray = part(
+        "number of dots in their slots with the force asked for, and without extra contacts"
     )
-    weakest: FloatArray = column(
-        "1", "force of the weakest dot, in parts of that of the single pulse; 0 where one is lost", "run"
+    weakest: FloatArray = part(
+        "force of the weakest dot, in parts of that of the single pulse; 0 where one is lost"
     )
-    spread: FloatArray = column(
-        "s", "largest deviation of a touch from its slot", "run", more="NaN where a dot is lost"
-    )
-    status: TextArray = column("", "how the runs ended", "run")
+    spread: FloatArray = part("largest deviation of a touch from its slot, s; NaN where a dot is lost")
+    status: TextArray = part("how the runs ended")
 
 
 class LeastWork(Result, rows="node"):
