@@ -117,7 +117,7 @@ def printing_current(
         return bool(once and outcomes.reloading[0] < _LAGS * RELOADING and met(missed[0], above[0]))
 
     def attempt(start: FloatArray, rounds: int = _ROUNDS) -> tuple[float, FloatArray] | None:
-        currents, cost = _descend(task, measured, begin.current, start, duration, rounds, printing=True)
+        cost, currents = _descend(task, measured, begin.current, start, duration, rounds, printing=True)
         return (cost, currents) if meets(currents) else None
 
     again = None if before is None else attempt(before, _ROUNDS_AGAIN)
@@ -134,11 +134,8 @@ def printing_current(
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
     """Find the currents at the nodes after the last dot with which the backstop takes least, A."""
 
-    def whole(currents: FloatArray) -> FloatArray:
-        return np.concatenate([currents, np.zeros((len(currents), 1))], axis=1)
-
     def rated(currents: FloatArray, tolerance: float) -> FloatArray:
-        outcomes = task.run(begin, whole(currents), duration, tolerance)
+        outcomes = task.run(begin, np.pad(currents, ((0, 0), (0, 1))), duration, tolerance)
         odd = _WRONG * ((outcomes.force > 0.0).astype(float) + ~outcomes.ok)
         return np.asarray(task.cost(outcomes, duration) + odd)
 
@@ -148,9 +145,7 @@ def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -
     tried = _landings(task, begin.current, duration, nodes)
 
     def attempt(row: int) -> tuple[float, FloatArray]:
-        start = tried[row]
-        currents, cost = _descend(task, measured, begin.current, start, duration, _ROUNDS, printing=False)
-        return cost, currents
+        return _descend(task, measured, begin.current, tried[row], duration, _ROUNDS, printing=False)
 
     best = best_of(rated(tried, _SEARCH_TOLERANCE), attempt, _TRIES)
     assert best is not None
@@ -166,8 +161,8 @@ def _descend(
     rounds: int,
     *,
     printing: bool,
-) -> tuple[FloatArray, float]:
-    """Return the best currents from a start, and their cost, within the bounds on value and slope.
+) -> tuple[float, FloatArray]:
+    """Return the cost of the best currents from a start, and these, within the bounds on value and slope.
 
     Without a dot to print, the current has to come back to zero in one more step.
     """
@@ -186,7 +181,7 @@ def _descend(
         conditions=printing,
         linear=(room / task.largest, both / task.largest),
     )
-    return _within(task, currents, begin, reach, not printing), cost
+    return cost, _within(task, currents, begin, reach, not printing)
 
 
 def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero: bool) -> FloatArray:

@@ -195,12 +195,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
         Parameters
         ----------
-        hammer : Hammer
-            The hammer the table is made for.
+        hammer, rate
+            As for `strategy` and `at`.
         slots : sequence of int
             Numbers of the slots, ascending; slot 0 is at `printhammer.printing.dots.slots.FIRST_SLOT`.
-        rate : float or str
-            Slots per second, Hz, or text with a unit.
 
         Raises
         ------
