@@ -2,7 +2,7 @@
 
 `column`, `coordinate`, `scalar` and `part` declare the fields of a `printhammer.results.Result`, and
 `derived` a property that belongs to its table. Dataset, table, files, the Attributes section of the docstring
-and the HTML repr follow from them.
+and the HTML repr follow from them. For values that belong together and are no result, see `Declared`.
 """
 
 from __future__ import annotations
