@@ -13,7 +13,8 @@ import numpy as np
 from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
-from printhammer.control.feedback.comparison import Feedback, FeedbackStrategy
+from printhammer.control.feedback.closed_loop import FeedbackStrategy
+from printhammer.control.feedback.comparison import Feedback
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.driver import driver_of
 from printhammer.printing.dots.strategy import Strategy, open_loop

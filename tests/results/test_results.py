@@ -3,6 +3,7 @@
 import json
 import pkgutil
 import re
+from dataclasses import FrozenInstanceError
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from printhammer.results import (
     ENDINGS,
     KEYS,
     RESULTS,
+    Declared,
     Result,
     column,
     coordinate,
@@ -258,3 +260,20 @@ def test_a_row_of_gaps_is_a_row(tmp_path: Path) -> None:
     path = tmp_path / "gaps.csv"
     path.write_text("x [m],y [m]\n1,2\n,\n3,4\n")
     np.testing.assert_array_equal(reopen(path).dataset["x"], [1.0, np.nan, 3.0])
+
+
+def test_values_that_belong_together_are_declared_alike() -> None:
+    class Stone(Declared):
+        """A stone."""
+
+        mass: float = scalar("kg", "mass")
+        shape: str = part("shape", more="as a word", default="round")
+
+    stone = Stone(2.0)
+    assert stone == Stone(2.0, "round")
+    assert hash(stone) == hash(Stone(2.0, "round"))
+    with pytest.raises(FrozenInstanceError):
+        stone.mass = 3.0  # type: ignore[misc]
+    section = "mass : float\n    Mass, kg.\nshape : str\n    Shape; as a word.\n"
+    assert Stone.__doc__ == f"A stone.\n\nAttributes\n----------\n{section}"
+    assert "Stone" not in RESULTS

@@ -185,13 +185,14 @@ def rates_between(what: str, most: int) -> Any:
     def read(written: str, name: str) -> list[float]:
         import numpy as np
 
-        from printhammer.printing.dots.nominal import rate_of
+        from printhammer.drive.input import read_positive
 
         parts = [part.strip() for part in written.split(",")]
         if len(parts) != 3:
             example = "'1.2 kHz, 1.4 kHz, 41'"
             raise InputError(f"{name} {written!r}: expected two rates and a number, such as {example}")
-        low, high, count = rate_of(parts[0], name), rate_of(parts[1], name), read_whole(parts[2], name)
+        low, high = (read_positive(part, "Hz", name) for part in parts[:2])
+        count = read_whole(parts[2], name)
         if not low < high or not 2 <= count <= most:
             raise InputError(
                 f"{name} {written!r}: expected the lower rate first, and a number from 2 to {most}"

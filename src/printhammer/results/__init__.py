@@ -1,6 +1,6 @@
 """Results: declared once, and from that Dataset, table, files, docstring, HTML repr and picture."""
 
-from printhammer.results.declare import Column, column, coordinate, derived, part, scalar
+from printhammer.results.declare import Column, Declared, column, coordinate, derived, part, scalar
 from printhammer.results.files import ENDINGS, Reopened, reopen, save_dataset
 from printhammer.results.provenance import KEYS, provenance
 from printhammer.results.result import RESULTS, Result
@@ -10,6 +10,7 @@ __all__ = [
     "KEYS",
     "RESULTS",
     "Column",
+    "Declared",
     "Reopened",
     "Result",
     "column",

@@ -2,7 +2,7 @@
 
 `column`, `coordinate`, `scalar` and `part` declare the fields of a `printhammer.results.Result`, and
 `derived` a property that belongs to its table. Dataset, table, files, the Attributes section of the docstring
-and the HTML repr follow from them.
+and the HTML repr follow from them. For values that belong together and are no result, see `Declared`.
 """
 
 from __future__ import annotations
@@ -11,10 +11,21 @@ import re
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from inspect import cleandoc
-from typing import TYPE_CHECKING, Any, Final, Literal, TypedDict, TypeVar, Unpack
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Final,
+    Literal,
+    TypedDict,
+    TypeVar,
+    Unpack,
+    dataclass_transform,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from dataclasses import Field
 
 Kind = Literal["column", "coordinate", "scalar", "part"]
 
@@ -200,3 +211,19 @@ def _type_text(annotation: str, dims: tuple[str, ...]) -> str:
     sort = "int " if "int" in annotation.lower() else "bool " if "bool" in annotation.lower() else ""
     none = " or None" if "None" in annotation else ""
     return f"{sort}array, shape ({', '.join(dims)}{',' if len(dims) == 1 else ''}){none}"
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(column, coordinate, scalar, part))
+class Declared:
+    """Values that belong together; a class that derives from it is a frozen dataclass without a Dataset.
+
+    Its fields say what they mean as those of a result do, and the Attributes of its docstring follow.
+    """
+
+    if TYPE_CHECKING:
+        __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        dataclass(frozen=True)(cls)
+        cls.__doc__ = with_attributes(cls.__doc__ or "", cls, columns_of(cls))

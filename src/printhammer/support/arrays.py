@@ -1,6 +1,9 @@
-"""The type of arrays of numbers."""
+"""The types of arrays: of numbers, whole numbers, truth values and words."""
 
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+TextArray = npt.NDArray[np.str_]

@@ -9,8 +9,8 @@ from tests import hammers
 
 import printhammer as ph
 from printhammer.cli.main import main
-from printhammer.control.feedback.closed_loop import closed_loops
-from printhammer.control.feedback.comparison import Feedback, FeedbackStrategy
+from printhammer.control.feedback.closed_loop import FeedbackStrategy
+from printhammer.control.feedback.comparison import Feedback
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.driver import driver_of
 from printhammer.control.feedback.estimator.sensor import PositionSensor
@@ -38,7 +38,7 @@ def controller() -> Controller:
 
 @pytest.mark.slow
 def test_a_perfect_sensor_tells_when_and_how_fast_the_pack_is_touched(controller: Controller) -> None:
-    loop = closed_loops(controller.hammer, controller, PERFECT, PATTERNS[:1], RATE)[0]
+    loop = FeedbackStrategy(controller, PERFECT).loops(controller.hammer, PATTERNS[:1], RATE)[0]
     drive = loop.drive(controller.driver.edge)
     motion = ph.simulate(controller.hammer, drive, duration=float(loop.due[-1]) + 2e-3)
     touches = [contact for contact in motion.contacts if contact.surface == "pack"]
@@ -56,7 +56,7 @@ def test_front_and_supply_are_learned_and_not_taken_for_each_other(
     controller: Controller, current: float, travel: float
 ) -> None:
     other = perturbed(controller.hammer, Perturbation(current=current, travel=travel))
-    loop = closed_loops(other, controller, PositionSensor(), [(0, 1, 2, 3, 6)], 1300.0)[0]
+    loop = FeedbackStrategy(controller, PositionSensor()).loops(other, [(0, 1, 2, 3, 6)], 1300.0)[0]
     known = loop.learned
     assert known.front * controller.stroke == pytest.approx(travel, abs=1e-6)
     assert known.scale == pytest.approx(current, abs=0.012)
@@ -111,7 +111,7 @@ def test_what_the_sensor_showed_is_what_the_whole_drive_does(
     """No decision changes what has been by then, also where it comes late."""
     driven = perturbed(controller.hammer, by) if by.name != "nominal" else controller.hammer
     patterns = [slots_of(pattern) for pattern in eight_slot_patterns()[128:255:9]]
-    for loop in closed_loops(driven, controller, PERFECT, patterns, RATE):
+    for loop in FeedbackStrategy(controller, PERFECT).loops(driven, patterns, RATE):
         drive = loop.drive(controller.driver.edge)
         motion = ph.simulate(driven, drive, duration=float(loop.due[-1]) + 2e-3)
         for times, shown in loop.seen:

@@ -142,7 +142,7 @@ def test_pulses_keep_to_their_bounds_also_where_it_is_looked_closely(
         return known(task, found)
 
     monkeypatch.setattr(search, "_kept", watched)
-    search.chosen(task, np.array([PERIOD]), lambda: None)
+    search.chosen(task, np.array([PERIOD]))
     assert max(some.brake.max(initial=0.0) for some in kept) == task.widest
     assert max(some.width.max(initial=0.0) for some in kept) <= task.widest
     brakes = np.concatenate([some.delay[some.brake > 0.0] for some in kept])

@@ -6,22 +6,23 @@ shown so far, and nothing else of the hammer that is driven. What comes out is a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from printhammer.control.feedback.estimator.sensor import Samples, run_key
+from printhammer.control.feedback.controller import CONTACT, LEADS, WINDOW
+from printhammer.control.feedback.estimator.sensor import PositionSensor, Samples, run_key
 from printhammer.control.feedback.loop import Loop
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.slots import slot_times
+from printhammer.results import Declared, part
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.feedback.controller import Controller
-    from printhammer.control.feedback.estimator.sensor import PositionSensor
+    from printhammer.drive.sequence import PulseSequence
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
@@ -29,79 +30,76 @@ _SOON: Final = 1e-6  # Least time by which a run is carried, s
 _BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
 
 
-def closed_loops(
-    hammer: Hammer,
-    controller: Controller,
-    sensor: PositionSensor,
-    patterns: Sequence[tuple[int, ...]],
-    rate: float,
-    *,
-    tolerance: float = DISPLAY_TOLERANCE,
-    threads: int | None = None,
-) -> list[Loop]:
-    """Run the closed loop for some patterns, from rest.
+class FeedbackStrategy(Declared):
+    """Feedback as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`."""
 
-    The controller does not know the hammer that is driven, and sees it through the sensor. Patterns are
-    numbers of the slots at which dots are wanted, `rate` slots per second, Hz. The result does not depend on
-    the number of threads.
-    """
-    rest = np.array([rest_state(hammer), 0.0, -1.0, 0.0])
-    loops = []
-    for slots in patterns:
-        due = slot_times(slots, rate) + controller.plant.single.flight_time
-        loop = Loop(slots, due, run_key(slots, rate), rest.copy())
-        controller.launch(loop, 0)
-        loops.append(loop)
-    policy = controller.policy(1.0 / rate)
-    run = _Run(hammer, controller, sensor, tolerance, threads)
-    # In the order of the slots, so that runs beside each other are as long as each other.
-    for slot in range(max(slots[-1] for slots in patterns) + 1):
-        now = [(loop, loop.slots.index(slot)) for loop in loops if slot in set(loop.slots)]
-        moving = [(loop, dot) for loop, dot in now if loop.alive]
-        if moving:
-            rested = [(loop, dot) for loop, dot in moving if loop.rests]
-            thrown = [(loop, dot) for loop, dot in moving if loop.printed is not None]
-            if rested or thrown:
-                run.see_contacts([loop for loop, _dot in (*rested, *thrown)])
-            for loop, dot in rested:
-                controller.launch(loop, dot)
-            if thrown:
-                controller.decide_again(thrown, policy)
-            run.see_flights([loop for loop, _dot in moving])
-        if now:
-            controller.decide(now, policy)
-    return loops
+    name: ClassVar[str] = "feedback"
+    controller: Controller = part("made for the nominal hammer")
+    sensor: PositionSensor = part("what it sees of the hammer that is driven", default=PositionSensor())
+    tolerance: float = part("error allowed in one step of the closed loop", default=DISPLAY_TOLERANCE)
+    threads: int | None = part("None for as many as there are cores; nothing depends on it", default=None)
 
+    def __call__(
+        self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
+    ) -> list[PulseSequence]:
+        """Run the closed loop on a hammer, and return the drive that it gave each pattern."""
+        loops = self.loops(hammer, patterns, rate) if patterns else []
+        return [loop.drive(self.controller.driver.edge) for loop in loops]
 
-@dataclass(frozen=True)
-class _Run:
-    """What carries runs on, and shows the controller what its sensor shows."""
+    def loops(self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Loop]:
+        """Run the closed loop on a hammer for each pattern, from rest.
 
-    hammer: Hammer
-    controller: Controller
-    sensor: PositionSensor
-    tolerance: float
-    threads: int | None
+        The controller does not know the hammer that is driven, and sees it through the sensor. Patterns are
+        numbers of the slots at which dots are wanted, `rate` slots per second, Hz.
+        """
+        controller = self.controller
+        rest = np.array([rest_state(hammer), 0.0, -1.0, 0.0])
+        loops = []
+        for slots in patterns:
+            due = slot_times(slots, rate) + controller.plant.single.flight_time
+            loop = Loop(slots, due, run_key(slots, rate), rest.copy())
+            controller.launch(loop, 0)
+            loops.append(loop)
+        policy = controller.policy(1.0 / rate)
+        # In the order of the slots, so that runs beside each other are as long as each other.
+        for slot in range(max(slots[-1] for slots in patterns) + 1):
+            now = [(loop, loop.slots.index(slot)) for loop in loops if slot in set(loop.slots)]
+            moving = [(loop, dot) for loop, dot in now if loop.alive]
+            if moving:
+                rested = [(loop, dot) for loop, dot in moving if loop.rests]
+                thrown = [(loop, dot) for loop, dot in moving if loop.printed is not None]
+                if rested or thrown:
+                    self._see_contacts(hammer, [loop for loop, _dot in (*rested, *thrown)])
+                for loop, dot in rested:
+                    controller.launch(loop, dot)
+                if thrown:
+                    controller.decide_again(thrown, policy)
+                self._see_flights(hammer, [loop for loop, _dot in moving])
+            if now:
+                controller.decide(now, policy)
+        return loops
 
-    def see_contacts(self, loops: list[Loop]) -> None:
+    def _see_contacts(self, hammer: Hammer, loops: list[Loop]) -> None:
         """Carry some runs until their latest contacts are over, and learn from these."""
         starts = np.array([loop.time for loop in loops])
         over = [loop.touched.end if loop.touched is not None else loop.time for loop in loops]
         ends = np.maximum(np.array(over) + self.sensor.delay, starts + _SOON)
-        contacts, _flights = self._carry(loops, ends, ends)
+        contacts, _flights = self._carry(hammer, loops, ends, ends)
         self.controller.learn(loops, contacts)
 
-    def see_flights(self, loops: list[Loop]) -> None:
+    def _see_flights(self, hammer: Hammer, loops: list[Loop]) -> None:
         """Carry some runs to their next decisions, and estimate the coming touches."""
         starts = np.array([loop.time for loop in loops])
-        touches = np.array([loop.touch - self.controller.leads[loop.kind] for loop in loops])
+        touches = np.array([loop.touch - LEADS[loop.kind] for loop in loops])
         ends = np.maximum(touches, starts + _SOON)
         since = np.maximum([loop.since for loop in loops], starts)
-        contacts, flights = self._carry(loops, since, ends)
+        contacts, flights = self._carry(hammer, loops, since, ends)
         self.controller.learn(loops, contacts)
         self.controller.estimate(loops, flights)
 
-    def _carry(self, loops: list[Loop], since: FloatArray, ends: FloatArray) -> tuple[Samples, Samples]:
+    def _carry(
+        self, hammer: Hammer, loops: list[Loop], since: FloatArray, ends: FloatArray
+    ) -> tuple[Samples, Samples]:
         """Carry runs to an end; return what is shown of contacts and, since a time, of flights."""
         controller, sensor = self.controller, self.sensor
         starts = np.array([loop.time for loop in loops])
@@ -110,8 +108,8 @@ class _Run:
             [(loop.touched.start, loop.touched.end) if loop.touched else (1.0, 0.0) for loop in loops]
         )
         until = np.minimum(spans[:, 1] + sensor.delay, ends)
-        contacts = sensor.numbers(spans[:, 0], until, controller.contact_samples(sensor))
-        flights = sensor.numbers(since, ends, controller.samples(sensor))
+        contacts = sensor.numbers(spans[:, 0], until, sensor.count(CONTACT * controller.single.flight_time))
+        flights = sensor.numbers(since, ends, sensor.count(WINDOW))
         numbers = np.concatenate([contacts, flights], axis=1)
         used = numbers >= 0
         times: FloatArray = (numbers * sensor.interval).astype(np.float64)
@@ -126,19 +124,19 @@ class _Run:
             strobes = [np.append(np.unique(times[k][used[k]]), ends[k]) for k in group]
             width = 4 if inside[group[0]] else 2
             result = Ensemble(
-                self.hammer,
+                hammer,
                 [loop.recent(controller.plant.driver) for loop in own],
                 ends[group],
                 states=np.array([loop.state[:width] for loop in own]),
                 starts=starts[group],
                 tolerance=self.tolerance,
             ).run(strobes=strobes, threads=self.threads)
-            found = result.strobes
-            assert found is not None
-            states = np.stack([found.x, found.v, found.branch, found.memory], axis=2)
+            sampled = result.strobes
+            assert sampled is not None
+            states = np.stack([sampled.x, sampled.v, sampled.branch, sampled.memory], axis=2)
             for row, (k, loop) in enumerate(zip(group.tolist(), own, strict=True)):
                 moments = strobes[row]
-                x[k, used[k]] = found.x[row, np.searchsorted(moments[:-1], times[k][used[k]])]
+                x[k, used[k]] = sampled.x[row, np.searchsorted(moments[:-1], times[k][used[k]])]
                 loop.alive, loop.time = bool(result.ok[row]), float(ends[k])
                 loop.state = states[row, len(moments) - 1]
         used &= np.isfinite(x)

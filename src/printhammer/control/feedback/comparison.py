@@ -8,24 +8,24 @@ of eight slots; so does the open loop, and both fire two pulses at all distances
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.control.feedback.closed_loop import closed_loops
+from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.driver import LARGEST_CURRENT, driver_of
 from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
-from printhammer.printing.dots.nominal import WAIT, rate_of
+from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.slots import slots_of
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
-from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.simulate import simulate
@@ -36,14 +36,12 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.control.feedback.driver import Driver
-    from printhammer.control.feedback.loop import Loop
-    from printhammer.drive.sequence import PulseSequence
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.results.result import Entries
     from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 BURST: Final = "11101101"  # Pattern of the run that is shown
 MOST_GAPS: Final = 500  # Number of gaps above which a double-pulse test is refused
@@ -51,68 +49,14 @@ MOST_GAPS: Final = 500  # Number of gaps above which a double-pulse test is refu
 _GAPS: Final = (1.5, 6.0, 46)
 
 
-class FeedbackStrategy:
-    """Feedback as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`.
+class ObservedRun(Declared):
+    """One run of the closed loop, and what the controller saw of it."""
 
-    Parameters
-    ----------
-    controller : Controller
-        Made for the nominal hammer.
-    sensor : PositionSensor, optional
-        What it sees of the hammer that is driven.
-    tolerance : float, optional
-        Of the closed loop.
-    threads : int, optional
-        By default as many as there are cores; the drives do not depend on it.
-    """
-
-    name = "feedback"
-
-    def __init__(
-        self,
-        controller: Controller,
-        sensor: PositionSensor | None = None,
-        *,
-        tolerance: float = DISPLAY_TOLERANCE,
-        threads: int | None = None,
-    ) -> None:
-        self.controller = controller
-        self.sensor = PositionSensor() if sensor is None else sensor
-        self._options: dict[str, Any] = {"tolerance": tolerance, "threads": threads}
-
-    def loops(self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Loop]:
-        """Run the closed loop on a hammer for each pattern."""
-        return closed_loops(hammer, self.controller, self.sensor, patterns, rate, **self._options)
-
-    def __call__(
-        self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
-    ) -> list[PulseSequence]:
-        """Run the closed loop on a hammer, and return the drive that it gave each pattern."""
-        loops = self.loops(hammer, patterns, rate) if patterns else []
-        return [loop.drive(self.controller.driver.edge) for loop in loops]
-
-
-@dataclass(frozen=True)
-class ObservedRun:
-    """One run of the closed loop, and what the controller saw of it.
-
-    Attributes
-    ----------
-    pattern : str
-        The slots, 1 where a dot is wanted.
-    motion : Motion
-        The run.
-    times, shown : array
-        Times of the samples that were looked at, s, and what the sensor showed, m.
-    due : array
-        Times at which touches were wanted, s.
-    """
-
-    pattern: str
-    motion: Motion = field(repr=False)
-    times: FloatArray = field(repr=False)
-    shown: FloatArray = field(repr=False)
-    due: FloatArray = field(repr=False)
+    pattern: str = part("the slots, 1 where a dot is wanted")
+    motion: Motion = part("the run", repr=False)
+    times: FloatArray = column("s", "times of the samples that were looked at", "sample")
+    shown: FloatArray = column("m", "what the sensor showed", "sample")
+    due: FloatArray = column("s", "times at which touches were wanted", "dot")
 
 
 _DOTS: Final = "strategy pattern dot"
@@ -129,9 +73,7 @@ class Feedback(Result, rows=_DOTS):
     single: Nominal = part("the single-pulse dot of the nominal hammer, by which all are judged")
     rate: float = scalar("Hz", "slots per second")
     strategies: tuple[str, ...] = coordinate("", "name of the way to drive", "strategy", name="strategy")
-    passed: npt.NDArray[np.bool_] = column(
-        "1", "whether all dots are within limits", "strategy pattern", dtype=np.int8
-    )
+    passed: BoolArray = column("1", "whether all dots are within limits", "strategy pattern", dtype=np.int8)
     force: FloatArray = column(
         "1",
         "force less that of the single pulse, in parts of it",
@@ -141,8 +83,8 @@ class Feedback(Result, rows=_DOTS):
     arrival: FloatArray = column(
         "s", "arrival less slot time and single-pulse flight time", _DOTS, more="nan likewise"
     )
-    lost: npt.NDArray[np.int64] = column("1", "lost dots", "strategy", dtype=np.int32)
-    extra_contacts: npt.NDArray[np.int64] = column("1", "extra contacts", "strategy", dtype=np.int32)
+    lost: IntArray = column("1", "lost dots", "strategy", dtype=np.int32)
+    extra_contacts: IntArray = column("1", "extra contacts", "strategy", dtype=np.int32)
     peak_current: FloatArray = column("A", "largest absolute value of the current", "strategy")
     gaps: FloatArray = coordinate("s", "time between two slots", "gap", name="gap")
     gap_force: FloatArray = column("1", "likewise of the second of two dots", "strategy gap")
@@ -213,8 +155,8 @@ def feedback(
         Largest current of the driver to either side, A.
     edge : float or str, optional
         Time constant of the driver, s; by default that with which the hammer's own waveform decays.
-    limits : Limits, optional
-        How far dots may be off.
+    limits, threads
+        As for `printhammer.safe_rate`.
     beside : sequence of Strategy, optional
         Further ways to drive, for instance a compensation table.
     gaps : array, optional
@@ -222,8 +164,6 @@ def feedback(
         times the flight time of the single pulse.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores; the result does not depend on it.
 
     Returns
     -------
@@ -235,33 +175,33 @@ def feedback(
     InputError
         An argument is not what is described above, or the driver is too weak for the hammer.
     """
-    speed = rate_of(rate)
-    wide = None if edge is None else read_positive(edge, "s", "edge")
-    driver = driver_of(hammer, read_positive(current, "A", "current"), wide)
-    seeing = PositionSensor() if sensor is None else sensor
+    slot_rate = read_positive(rate, "Hz", "rate")
+    time_constant = None if edge is None else read_positive(edge, "s", "edge")
+    driver = driver_of(hammer, read_positive(current, "A", "current"), time_constant)
+    position_sensor = PositionSensor() if sensor is None else sensor
     bounds = Limits() if limits is None else limits
-    real = hammer if driven is None else driven
+    actual = hammer if driven is None else driven
     between = None if gaps is None else _checked_gaps(gaps)
     controller = Controller(hammer, driver, bounds, threads=threads)
-    own = FeedbackStrategy(controller, seeing, tolerance=tolerance, threads=threads)
+    own = FeedbackStrategy(controller, position_sensor, tolerance=tolerance, threads=threads)
     every: list[Strategy] = [open_loop, *beside, own]
     if between is None:
         between = np.linspace(*_GAPS) * controller.single.flight_time
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     patterns = from_rest(every=False)
     single = controller.single
-    trials = [attempt([Case(real, single, speed)], patterns, way, **options) for way in every]
-    cases = [Case(real, single, 1.0 / gap) for gap in between.tolist()]
+    trials = [attempt([Case(actual, single, slot_rate)], patterns, way, **options) for way in every]
+    cases = [Case(actual, single, 1.0 / gap) for gap in between.tolist()]
     doubles = [attempt(cases, [(0, 1)], way, **options) for way in every]
     judged = [trial.judgement for trial in trials]
     return Feedback(
         hammer=hammer,
-        driven=real,
+        driven=actual,
         driver=driver,
-        sensor=seeing,
+        sensor=position_sensor,
         limits=bounds,
         single=single,
-        rate=speed,
+        rate=slot_rate,
         strategies=tuple(name_of(way) for way in every),
         passed=np.array([judgement.passed for judgement in judged]),
         force=np.array([judgement.force_deviation for judgement in judged]),
@@ -272,7 +212,7 @@ def feedback(
         gaps=between,
         gap_force=np.array([double.judgement.force_deviation[:, 1] for double in doubles]),
         gap_arrival=np.array([double.judgement.arrival_deviation[:, 1] for double in doubles]),
-        run=_observed(real, own, speed, tolerance),
+        run=_observed(actual, own, slot_rate, tolerance),
         tolerance=read_number(tolerance, "1", "tolerance"),
     )
 

@@ -7,7 +7,7 @@ soon, and brakes it before the backstop where there is time to come to rest.
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -29,12 +29,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.feedback.driver import Driver
-    from printhammer.control.feedback.estimator.sensor import PositionSensor, Samples
-    from printhammer.control.feedback.interpolation import IntArray
+    from printhammer.control.feedback.estimator.sensor import Samples
     from printhammer.control.feedback.loop import Loop
     from printhammer.control.feedback.policy import Choice
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
 """Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,
@@ -50,7 +49,7 @@ _LAUNCH_ERRORS: Final = (0.005, 0.003)
 # Distance before the touch from which a contact is computed, in parts of the way to the pack
 _BEFORE: Final = 0.15
 # Time after a touch up to which its samples are looked at, in flight times of the single pulse
-_CONTACT: Final = 1.1
+CONTACT: Final = 1.1
 # Change of the time of a touch beyond which an estimate is not believed, in flight times
 _ASTRAY: Final = 0.4
 # Current, in parts of the largest one, that presses the armature against the backstop after a landing
@@ -104,40 +103,20 @@ class Controller:
             missing = "pack" if hammer.front is None else "backstop"
             raise InputError(f"{hammer.path}: the hammer has no {missing}, expected one")
         self.limits = Limits() if limits is None else limits
-        self.leads = LEADS
         self.plant = plant = Plant(hammer, driver, nominal(hammer), threads)
         self.hammer, self.driver = hammer, driver
         self.single, self.stroke = plant.single, plant.stroke
         forces = force_map(plant)
         self.start = launch(plant, forces)
         self.fronts = fronts(plant, forces, self.start)
-        self._policies: dict[float, Policy] = {}
+        self._contacts = Contacts(plant)
+        # Of a period, s
+        self.policy = lru_cache(_POLICIES)(lambda period: Policy(self.fronts, period, self.limits))
 
     @cached_property
     def force(self) -> FreeForce:
         """Force on the flying armature."""
         return FreeForce(self.hammer, self.hammer.origin, self.plant.front, self.driver.current)
-
-    @cached_property
-    def contacts(self) -> Contacts:
-        """Contacts of the nominal hammer with packs at several places."""
-        return Contacts(self.plant)
-
-    def policy(self, period: float) -> Policy:
-        """Return the policy for a period, s."""
-        if period not in self._policies:
-            if len(self._policies) >= _POLICIES:
-                self._policies.clear()
-            self._policies[period] = Policy(self.fronts, period, self.limits)
-        return self._policies[period]
-
-    def samples(self, sensor: PositionSensor) -> int:
-        """Return the number of samples of a flight that are looked at."""
-        return max(1, round(WINDOW / sensor.interval))
-
-    def contact_samples(self, sensor: PositionSensor) -> int:
-        """Likewise of a contact."""
-        return max(1, round(_CONTACT * self.single.flight_time / sensor.interval))
 
     def launch(self, loop: Loop, dot: int) -> None:
         """Fire from rest, so that a dot comes when it is due."""
@@ -165,7 +144,7 @@ class Controller:
         for loop in loops:
             loop.learned.drift()
         if rows:
-            self.contacts.learn([loops[k] for k in rows], samples.take(rows))
+            self._contacts.learn([loops[k] for k in rows], samples.take(rows))
 
     def estimate(self, loops: Sequence[Loop], samples: Samples) -> None:
         """Estimate the coming touches from what the sensor shows of flights."""
@@ -195,7 +174,7 @@ class Controller:
                 loop.touch, loop.speed = float(flight.touch[k]), float(flight.speed[k])
                 loop.learned.take_scale(float(flight.scale[k]), float(flight.covariance[k, 2, 2]))
                 loop.touched = Touched(
-                    float(begins[k]), loop.touch + _CONTACT * long, states[k], covariances[k]
+                    float(begins[k]), loop.touch + CONTACT * long, states[k], covariances[k]
                 )
             loop.touches.append((loop.touch, loop.speed))
             used = samples.used[k]
@@ -248,8 +227,8 @@ class Controller:
             self._push(loop, pulse, float(release[k]), back)
             pulse.switch(loop.touch + ahead[k].fire, 0.0)
             self._throw(loop, loop.touch, ahead[k])
-            # What the contact tells of the front comes in time for a throw that is late.
-            over = printed.touch + _CONTACT * self.single.flight_time + _PATIENCE
+            # What the contact shows of the front comes in time for a throw that is late.
+            over = printed.touch + CONTACT * self.single.flight_time + _PATIENCE
             unsure = learned.front_error > KNOWN and loop.pulses[-1].fired > over
             loop.printed = printed if unsure else None
 
@@ -330,15 +309,15 @@ class Controller:
         """Return release, begin and width of the brake pulse for some touches."""
         below, share = between(self.fronts.table, kind, speed)
         nearer, farther = between_fronts(front)
-        found = []
+        settings = []
         for name in ("release", "brake", "width"):
             tables = np.array([getattr(landing, name) for landing in self.fronts.landings])
             near, far = (
                 blend_known(tables[number, below], tables[number, below + 1], share)
                 for number in (nearer, nearer + 1)
             )
-            found.append(blend_known(near, far, farther))
-        return found
+            settings.append(blend_known(near, far, farther))
+        return settings
 
     @property
     def _rest(self) -> float:

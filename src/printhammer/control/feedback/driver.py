@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from printhammer.drive.input import read_positive
@@ -10,31 +9,23 @@ from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Switched
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
+from printhammer.results import Declared, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.hammer.hammer import Hammer
 
-LARGEST_CURRENT: Final = 2.0  # Largest current unless told otherwise, A
+LARGEST_CURRENT: Final = 2.0  # Largest current by default, A
 FASTEST: Final = 1e-6  # Least time constant of a driver, s; a shorter one of a hammer counts as this
 STANDARD: Final = 20e-6  # Time constant where the waveform of a hammer has no decay, s
 
 
-@dataclass(frozen=True)
-class Driver:
-    """A driver that switches the coil between currents.
+class Driver(Declared):
+    """A driver that switches the coil between currents."""
 
-    Attributes
-    ----------
-    current : float
-        Largest current to either side, A.
-    edge : float
-        Time constant with which the current goes to its new value, s.
-    """
-
-    current: float
-    edge: float
+    current: float = scalar("A", "largest current to either side")
+    edge: float = scalar("s", "time constant with which the current goes to its new value")
 
     def __post_init__(self) -> None:
         read_positive(self.current, "A", "current of the driver")

@@ -18,11 +18,10 @@ from printhammer.control.feedback.soft_landing import soft_landing
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.impact_map import ForceMap, ImpactMap
-    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.control.feedback.launch import Launch
     from printhammer.control.feedback.plant import Plant
     from printhammer.control.feedback.soft_landing import Landing
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)
 """By how much the fronts of the maps lie farther from the armature, in parts of the way to the pack; evenly
@@ -75,11 +74,10 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
         key = int(row), float(table.release[row, way]), float(table.back[way])
         which[row, way] = keys.setdefault(key, len(keys))
     # From where the nominal hammer touches its pack.
-    found = released_forces(farther, table.forces, list(keys))
+    forces = released_forces(farther, table.forces, list(keys))
     nominal = np.array([table.forces.force_at(*key) for key in keys])
-    slopes = np.append(np.nan_to_num((found - nominal) / OFFSETS[-1]), 0.0)
-    values: FloatArray = slopes[which]
-    return values
+    slopes = np.append(np.nan_to_num((forces - nominal) / OFFSETS[-1]), 0.0)
+    return np.asarray(slopes[which])
 
 
 def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:

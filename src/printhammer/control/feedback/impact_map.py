@@ -16,10 +16,9 @@ import numpy as np
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.driver import Driver
-    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.control.feedback.plant import Plant
     from printhammer.drive.waveforms.shapes import Switched
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 AHEAD: Final = 1e-6  # Time before the touch at which the runs of a map begin, s
 PUSHED, FREE = 0, 1
@@ -68,12 +67,12 @@ class ForceMap:
 
         Where even no push is too much, it is 0.
         """
-        found = np.full(self.force.shape[:2], np.nan)
-        for place in np.ndindex(found.shape):
+        releases = np.full(self.force.shape[:2], np.nan)
+        for place in np.ndindex(releases.shape):
             row = np.maximum.accumulate(self.force[place])
             if row[-1] >= force:
-                found[place] = np.interp(force, row, self.release) if row[0] < force else 0.0
-        return found
+                releases[place] = np.interp(force, row, self.release) if row[0] < force else 0.0
+        return releases
 
     def force_at(self, row: int, release: float, back: float) -> float:
         """Return the force of a touch, in parts of the single-pulse force."""
@@ -115,15 +114,15 @@ def force_map(plant: Plant) -> ForceMap:
     speeds = np.concatenate([_PUSHED_SPEEDS, _FREE_SPEEDS]) * single.impact_speed
     releases, back = _RELEASES * single.flight_time, np.array(_RETURNS) * driver.current
     force = np.empty((len(kinds), len(back), len(releases)))
-    found = ForceMap(kinds, speeds, back, releases, force, plant.front)
+    forces = ForceMap(kinds, speeds, back, releases, force, plant.front)
     keys = [
         (row, release, level)
         for row in range(len(kinds))
         for level in back.tolist()
         for release in releases.tolist()
     ]
-    force[:] = released_forces(plant, found, keys).reshape(force.shape)
-    return found
+    force[:] = released_forces(plant, forces, keys).reshape(force.shape)
+    return forces
 
 
 def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float, float]]) -> FloatArray:

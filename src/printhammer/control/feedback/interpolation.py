@@ -7,11 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
-
-    IntArray = npt.NDArray[np.int64]
+    from printhammer.support.arrays import FloatArray, IntArray
 
 
 def place_of(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -23,8 +19,7 @@ def place_of(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArra
 
 def blend(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
     """Return values between two, nearer the second one the larger its share."""
-    found: FloatArray = (1.0 - share) * low + share * high
-    return found
+    return np.asarray((1.0 - share) * low + share * high)
 
 
 def bilinear(table: FloatArray, i: IntArray, p: FloatArray, j: IntArray, q: FloatArray) -> FloatArray:

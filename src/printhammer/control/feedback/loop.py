@@ -91,7 +91,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """A touch as it was when its push was decided, before the contact told where the front is."""
+    """A touch as it was when its push was decided, before the contact showed where the front is."""
 
     # Time, s, speed, m/s, and kind of the touch
     touch: float
@@ -110,7 +110,7 @@ class Loop:
 
     slots: tuple[int, ...]  # Numbers of the slots at which dots are wanted
     due: FloatArray  # Times at which touches are wanted, s, (dots,)
-    key: int  # What tells the noise of this run from that of others
+    key: int  # By which the noise of this run differs from that of others
     state: FloatArray  # Displacement, m, velocity, m/s, mode, memory, (4,)
     pulses: list[Pulse] = field(default_factory=list)  # All firings so far
     # The coming touch as it is expected: time, s, speed, m/s, and kind

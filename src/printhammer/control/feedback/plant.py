@@ -14,13 +14,12 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.control.feedback.driver import Driver
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
     from printhammer.run.ensemble import DotTable, Strobes
+    from printhammer.support.arrays import BoolArray
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Plant:
 
     def run(
         self, drives: Sequence[Drive], end: Any, states: Any = None, strobes: Any = None
-    ) -> tuple[npt.NDArray[np.bool_], DotTable, Strobes]:
+    ) -> tuple[BoolArray, DotTable, Strobes]:
         """Run drives from rest, or from states (drives, 2), m and m/s, up to an end, s.
 
         Returns

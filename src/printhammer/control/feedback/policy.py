@@ -23,9 +23,8 @@ from printhammer.control.feedback.interpolation import bilinear, blend, place_of
 if TYPE_CHECKING:
     from printhammer.control.feedback.fronts import Fronts
     from printhammer.control.feedback.impact_map import ImpactMap
-    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.printing.dots.limits import Limits
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 NEVER: Final = 50.0  # Cost of what leads nowhere
 # Standard deviation of the front, in parts of the way to the pack, above which it counts as not known
@@ -72,19 +71,18 @@ class Policy:
     def dot_cost(self, force: FloatArray, late: FloatArray) -> FloatArray:
         """Return the cost of a dot: force in parts of the single-pulse force, lateness in s."""
         a, b = (force - 1.0) / self.limits.force, late / self.limits.arrival
-        cost: FloatArray = a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4)
-        return cost
+        return np.asarray(a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4))
 
     def effort(self, release: FloatArray) -> FloatArray:
         """Return what it costs to pull back, where it is not needed: a hard landing wears the backstop."""
         table = self.table
-        cost: FloatArray = _EFFORT * np.square(table.back / table.driver.current) * (table.fire - release)
-        return cost / self.period
+        cost = _EFFORT * np.square(table.back / table.driver.current) * (table.fire - release)
+        return np.asarray(cost / self.period)
 
     def ahead(self, kind: IntArray, late: FloatArray, speed: FloatArray, costs: FloatArray) -> FloatArray:
         """Return the cost of a touch and all that follows it."""
         kinds, lates, speeds = np.broadcast_arrays(kind, late, speed)
-        found = np.full(kinds.shape, NEVER)
+        total = np.full(kinds.shape, NEVER)
         end = self._late[-1]
         for number, rows in enumerate(self._rows):
             nodes = self.table.speed[rows]
@@ -94,10 +92,10 @@ class Policy:
                 continue
             off = lates[inside]
             places = place_of(speeds[inside], nodes), place_of(np.clip(off, -end, end), self._late)
-            found[inside] = bilinear(costs[rows], *places[0], *places[1])
+            total[inside] = bilinear(costs[rows], *places[0], *places[1])
             # Too late is worse the later it is, so that lost time is made up for.
-            found[inside] += NEVER * np.maximum(np.abs(off) - end, 0.0) / self.limits.arrival
-        return found
+            total[inside] += NEVER * np.maximum(np.abs(off) - end, 0.0) / self.limits.arrival
+        return total
 
     def best(
         self,
@@ -115,7 +113,7 @@ class Policy:
         The touches come by `kind`, `late`, s, and `speed`, m/s. The next dot is to come after `wait`, s, and
         `after` dots follow between that one and a rest. The front of the pack lies farther away by `front`,
         known to `front_error`, in parts of the way from backstop to pack. Where the throw alone is to be
-        decided, `done` tells what has been done by then.
+        decided, `done` says what has been done by then.
         """
         choice = Choice(self.fronts, kind, speed, front)
         if done is not None:
@@ -149,7 +147,7 @@ class Policy:
         table between the speeds says little.
         """
         table = self.table
-        found = np.zeros(table.next_touch.shape)
+        doubts = np.zeros(table.next_touch.shape)
         for rows in self._rows:
             speeds, touch = table.speed[rows], table.next_touch[rows]
             slope = np.abs(np.gradient(touch, speeds, axis=0))
@@ -158,8 +156,8 @@ class Policy:
             around = np.vstack([steepest, steepest[-1:]])
             # At the end of what is possible there is no slope to either side.
             slope = np.nan_to_num(np.maximum(slope, around), nan=_STEEPEST)
-            found[rows] = np.square(slope * _SPEED_DOUBT / self.limits.arrival)
-        return found
+            doubts[rows] = np.square(slope * _SPEED_DOUBT / self.limits.arrival)
+        return doubts
 
     def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
         """Return what it costs some touches that the front of the pack is known only so well, (M, A)."""
@@ -240,7 +238,7 @@ class Choice:
         """Interpolate arrays (T, A) of all maps to (M, A), or to (M,) for one way each."""
         tables = [getattr(table, name) for table in self._fronts.maps]
         shape = (len(self.below), tables[MIDDLE].shape[1]) if way is None else (len(self.below),)
-        found = np.empty(shape)
+        values = np.empty(shape)
         for number, (near, far) in enumerate(itertools.pairwise(tables)):
             rows = np.flatnonzero(self.nearer == number)
             own: Any = slice(None) if way is None else way[rows]
@@ -248,8 +246,8 @@ class Choice:
             if way is None:
                 share, farther = share[:, np.newaxis], farther[:, np.newaxis]
             low, high = (blend(table[below, own], table[below + 1, own], share) for table in (near, far))
-            found[rows] = blend(low, high, farther)
-        return found
+            values[rows] = blend(low, high, farther)
+        return values
 
 
 def between(table: ImpactMap, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:

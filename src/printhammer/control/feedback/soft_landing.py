@@ -17,9 +17,8 @@ from printhammer.hammer.equilibrium import rest_state
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.impact_map import ForceMap
-    from printhammer.control.feedback.interpolation import IntArray
     from printhammer.control.feedback.plant import Plant
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 # Beginnings and widths of the brake pulses of the first grid, in flight times of the single pulse
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
@@ -93,5 +92,5 @@ def _left(
     ok, dots, strobes = plant.run(drives, float(watched[-1]), states, [watched] * len(drives))
     # An armature that hovers between backstop and pack is slow too, but not at rest.
     away = np.abs(strobes.x - rest_state(plant.hammer)) / (_FALL * scale)
-    found = np.maximum(np.abs(strobes.v), away).max(axis=1)
-    return np.where(ok & (dots.extra_contacts[:, 0] == 0), found, np.inf).reshape(tried.shape[:2])
+    remaining = np.maximum(np.abs(strobes.v), away).max(axis=1)
+    return np.where(ok & (dots.extra_contacts[:, 0] == 0), remaining, np.inf).reshape(tried.shape[:2])

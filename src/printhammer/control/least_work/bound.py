@@ -14,7 +14,6 @@ fall counts as its positive work, and a backstop gives back less of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -22,6 +21,7 @@ import numpy as np
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.static_force import StaticForce
+from printhammer.results import Declared, scalar
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.ledger import stored_energy
 from printhammer.run.simulate import CYCLE
@@ -38,29 +38,14 @@ _SPEEDS: Final = 32  # Speeds with which an armature is thrown at the backstop
 _STROBES: Final = 4001  # Instants at which it is looked at
 
 
-@dataclass(frozen=True)
-class Bound:
-    """Least positive work of the coil, J.
+class Bound(Declared):
+    """Least positive work of the coil."""
 
-    Attributes
-    ----------
-    first : float
-        For a dot from rest.
-    later : float
-        For each dot after it, thrown from where the armature turned before the pack.
-    bounced : float
-        For each dot after it, thrown after a bounce off the backstop.
-    turn : float
-        Displacement nearest to the paper from which a later dot can be thrown, m.
-    loading : float
-        Loading work of the pack for one dot.
-    """
-
-    first: float
-    later: float
-    bounced: float
-    turn: float
-    loading: float
+    first: float = scalar("J", "for a dot from rest")
+    later: float = scalar("J", "for each dot after it, thrown from where the armature turned before the pack")
+    bounced: float = scalar("J", "for each dot after it, thrown after a bounce off the backstop")
+    turn: float = scalar("m", "displacement nearest to the paper from which a later dot can be thrown")
+    loading: float = scalar("J", "loading work of the pack for one dot")
 
     def burst(self, dots: int) -> float:
         """Return the least positive work of a burst of some dots, J."""
@@ -78,8 +63,8 @@ def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Boun
     thrown = _strongest(static, x, largest)
     # Trapezoidal rule from every place to the last one.
     parts = 0.5 * float(x[1] - x[0]) * (thrown[1:] + thrown[:-1])
-    given = np.append(np.cumsum(parts[::-1])[::-1], 0.0)
-    enough = np.flatnonzero(given >= loading)
+    supplied = np.append(np.cumsum(parts[::-1])[::-1], 0.0)
+    enough = np.flatnonzero(supplied >= loading)
     # The place after it, so that the bound errs on the safe side by a step.
     turn = min(float(x[enough[-1] + 1]), static.front) if enough.size else float(x[0])
     # Where the energy has a crest on the way, it is best to turn on it.
@@ -120,12 +105,12 @@ def _given_back(hammer: Hammer, most: float) -> float:
     never = PulseTrain(hammer.waveform, at=[2.0 * CYCLE])
     grid = np.linspace(0.0, CYCLE, _STROBES)
     states = np.stack([np.full(_SPEEDS, bottom), -speeds], axis=1)
-    found = Ensemble(hammer, never, CYCLE, states=states).run(strobes=[grid] * _SPEEDS).strobes
-    assert found is not None
+    strobes = Ensemble(hammer, never, CYCLE, states=states).run(strobes=[grid] * _SPEEDS).strobes
+    assert strobes is not None
     places = np.linspace(bottom, front, _POINTS)
     stored = np.array([stored_energy(hammer, place) for place in places.tolist()])
-    energy = 0.5 * hammer.mass * found.v**2 + np.interp(found.x, places, stored - stored[0])
-    rising = (found.v > 0.0) & (found.x >= bottom) & (found.x <= front)
+    energy = 0.5 * hammer.mass * strobes.v**2 + np.interp(strobes.x, places, stored - stored[0])
+    rising = (strobes.v > 0.0) & (strobes.x >= bottom) & (strobes.x <= front)
     return float(energy[rising].max(initial=0.0))
 
 

@@ -23,14 +23,14 @@ from printhammer.control.least_work.coil_force import CoilForce
 from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
 from printhammer.control.least_work.slot import Task
-from printhammer.control.least_work.supply import SupplyCheck
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of, rate_of
-from printhammer.results import Result, part, scalar
+from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of
+from printhammer.printing.dots.settling import settled_from
+from printhammer.results import Declared, Result, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
@@ -56,18 +56,18 @@ if TYPE_CHECKING:
     from printhammer.run.contacts import Contact
     from printhammer.run.ledger import Ledger
     from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 FORCE: Final = 0.9  # Least force of an adequate dot, in parts of that of the single pulse
 SPACING: Final = 0.6
-"""Time between the nodes of the current unless told otherwise, in parts of the time in which a single pulse
+"""Time between the nodes of the current by default, in parts of the time in which a single pulse
 indents the pack; a period holds a whole number of them."""
 
 MOST_DOTS: Final = 1000  # Number of dots above which a burst is refused
 Least = Literal["positive work", "heat"]
 # What is made least: the positive work of the coil, or its heat, which goes by the squared current
 LEASTS: Final = get_args(Least)
-# Relative changes of the current under which a burst is looked at unless told otherwise
+# Relative changes of the current under which a burst is looked at by default
 SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
 Shape = Literal["free", "pulses"]
 # What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths
@@ -81,6 +81,20 @@ _SETTLED: Final = 1e-2
 
 class NoBurstError(PrinthammerError):
     """No current within the bounds was found that prints the burst."""
+
+
+class SupplyCheck(Declared):
+    """A burst when the supply gives another current than it was planned for: arrays of shape (n,)."""
+
+    changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
+    adequate: IntArray = part(
+        "number of dots in their slots with the force asked for, and without extra contacts"
+    )
+    weakest: FloatArray = part(
+        "force of the weakest dot, in parts of that of the single pulse; 0 where one is lost"
+    )
+    spread: FloatArray = part("largest deviation of a touch from its slot, s; NaN where a dot is lost")
+    status: TextArray = part("how the runs ended")
 
 
 class LeastWork(Result, rows="node"):
@@ -198,8 +212,8 @@ class LeastWork(Result, rows="node"):
         rest = stored_energy(hammer, rest_state(hammer))
         stored = np.array([stored_energy(hammer, x) for x in motion.x.tolist()])
         energy = 0.5 * hammer.mass * motion.v**2 + stored - rest
-        moving = np.flatnonzero(energy > _SETTLED * self.single.pack_loss)
-        return float(motion.t[min(int(moving[-1]) + 1, motion.t.size - 1)]) if moving.size else 0.0
+        place = settled_from(energy > _SETTLED * self.single.pack_loss)
+        return float(motion.t[min(place, motion.t.size - 1)])
 
     def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
         """Run the same drive, in one ensemble, with every current larger or smaller by given parts of it.
@@ -356,7 +370,7 @@ def least_work(
     NoBurstError
         No current within the bounds was found.
     """
-    period = 1.0 / rate_of(rate)
+    period = 1.0 / read_positive(rate, "Hz", "rate")
     count = read_count(dots, "dots")
     if count > MOST_DOTS:
         raise InputError(f"dots = {count}, expected at most {MOST_DOTS}")

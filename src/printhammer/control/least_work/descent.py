@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 LOST: Final = 25.0  # What a run that failed counts as, in parts of the tolerances
-MISSED: Final = 0.05  # Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`
-SLACK: Final = 8e-3  # Lack of force up to which a dot has the force asked for, in `FORCE`
+_MISSED: Final = 0.05  # Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`
+_SLACK: Final = 8e-3  # Lack of force up to which a dot has the force asked for, in `_FORCE`
 ARRIVAL: Final = 20e-6  # Tolerance by which a time of arrival is measured, s
-FORCE: Final = 0.05  # Tolerance by which a force is measured, relative
+_FORCE: Final = 0.05  # Tolerance by which a force is measured, relative
 _DIFFERENCE: Final = 1e-5  # Difference from which derivatives are taken
 _ENDS_AT: Final = 1e-5  # Change of the cost at which a descent ends
 
@@ -35,7 +35,7 @@ def descend(
 ) -> tuple[FloatArray, float]:
     """Minimise the first row that `measured` returns; of two more the first is 0, the second not negative.
 
-    `measured` returns rows (1 or 3, places) of many places (places, n); `conditions` tells whether there are
+    `measured` returns rows (1 or 3, places) of many places (places, n); `conditions` says whether there are
     the two more. `bounds` hold for every number of a place. `linear`, an offset and a matrix, are further
     numbers that are not to be negative. With `inward`, differences are taken away from the nearer of the
     bounds 0 and 1. Returns the place, and the first row there.
@@ -49,8 +49,8 @@ def descend(
         if key not in known:
             known.clear()
             side = np.where((place < 0.5) | (not inward), _DIFFERENCE, -_DIFFERENCE)
-            found = np.nan_to_num(measured(np.vstack([place, place + np.diag(side)])), nan=LOST)
-            known[key] = found[:, 0], (found[:, 1:] - found[:, :1]) / side
+            rows = np.nan_to_num(measured(np.vstack([place, place + np.diag(side)])), nan=LOST)
+            known[key] = rows[:, 0], (rows[:, 1:] - rows[:, :1]) / side
         return known[key]
 
     def row(number: int) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def descend(
     if conditions:
         asked += [{"type": "eq", **row(1)}, {"type": "ineq", **row(2)}]
     minimize: Any = optimize.minimize
-    found = minimize(
+    optimum = minimize(
         **row(0),
         x0=start,
         bounds=[bounds] * start.size,
@@ -71,7 +71,20 @@ def descend(
         options={"maxiter": rounds, "ftol": _ENDS_AT},
         constraints=asked,
     )
-    return np.asarray(found.x, dtype=np.float64), float(found.fun)
+    return np.asarray(optimum.x, dtype=np.float64), float(optimum.fun)
+
+
+def deviations(late: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return missed arrivals and spare forces, in parts of the tolerances.
+
+    Of dots that come `late`, s, not finite where there is none, with a `force` in parts of that asked for.
+    """
+    return np.where(np.isfinite(late), late / ARRIVAL, LOST), (force - 1.0) / _FORCE
+
+
+def met(missed: float, spare: float) -> bool:
+    """Return whether a dot of such deviations does."""
+    return abs(missed) < _MISSED and spare > -_SLACK
 
 
 def best_of(
@@ -89,9 +102,9 @@ def best_of(
     for number, start in enumerate(np.argsort(badness, kind="stable")[: most or tries].tolist()):
         if number >= tries and best is not None:
             break
-        found = attempt(start)
-        if found is not None and (best is None or found[0] < best[0]):
-            best = found
+        outcome = attempt(start)
+        if outcome is not None and (best is None or outcome[0] < best[0]):
+            best = outcome
     return None if best is None else best[1]
 
 

@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.least_work.descent import (
-    ARRIVAL,
-    FORCE,
-    LOST,
-    MISSED,
-    SLACK,
-    best_of,
-    descend,
-    sobol,
-)
+from printhammer.control.least_work.descent import ARRIVAL, LOST, best_of, descend, deviations, met, sobol
 from printhammer.control.least_work.slot import SlotState, end_of
 from printhammer.control.widths import of_width, widest
 from printhammer.drive.sequence import PulseSequence
@@ -96,7 +87,7 @@ class PulsePlan:
         def attempt(row: int) -> tuple[float, FloatArray] | None:
             place = _descend(measured, tried[row], conditions=True)
             cost, missed, above = measured(place[np.newaxis])[:, 0].tolist()
-            return (cost, place) if abs(missed) < MISSED and above > -SLACK else None
+            return (cost, place) if met(missed, above) else None
 
         cost, missed, above = measured(tried)
         best = best_of(cost + np.abs(missed) + np.abs(above), attempt, _TRIES, _MOST_TRIES)
@@ -166,7 +157,7 @@ class PulsePlan:
         touched = np.where(late, dots.fired_at + dots.flight_time, np.inf).min(axis=1)
         force = np.where(late, dots.peak_force, 0.0).max(axis=1, initial=0.0)
         contacts = (late * (1 + dots.extra_contacts)).sum(axis=1)
-        missed = np.where(np.isfinite(touched), (touched - begin - arrival) / ARRIVAL, LOST)
+        missed, spare = deviations(touched - begin - arrival, force / task.force)
         spent = np.trapezoid(np.maximum(power, 0.0), grid, axis=1)
         if task.heat:
             spent = task.loading * np.trapezoid(current**2, grid, axis=1) / (task.largest**2 * duration)
@@ -175,7 +166,6 @@ class PulsePlan:
         over = np.array([sum(self._pulses(row, arrival)[-1]) for row in rows]) - begin - arrival
         odd = _WRONG * ((contacts > wanted).astype(float) + ~result.ok) + np.maximum(over, 0.0) / ARRIVAL
         cost = (spent + np.trapezoid(power, grid, axis=1)) / task.loading + odd
-        spare = (force / task.force - 1.0) / FORCE
         return np.asarray(np.nan_to_num(np.stack([cost, missed, spare]), nan=LOST))
 
     def _keep(self, row: FloatArray, duration: float, arrival: float) -> None:

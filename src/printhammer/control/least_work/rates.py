@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.control.least_work.burst import NoBurstError, least_work
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.dots.nominal import rate_of
 from printhammer.results import Result, column, coordinate, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 FOUND = "ok"
 NOT_FOUND = "no current found"
@@ -33,8 +31,8 @@ class LeastWorkRates(Result):
     positive_ratio: FloatArray = column("1", "positive work over what the pack absorbs", "rate")
     bound_ratio: FloatArray = column("1", "least positive work of any current, likewise", "rate")
     squared_current: FloatArray = column("A^2 s", "integral of the squared current", "rate")
-    adequate: npt.NDArray[np.int64] = column("1", "number of adequate dots", "rate")
-    status: npt.NDArray[np.str_] = column(
+    adequate: IntArray = column("1", "number of adequate dots", "rate")
+    status: TextArray = column(
         "", "whether a current was found", "rate", more="no current found is no proof that there is none"
     )
 
@@ -79,16 +77,16 @@ def least_work_rates(
     """
     if isinstance(rates, str) or not len(rates):
         raise InputError(f"rates = {rates!r}, expected at least one rate in a sequence")
-    asked = np.array([rate_of(rate) for rate in rates])
+    asked = np.array([read_positive(rate, "Hz", "rate") for rate in rates])
     rows: list[tuple[float, float, float, float, int, str]] = []
     for number, rate in enumerate(asked.tolist()):
         try:
-            found = least_work(hammer, rate, dots=dots, **options)
+            burst = least_work(hammer, rate, dots=dots, **options)
         except NoBurstError:
             rows.append((np.nan, np.nan, np.nan, np.nan, 0, NOT_FOUND))
         else:
-            ratios = found.net_ratio, found.positive_ratio, found.bound_ratio
-            rows.append((*ratios, found.work.squared_current, found.adequate, FOUND))
+            ratios = burst.net_ratio, burst.positive_ratio, burst.bound_ratio
+            rows.append((*ratios, burst.work.squared_current, burst.adequate, FOUND))
         if progress is not None:
             progress(number + 1, asked.size)
     net, positive, least, squared, adequate, status = zip(*rows, strict=True)

@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.least_work.descent import (
-    ARRIVAL,
-    FORCE,
-    LOST,
-    MISSED,
-    SLACK,
-    best_of,
-    descend,
-    sobol,
-)
+from printhammer.control.least_work.descent import best_of, descend, deviations, met, sobol
 from printhammer.control.least_work.slot import RELOADING, SlotState, node_times
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Sampled
@@ -69,18 +60,18 @@ class NodePlan:
         nodes = self._nodes if self._currents else self._lead
         duration = nodes * self._step
         before = self._currents[-1] if len(self._currents) > 1 else None
-        found = printing_current(self._task, self._state, duration, duration - self._past, nodes, before)
-        if found is None:
+        current = printing_current(self._task, self._state, duration, duration - self._past, nodes, before)
+        if current is None:
             return False
-        self._state = self._task.end(self._state, found, duration)
-        self._currents.append(found)
+        self._state = self._task.end(self._state, current, duration)
+        self._currents.append(current)
         self.touches.append(sum(c.size for c in self._currents) * self._step - self._past)
         return True
 
     def land(self) -> None:
         """Plan the landing."""
-        found = landing_current(self._task, self._state, self._landing * self._step, self._landing)
-        self._currents.append(found)
+        current = landing_current(self._task, self._state, self._landing * self._step, self._landing)
+        self._currents.append(current)
 
     def drive(self) -> PulseSequence:
         """Return the whole current, fired slot by slot; the last one ends with the landing."""
@@ -112,45 +103,41 @@ def printing_current(
     A; None where none was found.
     """
 
-    def asked(found: Outcomes) -> tuple[FloatArray, FloatArray]:
-        missed = np.where(np.isnan(found.arrival), LOST, (found.arrival - arrival) / ARRIVAL)
-        return missed, (found.force / task.force - 1.0) / FORCE
+    def asked(outcomes: Outcomes) -> tuple[FloatArray, FloatArray]:
+        return deviations(outcomes.arrival - arrival, outcomes.force / task.force)
 
     def measured(currents: FloatArray) -> FloatArray:
-        found = task.run(begin, currents, duration, task.tolerance)
-        return np.stack([task.cost(found, duration), *asked(found)])
+        outcomes = task.run(begin, currents, duration, task.tolerance)
+        return np.stack([task.cost(outcomes, duration), *asked(outcomes)])
 
     def meets(currents: FloatArray) -> bool:
-        found = task.run(begin, currents[np.newaxis], duration, task.tolerance)
-        missed, above = asked(found)
-        clean = found.ok[0] and found.extra_contacts[0] == 0 and found.reloading[0] < _LAGS * RELOADING
-        return bool(clean and abs(missed[0]) < MISSED and above[0] > -SLACK)
+        outcomes = task.run(begin, currents[np.newaxis], duration, task.tolerance)
+        missed, above = asked(outcomes)
+        once = outcomes.ok[0] and outcomes.extra_contacts[0] == 0
+        return bool(once and outcomes.reloading[0] < _LAGS * RELOADING and met(missed[0], above[0]))
 
     def attempt(start: FloatArray, rounds: int = _ROUNDS) -> tuple[float, FloatArray] | None:
-        currents, cost = _descend(task, measured, begin.current, start, duration, rounds, printing=True)
+        cost, currents = _descend(task, measured, begin.current, start, duration, rounds, printing=True)
         return (cost, currents) if meets(currents) else None
 
     again = None if before is None else attempt(before, _ROUNDS_AGAIN)
     if again is not None:
         return again[1]
     tried = _profiles(task, begin.current, duration, arrival, nodes)
-    found = task.run(begin, tried, duration, _SEARCH_TOLERANCE)
-    missed, above = asked(found)
-    odd = _WRONG * ((found.extra_contacts > 0).astype(float) + ~found.ok)
-    badness = task.cost(found, duration) + np.abs(missed) + np.abs(above) + odd
+    outcomes = task.run(begin, tried, duration, _SEARCH_TOLERANCE)
+    missed, above = asked(outcomes)
+    odd = _WRONG * ((outcomes.extra_contacts > 0).astype(float) + ~outcomes.ok)
+    badness = task.cost(outcomes, duration) + np.abs(missed) + np.abs(above) + odd
     return best_of(badness, lambda row: attempt(tried[row]), _TRIES, _MOST_TRIES)
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
     """Find the currents at the nodes after the last dot with which the backstop takes least, A."""
 
-    def whole(currents: FloatArray) -> FloatArray:
-        return np.concatenate([currents, np.zeros((len(currents), 1))], axis=1)
-
     def rated(currents: FloatArray, tolerance: float) -> FloatArray:
-        found = task.run(begin, whole(currents), duration, tolerance)
-        odd = _WRONG * ((found.force > 0.0).astype(float) + ~found.ok)
-        return np.asarray(task.cost(found, duration) + odd)
+        outcomes = task.run(begin, np.pad(currents, ((0, 0), (0, 1))), duration, tolerance)
+        odd = _WRONG * ((outcomes.force > 0.0).astype(float) + ~outcomes.ok)
+        return np.asarray(task.cost(outcomes, duration) + odd)
 
     def measured(currents: FloatArray) -> FloatArray:
         return rated(currents, task.tolerance)[np.newaxis]
@@ -158,9 +145,7 @@ def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -
     tried = _landings(task, begin.current, duration, nodes)
 
     def attempt(row: int) -> tuple[float, FloatArray]:
-        start = tried[row]
-        currents, cost = _descend(task, measured, begin.current, start, duration, _ROUNDS, printing=False)
-        return cost, currents
+        return _descend(task, measured, begin.current, tried[row], duration, _ROUNDS, printing=False)
 
     best = best_of(rated(tried, _SEARCH_TOLERANCE), attempt, _TRIES)
     assert best is not None
@@ -176,8 +161,8 @@ def _descend(
     rounds: int,
     *,
     printing: bool,
-) -> tuple[FloatArray, float]:
-    """Return the best currents from a start, and their cost, within the bounds on value and slope.
+) -> tuple[float, FloatArray]:
+    """Return the cost of the best currents from a start, and these, within the bounds on value and slope.
 
     Without a dot to print, the current has to come back to zero in one more step.
     """
@@ -188,7 +173,7 @@ def _descend(
     reach = _INSIDE * task.slew * duration / steps
     both = np.concatenate([-slope, slope])
     room = reach + np.concatenate([-offset, offset])
-    found, cost = descend(
+    currents, cost = descend(
         measured,
         start,
         (-task.largest, task.largest),
@@ -196,7 +181,7 @@ def _descend(
         conditions=printing,
         linear=(room / task.largest, both / task.largest),
     )
-    return _within(task, found, begin, reach, not printing), cost
+    return cost, _within(task, currents, begin, reach, not printing)
 
 
 def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero: bool) -> FloatArray:

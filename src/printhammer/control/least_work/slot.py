@@ -18,11 +18,9 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.control.least_work.coil_force import CoilForce
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _SAMPLES: Final = 301  # Instants of a slot at which power and motion are looked at
 _IN_PACK: Final = {
@@ -104,11 +102,11 @@ class Outcomes:
     squared_current: FloatArray  # Integral of the squared current, A^2 s
     force: FloatArray  # Largest force of the first dot, N; 0 without one
     arrival: FloatArray  # Time of its touch since the slot began, s; NaN without one
-    extra_contacts: npt.NDArray[np.int64]  # Further contacts
+    extra_contacts: IntArray  # Further contacts
     # How far the armature lagged, m, in the contact with which the slot begins: by which way it left
     # the pack slower than `_LEAST_SPEED`, once clear of where it turned, or went into it again
     reloading: FloatArray
-    ok: npt.NDArray[np.bool_]  # Whether the run went as asked
+    ok: BoolArray  # Whether the run went as asked
 
 
 def node_times(duration: float, nodes: int) -> FloatArray:
@@ -165,16 +163,16 @@ class Task:
         ensemble = self._ensemble(begin, path, duration, self.tolerance)
         return end_of(ensemble, duration, float(currents[-1]))
 
-    def cost(self, found: Outcomes, duration: float) -> FloatArray:
+    def cost(self, outcomes: Outcomes, duration: float) -> FloatArray:
         """Return what is to be least, in parts of the loading work.
 
         The net work counts as well, since it grows with what the backstop takes. Lagging in the pack is dear:
         where the armature went into it again, the law as printed would jump to the loading branch, and the
         pack give back more than it does once unloaded.
         """
-        heat = found.squared_current / (self.largest**2 * duration)
-        spent = heat if self.heat else found.positive / self.loading + _SMOOTHING * heat
-        return np.asarray(spent + found.net / self.loading + found.reloading / RELOADING)
+        heat = outcomes.squared_current / (self.largest**2 * duration)
+        spent = heat if self.heat else outcomes.positive / self.loading + _SMOOTHING * heat
+        return np.asarray(spent + outcomes.net / self.loading + outcomes.reloading / RELOADING)
 
     def _ensemble(self, begin: SlotState, paths: FloatArray, duration: float, tolerance: float) -> Ensemble:
         # Thousands are made in a search: checks of what was just computed would take most of its time.
@@ -188,7 +186,7 @@ class Task:
 
 def end_of(ensemble: Ensemble, end: float, current: float) -> SlotState:
     """Return the state at the end of a run, s, where the current is known, A."""
-    found = ensemble.run(strobes=[[end]], threads=1, engine="plain").strobes
-    assert found is not None
-    x, v, memory = (float(column[0, 0]) for column in (found.x, found.v, found.memory))
-    return SlotState(x, v, int(found.branch[0, 0]), memory, current)
+    strobes = ensemble.run(strobes=[[end]], threads=1, engine="plain").strobes
+    assert strobes is not None
+    x, v, memory = (float(column[0, 0]) for column in (strobes.x, strobes.v, strobes.memory))
+    return SlotState(x, v, int(strobes.branch[0, 0]), memory, current)

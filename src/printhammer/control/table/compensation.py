@@ -23,6 +23,7 @@ from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
 from printhammer.support.outputs import write_file
+from printhammer.support.sheets import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,9 +63,13 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
     rates: FloatArray = coordinate("Hz", "slots per second", "rate", name="rate", more="ascending")
     gaps: int = scalar("1", "number of gaps in a history")
     reach: int = scalar("1", "longest gap that counts, slots", more="a longer one is rest")
-    advance: FloatArray = column("s", "how long before its slot a dot is fired", _CELLS)
+    advance: FloatArray = column(
+        "s", "how long before its slot a dot is fired", _CELLS, more="negative: after it"
+    )
     width: FloatArray = column("s", "width of its pulse", _CELLS)
-    brake_delay: FloatArray = column("s", "from the slot of the dot before to the brake pulse", _CELLS)
+    brake_delay: FloatArray = column(
+        "s", "from the slot of the dot before to the brake pulse", _CELLS, more="0 without one"
+    )
     brake_width: FloatArray = column("s", "width of the brake pulse, 0 for none", _CELLS)
     deviation: FloatArray = column(
         "1",
@@ -190,12 +195,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
         Parameters
         ----------
-        hammer : Hammer
-            The hammer the table is made for.
+        hammer, rate
+            As for `strategy` and `at`.
         slots : sequence of int
             Numbers of the slots, ascending; slot 0 is at `printhammer.printing.dots.slots.FIRST_SLOT`.
-        rate : float or str
-            Slots per second, Hz, or text with a unit.
 
         Raises
         ------
@@ -218,13 +221,13 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         """Return the arrays over the histories that differ, the gaps as text such as "1-2-rest"."""
         every = histories(self.gaps, self.reach)
         numbers = [number_of(history, self.reach) for history in every]
-        found = {
+        arrays = {
             name: (note, values[:, numbers] if note.kind == "column" else values)
             for name, (note, values) in super().entries().items()
         }
         meaning = "gaps to the dots before in slots, the latest first"
         note = Column("", meaning, ("history",), "coordinate", name="history")
-        return {**found, "history": (note, np.array([history_text(history) for history in every]))}
+        return {**arrays, "history": (note, np.array([history_text(history) for history in every]))}
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return a row for each rate and history, the gaps of the history in columns of their own."""
@@ -269,19 +272,9 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
 
 class TableStrategy:
-    """A compensation table as a way to drive a hammer.
+    """A compensation table as a way to drive a hammer, as `CompensationTable.strategy` makes it.
 
-    Parameters
-    ----------
-    table : CompensationTable
-        The table.
-    hammer : Hammer
-        The hammer it is made for, whose waveform gets other widths.
-
-    Raises
-    ------
-    InputError
-        A pulse of the table peaks above its largest current.
+    The waveform of the hammer it is made for gets other widths.
     """
 
     name = "table"
@@ -313,17 +306,7 @@ class TableStrategy:
 
 
 def load_table(path: str | Path) -> CompensationTable:
-    """Read a compensation table that was written as CSV or JSON.
-
-    Parameters
-    ----------
-    path : str or Path
-        Its file.
-
-    Returns
-    -------
-    CompensationTable
-        The same, to the last bit.
+    """Read a compensation table that was written as CSV or JSON; it is the same to the last bit.
 
     Raises
     ------
@@ -334,13 +317,7 @@ def load_table(path: str | Path) -> CompensationTable:
     target = Path(path)
     if target.suffix.lower() not in (".csv", ".json"):
         raise InputError(f"{target}: expected a table whose name ends in .csv or .json")
-    try:
-        text = target.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{target}: the table is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{target}: the table cannot be read ({reason})") from None
+    text = read_text(target, "the table")
     try:
         return CompensationTable(**read_table(text, target.suffix.lower()))
     except InputError as error:

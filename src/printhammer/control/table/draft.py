@@ -23,18 +23,15 @@ from printhammer.control.table.histories import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.control.table.histories import History
     from printhammer.control.table.task import Task
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
     Cells = Sequence[tuple[int, History]]
     """Entries by row and history."""
 
-    IntArray = npt.NDArray[np.int64]
 
 VALUES: Final = (*COLUMNS, "deviation")  # Names of the arrays of a table
 # Length of the row of dots in every slot before a history, where it has to be right in long patterns too
@@ -131,7 +128,7 @@ class Draft:
         most = max(map(len, gaps))
         drives: list[Drive] = []
         due: list[FloatArray] = []
-        alike: list[npt.NDArray[np.bool_]] = []
+        alike: list[BoolArray] = []
         known: dict[tuple[float, float, float], Waveform] = {}
         for (row, history), value, before in zip(cells, values, gaps, strict=True):
             settings, rate = Settings(*self.values[:4, row]), float(self.rates[row])
@@ -154,13 +151,13 @@ class Draft:
             slots_of_all[place, : len(times)] = times
             asked[place, : len(times)] = same
         last = np.arange(len(drives)), [len(times) - 1 for times in due]
-        found = []
+        deviations = []
         for hammer in task.hammers:
             off, crowded = task.deviations(hammer, drives, slots_of_all, ends)
             off = np.where(asked[:, :, np.newaxis], np.abs(off), 0.0).max(axis=1) if whole else off[last]
             off[crowded.any(axis=1)] = np.nan
-            found.append(off.reshape(len(cells), len(shifts), most, 2))
-        return np.concatenate(found, axis=2).reshape(len(cells), len(shifts), -1)
+            deviations.append(off.reshape(len(cells), len(shifts), most, 2))
+        return np.concatenate(deviations, axis=2).reshape(len(cells), len(shifts), -1)
 
 
 def blank(task: Task, rates: FloatArray) -> Draft:

@@ -12,6 +12,7 @@ from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Chain
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
+from printhammer.printing.dots.settling import settled_from
 from printhammer.printing.dots.slots import slot_times
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 WIDEST: Final = 2.0  # Largest width of a pulse, in parts of that of the hammer's own
-LARGEST_CURRENT: Final = 2.0  # Largest current in any drive unless told otherwise, A
+LARGEST_CURRENT: Final = 2.0  # Largest current in any drive by default, A
 # Part of the largest current that a single pulse stays below it, for what is left of a brake pulse
 MARGIN: Final = 1e-3
 ROUNDING: Final = 1e-9  # Part by which rounding may go beyond a bound
@@ -32,18 +33,9 @@ _WAIT: Final = 1e-6  # Step of the wait after a brake pulse, s
 
 
 class Settings(NamedTuple):
-    """What a table says at one rate: arrays of shape (entries,), over the numbers of the histories.
+    """What a `CompensationTable` says at one rate: arrays of shape (entries,), over the numbers of histories.
 
-    Attributes
-    ----------
-    advance : array
-        How long before its slot a dot is fired, s; negative: after it.
-    width : array
-        Width of its pulse, s.
-    brake_delay : array
-        From the slot of the dot before to the brake pulse in the gap before this dot, s; 0 without one.
-    brake_width : array
-        Width of that brake pulse, s; 0 for none.
+    Meanings and units are those of the columns of the table.
     """
 
     advance: FloatArray
@@ -81,8 +73,8 @@ def fading(pulse: Waveform, share: float) -> float:
     """Return the time, s, after its width in which a pulse has faded to a share of its peak for good."""
     own: Any = pulse
     times = np.linspace(own.width, max(pulse.support, own.width), _SAMPLES)
-    loud = np.flatnonzero(np.abs(pulse.value(times)) > share * pulse.peak)
-    return float(times[min(loud[-1] + 1, _SAMPLES - 1)] - own.width) if loud.size else 0.0
+    place = settled_from(np.abs(pulse.value(times)) > share * pulse.peak)
+    return float(times[min(place, _SAMPLES - 1)] - own.width)
 
 
 def clearance(pulse: Waveform, width: float, largest: float) -> float:

@@ -6,7 +6,6 @@ read back is the same table to the last bit; in the C header they are whole nano
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 from typing import TYPE_CHECKING, Any, Final
@@ -27,6 +26,7 @@ from printhammer.control.table.histories import (
 )
 from printhammer.errors import InputError
 from printhammer.support.constants import shown
+from printhammer.support.sheets import sheet_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -78,12 +78,8 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
         first = shown(lines[0] if lines else "")
         raise InputError(f"first line = {first}, expected {_FIRST!r}")
     head: Head = {}
-    body = []
     for line in lines[1:]:
-        if not line.startswith("#"):
-            body.append(line)
-            continue
-        if _ATTRIBUTE.match(line):
+        if not line.startswith("#") or _ATTRIBUTE.match(line):
             continue
         key, mark, value = line[1:].partition("=")
         if not mark:
@@ -96,7 +92,7 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
             raise InputError(f"{key.strip()} = {shown(value.strip())}: expected a text or a number") from None
     _check_head(head)
     gaps, wanted = head["gaps"], columns(head["gaps"])
-    table = [row for row in csv.reader(body) if row]
+    table = [cells for _line, cells in sheet_of(text, "table", gaps=True).rows]
     if not table or table[0] != wanted:
         raise InputError(
             f"columns = {shown(','.join(table[0]) if table else '')}, expected {','.join(wanted)}"
@@ -105,20 +101,14 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
     for number, cells in enumerate(table[1:], 1):
         if len(cells) != len(wanted):
             raise InputError(f"row {number}: {len(cells)} cells, expected {len(wanted)}")
-        texts = {"rate": cells[0], **dict(zip((*COLUMNS, DEVIATION), cells[1 + gaps :], strict=True))}
-        values = {
-            name: _csv_number(cell, f"row {number}: {name}") if cell or name != DEVIATION else None
-            for name, cell in texts.items()
-        }
-        rows.append({"gaps": cells[1 : 1 + gaps], **values})
+        row: dict[str, Any] = {"gaps": cells[1 : 1 + gaps]}
+        for name, cell in zip(("rate", *COLUMNS, DEVIATION), (cells[0], *cells[1 + gaps :]), strict=True):
+            try:
+                row[name] = float(cell) if cell or name != DEVIATION else None
+            except ValueError:
+                raise InputError(f"row {number}: {name} = {shown(cell)}, expected a number") from None
+        rows.append(row)
     return head, rows
-
-
-def _csv_number(text: str, where: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{where} = {shown(text)}, expected a number") from None
 
 
 def _of_json(text: str) -> tuple[Head, Rows]:
@@ -191,12 +181,12 @@ def _check_head(head: Mapping[str, Any]) -> None:
         raise InputError(f"largest_current = {head['largest_current']!r} A, expected a positive number")
 
 
-def _check_keys(given: Mapping[str, Any], wanted: Sequence[str], where: str) -> None:
-    for key in given:
+def _check_keys(entry: Mapping[str, Any], wanted: Sequence[str], where: str) -> None:
+    for key in entry:
         if key not in wanted:
             raise InputError(f"{where}{shown(key)} is not known, expected one of {', '.join(wanted)}")
     for key in wanted:
-        if key not in given:
+        if key not in entry:
             raise InputError(f"{where}{key} is missing")
 
 
@@ -228,8 +218,8 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
                 " for it"
             )
     shared = shared_numbers(gaps, reach)
-    given = {**head, "largest_current": float(head["largest_current"])}
-    return {**given, "rates": rates, **{name: values[:, shared] for name, values in arrays.items()}}
+    arguments = {**head, "largest_current": float(head["largest_current"])}
+    return {**arguments, "rates": rates, **{name: values[:, shared] for name, values in arrays.items()}}
 
 
 def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
@@ -241,10 +231,10 @@ def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
             raise InputError(
                 f"{where}gap = {shown(text)}, expected 'rest' or a whole number from 1 to {reach}"
             )
-    found = tuple(known[text] for text in texts)
-    if found != plain(found):
+    history = tuple(known[text] for text in texts)
+    if history != plain(history):
         raise InputError(f"{where}gaps = {'-'.join(texts)}, expected only rest after a rest")
-    return found
+    return history
 
 
 def header_text(head: Mapping[str, Any], rates: FloatArray, times: Mapping[str, FloatArray]) -> str:

@@ -21,7 +21,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
+    from printhammer.support.arrays import IntArray
 
 REST: Final = 0  # Gap of a dot that is printed from rest
 MOST_GAPS: Final = 4  # Largest number of gaps in a history
@@ -68,13 +68,13 @@ def histories(gaps: int, reach: int) -> list[History]:
     return sorted((row for row in every if row == plain(row)), key=lambda row: (gaps - row.count(REST), row))
 
 
-def shared_numbers(gaps: int, reach: int) -> npt.NDArray[np.int64]:
+def shared_numbers(gaps: int, reach: int) -> IntArray:
     """Return for every number that of the history it stands for, shape (entries,)."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return np.array([number_of(row, reach) for row in every], np.int64)
 
 
-def histories_of(slots: Sequence[int], gaps: int, reach: int) -> npt.NDArray[np.int64]:
+def histories_of(slots: Sequence[int], gaps: int, reach: int) -> IntArray:
     """Return the number of the history of each dot of a pattern that begins at rest.
 
     The last one, of dots + 1, is that of a dot long after, which is printed from rest: all rest. `slots` are
@@ -89,11 +89,11 @@ def histories_of(slots: Sequence[int], gaps: int, reach: int) -> npt.NDArray[np.
     if (steps < 1).any():
         raise InputError(f"slots = {tuple(slots)}, expected ascending numbers")
     recent = [REST] * gaps
-    found = [number_of(recent, reach)]
+    numbers = [number_of(recent, reach)]
     for step in steps.tolist():
         recent = [step if step <= reach else REST, *recent[:-1]]
-        found.append(number_of(recent, reach))
-    return np.array([*found, number_of([REST] * gaps, reach)], np.int64)
+        numbers.append(number_of(recent, reach))
+    return np.array([*numbers, number_of([REST] * gaps, reach)], np.int64)
 
 
 def gap_text(gap: int) -> str:

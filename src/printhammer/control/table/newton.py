@@ -9,12 +9,10 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-    from printhammer.support.arrays import FloatArray
-
-    Measure = Callable[[FloatArray, npt.NDArray[np.int64], FloatArray], FloatArray]
-    Bounded = Callable[[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_]], None]
+    Measure = Callable[[FloatArray, IntArray, FloatArray], FloatArray]
+    Bounded = Callable[[FloatArray, IntArray, BoolArray], None]
 
 ROUNDS: Final = 7  # Largest number of steps
 LONGEST_STEP: Final = 25e-6  # Longest change of firing time or width in one step, s

@@ -11,13 +11,11 @@ from printhammer.control.table.histories import REST, number_of
 from printhammer.control.table.newton import solve
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    import numpy.typing as npt
-
-    from printhammer.control.table.draft import Cells, Draft, IntArray
+    from printhammer.control.table.draft import Cells, Draft
     from printhammer.control.table.histories import History
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 GOOD: Final = 1e-4  # Deviation, in parts of the limits, from which on an entry is left as it is
 LEAST_OF_WIDEST: Final = 0.3  # Least width, in parts of the largest one
@@ -26,10 +24,10 @@ ROUGH: Final = 0.2
 _STEP: Final = 0.5e-6  # Difference of times from which derivatives are taken, s
 
 
-def polish(draft: Draft, report: Callable[[], None]) -> None:
+def polish(draft: Draft) -> None:
     """Improve all entries of a draft in place; that from rest stays as it is.
 
-    The draft has a first guess for every history. `report` is called after each round.
+    The draft has a first guess for every history.
     """
     task = draft.task
     for known in range(1, task.gaps + 1):
@@ -38,13 +36,13 @@ def polish(draft: Draft, report: Callable[[], None]) -> None:
             parent = (*history[: known - 1], *[REST] * (task.gaps - known + 1))
             guess = draft.values[:4, :, number_of(parent, task.reach)]
             draft.values[:4, :, number_of(history, task.reach)] = guess
-        _polish_level(draft, level, report)
+        _polish_level(draft, level)
     # Entries that come before others may have changed since they were judged.
     draft.judge()
-    report()
+    task.report()
 
 
-def _polish_level(draft: Draft, level: Sequence[History], report: Callable[[], None]) -> None:
+def _polish_level(draft: Draft, level: Sequence[History]) -> None:
     """Improve the entries of some histories at all rates; what is printed from rest stays as it is.
 
     At first each entry is made right in the pattern that begins with it: where all dots before are right, it
@@ -57,7 +55,7 @@ def _polish_level(draft: Draft, level: Sequence[History], report: Callable[[], N
         for history in level
         if history[0] / rate <= settled
     ]
-    _solve(draft, cells, report, dense=False)
+    _solve(draft, cells, dense=False)
     draft.judge(level)
     if not cells:
         return
@@ -66,14 +64,14 @@ def _polish_level(draft: Draft, level: Sequence[History], report: Callable[[], N
     if not rough:
         return
     before = draft.values.copy()
-    _solve(draft, rough, report, dense=True)
+    _solve(draft, rough, dense=True)
     draft.judge(level)
     rows, columns = draft.places(rough)
     worse = ~(draft.deviation[rows, columns] < before[4, rows, columns])
     draft.values[:, rows[worse], columns[worse]] = before[:, rows[worse], columns[worse]]
 
 
-def _solve(draft: Draft, cells: Cells, report: Callable[[], None], *, dense: bool) -> None:
+def _solve(draft: Draft, cells: Cells, *, dense: bool) -> None:
     if not cells:
         return
     task = draft.task
@@ -85,10 +83,10 @@ def _solve(draft: Draft, cells: Cells, report: Callable[[], None], *, dense: boo
         # Dots before the last one may have the same history.
         draft.timing[:, rows, columns] = now.T
         off = draft.last_dots([cells[k] for k in active.tolist()], now[active], shifts, dense=dense)
-        report()
+        task.report()
         return off
 
-    def bounded(now: FloatArray, active: IntArray, stepped: npt.NDArray[np.bool_]) -> None:
+    def bounded(now: FloatArray, active: IntArray, stepped: BoolArray) -> None:
         on = active[stepped]
         now[on, 0] = np.clip(now[on, 0], -task.latest(now[on, 1]), gap[on] - first[on])
 

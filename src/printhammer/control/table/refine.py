@@ -13,21 +13,18 @@ from printhammer.control.table.search import BAD, searched
 from printhammer.control.table.ways import costs, solved, ways_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from printhammer.control.table.draft import IntArray
+    from printhammer.support.arrays import IntArray
 
 HALVINGS: Final = 3  # How often the step between two rates is halved at most
 # Deviation between two rates, in parts of the limits, from which on there is one more between them
 BETWEEN: Final = 0.5
 
 
-def refined(draft: Draft, report: Callable[[], None]) -> Draft:
+def refined(draft: Draft) -> Draft:
     """Put rates between those of a table where it is not good enough halfway between two of them.
 
     Such places are where the way to fire a dot changes. The new entries follow that of the rate below or that
-    of the rate above, whichever is the better one; where neither is good, another one is looked for. `report`
-    is called after each step of the work.
+    of the rate above, whichever is the better one; where neither is good, another one is looked for.
     """
     # Rates at which every dot is printed from rest need nothing.
     lower = np.flatnonzero(1.0 / draft.rates[1:] <= draft.task.single.settled)
@@ -38,11 +35,11 @@ def refined(draft: Draft, report: Callable[[], None]) -> Draft:
         if not lower.size:
             break
         halfway = _halfway(draft, lower)
-        report()
+        draft.task.report()
         lower = lower[~(halfway.worst <= BETWEEN)]
         if not lower.size:
             break
-        more = _tuned(draft, lower, report)
+        more = _tuned(draft, lower)
         wanted = {*draft.rates[lower].tolist(), *more.rates.tolist()}
         rates = np.concatenate([draft.rates, more.rates])
         order = np.argsort(rates, kind="stable")
@@ -57,16 +54,16 @@ def _halfway(draft: Draft, lower: IntArray) -> Draft:
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     settings = np.array([table.at(float(rate)) for rate in rates])
     values = np.concatenate([settings, np.zeros_like(settings[:, :1])], axis=1).transpose(1, 0, 2)
-    found = Draft(draft.task, rates, values)
-    found.judge()
-    return found
+    halfway = Draft(draft.task, rates, values)
+    halfway.judge()
+    return halfway
 
 
-def _tuned(draft: Draft, lower: IntArray, report: Callable[[], None]) -> Draft:
+def _tuned(draft: Draft, lower: IntArray) -> Draft:
     """Return tuned rows halfway between some rates and those above them."""
     task = draft.task
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
-    found = Draft(task, rates, draft.values[:, lower])
+    halfway = Draft(task, rates, draft.values[:, lower])
     for gap in range(1, task.reach + 1):
         periods = gap / rates
         near = np.flatnonzero(periods <= task.single.settled)
@@ -87,6 +84,6 @@ def _tuned(draft: Draft, lower: IntArray, report: Callable[[], None]) -> Draft:
                 more = searched(task, float(periods[row]))
                 if more.size and more.cost.min() < cost[place].min():
                     best = more.take([int(more.cost.argmin())])
-            found.values[:4, row, column] = best.settings[:, 0]
-    polish(found, report)
-    return found
+            halfway.values[:4, row, column] = best.settings[:, 0]
+    polish(halfway)
+    return halfway

@@ -15,7 +15,7 @@ from printhammer.printing.dots.strategy import open_loop
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import from_rest
-from printhammer.results import Result, column, coordinate, derived, part, scalar
+from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
@@ -29,18 +29,11 @@ if TYPE_CHECKING:
 
 PERTURBATIONS: Final = (
     Perturbation(),
-    Perturbation(current=0.03),
-    Perturbation(current=-0.03),
-    Perturbation(current=0.1),
-    Perturbation(current=-0.1),
-    Perturbation(travel=10e-6),
-    Perturbation(travel=-10e-6),
-    Perturbation(forms=0.1),
-    Perturbation(forms=-0.1),
-    Perturbation(magnet=0.01),
-    Perturbation(magnet=-0.01),
-    Perturbation(damping=0.2),
-    Perturbation(damping=-0.2),
+    *(Perturbation(current=share) for share in (0.03, -0.03, 0.1, -0.1)),
+    *(Perturbation(travel=way) for way in (10e-6, -10e-6)),
+    *(Perturbation(forms=share) for share in (0.1, -0.1)),
+    *(Perturbation(magnet=share) for share in (0.01, -0.01)),
+    *(Perturbation(damping=share) for share in (0.2, -0.2)),
 )
 """Hammers on which a table is judged: supply, wire travel, number of forms, drift of magnet and damping."""
 
@@ -87,23 +80,13 @@ class TableReport(Result, rows=_AXES):
     arrival_deviation: FloatArray = part("likewise, s", repr=False)
     seed: int = scalar("1", "seed of the random patterns")
     tolerance: float = part("error allowed in one step")
+    strategy: tuple[str, ...] = coordinate("", "way to drive", "strategy", default=STRATEGIES)
+    patterns: tuple[str, ...] = coordinate("", "set of patterns", "patterns", default=SETS)
 
     @property
     def passed(self) -> Any:
         """Whether all dots are within limits, bool array of shape (strategies, hammers, rates)."""
         return (self.good == 1.0).all(axis=3)
-
-    @property
-    @derived("", "way to drive", "strategy", kind="coordinate")
-    def strategy(self) -> tuple[str, ...]:
-        """Names of the ways to drive."""
-        return STRATEGIES
-
-    @property
-    @derived("", "set of patterns", "patterns", kind="coordinate")
-    def patterns(self) -> tuple[str, ...]:
-        """Names of the sets of patterns."""
-        return SETS
 
     @property
     def title(self) -> str:
@@ -144,14 +127,12 @@ def judge_table(
         that lie between them.
     perturbations : sequence of Perturbation, optional
         How the hammers differ; by default `PERTURBATIONS`.
-    limits : Limits, optional
-        How far a dot may be off.
+    limits, threads
+        As for `printhammer.safe_rate`.
     seed : int, optional
         Of the random patterns.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores.
     progress : callable, optional
         Called now and then with the number of trials done and of all.
 
@@ -192,18 +173,19 @@ def judge_table(
                     tolerance=tolerance,
                     threads=threads,
                 )
-                found, count = trial.judgement, len(patterns)
+                judgement = trial.judgement
                 for c in range(len(driven)):
-                    rows = slice(c * count, (c + 1) * count)
-                    place = s, c, r, p
-                    good[place] = found.good[rows].sum() / found.wanted[rows].sum()
-                    force[place] = _largest(found.force_deviation[rows])
-                    arrival[place] = _largest(found.arrival_deviation[rows])
-                    lost[place] = found.lost[rows].sum()
-                    extra[place] = found.extra_contacts[rows].sum()
+                    rows, place = trial.rows(c), (s, c, r, p)
+                    good[place] = judgement.good[rows].sum() / judgement.wanted[rows].sum()
+                    force[place] = _largest(judgement.force_deviation[rows])
+                    arrival[place] = _largest(judgement.arrival_deviation[rows])
+                    lost[place] = judgement.lost[rows].sum()
+                    extra[place] = judgement.extra_contacts[rows].sum()
                 if p == 1 and r == 0:
-                    wanted = found.wanted[0]
-                    deviations.append((found.force_deviation[0][wanted], found.arrival_deviation[0][wanted]))
+                    wanted = judgement.wanted[0]
+                    deviations.append(
+                        (judgement.force_deviation[0][wanted], judgement.arrival_deviation[0][wanted])
+                    )
                 done += 1
                 if progress is not None:
                     progress(done, len(strategies) * len(sets) * asked.size)

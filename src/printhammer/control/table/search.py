@@ -30,12 +30,10 @@ from printhammer.control.table.ways import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    import numpy.typing as npt
+    from collections.abc import Sequence
 
     from printhammer.control.table.task import Task
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 # Between the times at which all ways are looked for; between them those of the neighbours are tried, s
 SPACING: Final = 30e-6
@@ -63,31 +61,30 @@ _SAME: Final = 1e-6  # Difference of firing times up to which ways with the same
 _ROUNDING: Final = 1e-12
 
 
-def chosen(task: Task, periods: FloatArray, report: Callable[[], None]) -> tuple[FloatArray, Ways]:
+def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
     """Choose a way for each of some times after a dot, from slot to slot, s, ascending.
 
-    Returns the times at which there is a way at all, and one for each of these. `report` is called after each
-    step of the work.
+    Returns the times at which there is a way at all, and one for each of these.
     """
     nodes = spaced(periods, SPACING)
     known = []
     for node in nodes:
         known.append(searched(task, node))
-        report()
+        task.report()
     tried = []
     for period in periods.tolist():
         place = int(np.searchsorted(nodes, period))
         near = known[max(0, place - 1) : place + (2 if nodes[place] == period else 1)]
         tried.append(_distinct(joined(ways.at(period) for ways in near)))
     groups = _valued(task, tried)
-    report()
+    task.report()
     if task.brake:
-        _look_closely(task, periods, groups, report)
+        _look_closely(task, periods, groups)
     there = [group for group in groups if group.size]
     every = joined(there)
     ends = np.cumsum([group.size for group in there])
-    found = every.take(_path(every, np.split(np.arange(every.size), ends[:-1]) if there else []))
-    return found.period, found
+    best = every.take(_path(every, np.split(np.arange(every.size), ends[:-1]) if there else []))
+    return best.period, best
 
 
 def spaced(periods: FloatArray, spacing: float) -> list[float]:
@@ -108,7 +105,7 @@ def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
     return [group.take(np.isfinite(group.cost)) for group in groups]
 
 
-def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: Callable[[], None]) -> None:
+def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
     """Look for more ways, with brake pulses between those tried before, where the best is not good enough.
 
     Adds to the groups of ways that are known at each of the times from slot to slot.
@@ -118,7 +115,7 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: C
     hope = [row for row, cost in enumerate(least) if not cost <= BAD and cost <= _FAR]
     nodes = spaced(periods[hope], _CLOSE)
     begin, narrowest = task.brake_from, _LEAST_BRAKE * task.width
-    found = []
+    closer = []
     for node in nodes:
         known = groups[int(np.searchsorted(periods, node))]
         known = known.take(known.brake > 0.0)
@@ -129,12 +126,12 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways], report: C
             for later in _LATER
             for wider in _WIDER
         ]
-        found.append(_kept(task, solved(task, ways_of(cells))))
-        report()
+        closer.append(_kept(task, solved(task, ways_of(cells))))
+        task.report()
     tried = []
     for row in hope:
         period = float(periods[row])
-        near = [ways for node, ways in zip(nodes, found, strict=True) if abs(node - period) <= _CLOSE]
+        near = [ways for node, ways in zip(nodes, closer, strict=True) if abs(node - period) <= _CLOSE]
         tried.append(_distinct(joined(ways.at(period) for ways in near)))
     for row, group in zip(hope, _valued(task, tried), strict=True):
         groups[row] = joined([groups[row], group])
@@ -180,11 +177,11 @@ def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
     return _kept(task, solved(task, cells.take(np.array(starts, dtype=np.int64))))
 
 
-def _kept(task: Task, found: Ways) -> Ways:
+def _kept(task: Task, ways: Ways) -> Ways:
     """Return the best of some ways that are solved, the best one first."""
-    found = _distinct(found._replace(cost=costs(task, found)))
-    best = np.argsort(found.cost, kind="stable")[:_KEPT]
-    return found.take(best[np.isfinite(found.cost[best])])
+    ways = _distinct(ways._replace(cost=costs(task, ways)))
+    best = np.argsort(ways.cost, kind="stable")[:_KEPT]
+    return ways.take(best[np.isfinite(ways.cost[best])])
 
 
 def _distinct(ways: Ways) -> Ways:
@@ -197,7 +194,7 @@ def _distinct(ways: Ways) -> Ways:
     return ways.take(np.array(kept, dtype=np.int64))
 
 
-def _path(ways: Ways, groups: Sequence[npt.NDArray[np.int64]]) -> npt.NDArray[np.int64]:
+def _path(ways: Ways, groups: Sequence[IntArray]) -> IntArray:
     """Choose one of each group so that the sum of the costs and of the changes of way is least.
 
     Between two times a table is interpolated where the way is the same.

@@ -14,19 +14,18 @@ from printhammer.drive.waveforms.chain import TAIL
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import Nominal, nominal
+from printhammer.printing.dots.settling import settled_from, touches
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
+    from collections.abc import Callable, Sequence
 
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.limits import Limits
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 # Distance from rest below which the hammer counts as settled, in parts of the way to the pack
 QUIET: Final = 2e-4
@@ -59,16 +58,15 @@ def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
     times = np.arange(0.0, _LONGEST, _SAMPLE)
     motion = simulate(hammer, PulseTrain(pulse), duration=_LONGEST, times=times, tolerance=tolerance)
     dot = next(contact for contact in motion.contacts if contact.surface == "pack")
-    back = any(contact.surface == "backstop" and not contact.initial for contact in motion.contacts)
     rest, front = rest_state(hammer), hammer.front
     assert front is not None
-    away = np.flatnonzero(np.abs(motion.x - rest) > QUIET * (front - rest))
-    if dot.t_out is None or not back or not motion.ok or away[-1] == len(motion.x) - 1:
+    place = settled_from(np.abs(motion.x - rest) > QUIET * (front - rest))
+    if dot.t_out is None or not touches(motion) or not motion.ok or place == len(motion.x):
         raise InputError(
             f"{hammer.path}: the hammer is not at rest {1e3 * _LONGEST:g} ms after a single pulse, expected"
             " one that settles on its backstop"
         )
-    return Single(known, float(dot.t_out), float(motion.t[away[-1] + 1]))
+    return Single(known, float(dot.t_out), float(motion.t[place]))
 
 
 @dataclass(frozen=True)
@@ -77,6 +75,7 @@ class Task:
 
     It is tuned on `hammers`, the one it is made for first; those of `spread` differ a little from that one.
     No pulse is wider than `widest`, and none begins earlier than `wait` after a brake pulse, s.
+    `report` is called after each step of the work.
     """
 
     gaps: int
@@ -92,6 +91,7 @@ class Task:
     brake: bool
     tolerance: float
     threads: int | None
+    report: Callable[[], None]
 
     @property
     def width(self) -> float:
@@ -127,7 +127,7 @@ class Task:
 
     def deviations(
         self, hammer: Hammer, drives: Sequence[Drive], slots: FloatArray, ends: FloatArray
-    ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    ) -> tuple[FloatArray, BoolArray]:
         """Run drives, and compare all dots with that of the single pulse.
 
         The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN beyond the last

@@ -32,10 +32,8 @@ if TYPE_CHECKING:
 FIRST: Final = 100.0  # Lowest rate of a table over all rates, Hz: every dot is printed from rest
 STEP: Final = 5.0  # Step between the rates of such a table, Hz
 SPREAD: Final = (
-    Perturbation(current=0.03),
-    Perturbation(current=-0.03),
-    Perturbation(travel=10e-6),
-    Perturbation(travel=-10e-6),
+    *(Perturbation(current=share) for share in (0.03, -0.03)),
+    *(Perturbation(travel=way) for way in (10e-6, -10e-6)),
 )
 """By how much the hammers differ on which ways to fire a dot are compared, and a robust table is tuned."""
 
@@ -122,7 +120,7 @@ def tune(
     grid = _all_rates(single) if asked is None else _given_rates(asked)
     nodes = len(spaced(_periods(grid, far, single), SPACING))
     # Once a time at which ways are looked for, once a step of Newton's method, with and without long rows.
-    report = _counter(progress, nodes + 3 + 2 * (ROUNDS + 1) * gaps)
+    steps = nodes + 3 + 2 * (ROUNDS + 1) * gaps
     task = Task(
         gaps=gaps,
         reach=far,
@@ -137,11 +135,12 @@ def tune(
         brake=brake,
         tolerance=tolerance,
         threads=threads,
+        report=_counter(progress, steps),
     )
-    draft = _tuned(task, grid, report, open_ended=asked is None)
+    draft = _tuned(task, grid, open_ended=asked is None)
     if asked is None:
-        return refined(draft.rows(np.arange(_usable(draft))), report).table()
-    _tune_again(draft, report)
+        return refined(draft.rows(np.arange(_usable(draft)))).table()
+    _tune_again(draft)
     lost = np.flatnonzero(~np.isfinite(draft.worst))
     if lost.size:
         speed = float(grid[lost[0]])
@@ -154,15 +153,15 @@ def tune(
 
 def _spread(hammer: Hammer) -> list[Hammer]:
     """Return the hammers that differ a little, as far as the laws of the hammer let them."""
-    found = []
+    hammers = []
     for by in SPREAD:
         with suppress(InputError):
-            found.append(perturbed(hammer, by))
-    return found
+            hammers.append(perturbed(hammer, by))
+    return hammers
 
 
 def _counter(progress: Callable[[int, int], None] | None, total: int) -> Callable[[], None]:
-    """Return what tells how far the work is, each time that it is called."""
+    """Return a function that reports one more step of the work each time that it is called."""
     steps = iter(range(1, total + 1))
 
     def count() -> None:
@@ -182,34 +181,29 @@ def _all_rates(single: Single) -> FloatArray:
 def _given_rates(asked: Sequence[float | str]) -> FloatArray:
     if isinstance(asked, str) or len(asked) == 0:
         raise InputError(f"rates = {asked!r}, expected a list of rates, at least one")
-    found = np.array([read_positive(rate, "Hz", "rate") for rate in asked])
-    if (np.diff(found) <= 0.0).any():
+    rates = np.array([read_positive(rate, "Hz", "rate") for rate in asked])
+    if (np.diff(rates) <= 0.0).any():
         raise InputError(f"rates = {list(asked)!r}, expected ascending rates")
-    return found
+    return rates
 
 
-def _tune_again(draft: Draft, report: Callable[[], None]) -> None:
+def _tune_again(draft: Draft) -> None:
     """Tune rates once more that are not good enough, with ways from times around theirs; changes the rows."""
     poor = np.flatnonzero(~(draft.worst <= _POOR))
     if not poor.size:
         return
-    again = _tuned(draft.task, draft.rates[poor], report, around=_AROUND)
+    again = _tuned(draft.task, draft.rates[poor], around=_AROUND)
     better = again.worst < draft.worst[poor]
     draft.values[:, poor[better]] = again.values[:, better]
 
 
 def _tuned(
-    task: Task,
-    rates: FloatArray,
-    report: Callable[[], None],
-    *,
-    open_ended: bool = False,
-    around: FloatArray | None = None,
+    task: Task, rates: FloatArray, *, open_ended: bool = False, around: FloatArray | None = None
 ) -> Draft:
     """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
 
-    `report` is called after each step of the work. An `open_ended` table ends below the first rate at which
-    no pulse comes near. `around` is how far from the times between dots ways are looked for as well, s.
+    An `open_ended` table ends below the first rate at which no pulse comes near. `around` is how far from the
+    times between dots ways are looked for as well, s.
     """
     draft = blank(task, rates)
     draft.timing[1] = task.width
@@ -219,7 +213,7 @@ def _tuned(
         others = (periods[:, np.newaxis] + around).ravel()
         longest, shortest = task.single.settled, periods.min(initial=np.inf) + around.min()
         periods = np.unique([*periods, *others[(others <= longest) & (others > max(shortest, 0.0))]])
-    there, ways = chosen(task, periods, report)
+    there, ways = chosen(task, periods)
     settings = ways.settings
     for gap in range(1, task.reach + 1):
         columns = [number_of(each, task.reach) for each in histories(task.gaps, task.reach) if each[0] == gap]
@@ -231,13 +225,13 @@ def _tuned(
                 draft.deviation[row, columns] = np.inf
             else:
                 draft.values[:4, row, columns] = settings[:, [place]]
-    found = np.flatnonzero(np.isfinite(draft.worst))
+    complete = np.flatnonzero(np.isfinite(draft.worst))
     if open_ended:
-        found = found[found == np.arange(found.size)]
-    if found.size:
-        good = draft.rows(found)
-        polish(good, report)
-        draft.values[:, found] = good.values
+        complete = complete[complete == np.arange(complete.size)]
+    if complete.size:
+        good = draft.rows(complete)
+        polish(good)
+        draft.values[:, complete] = good.values
     return draft
 
 

@@ -12,13 +12,11 @@ from printhammer.control.table.newton import largest_of, solve
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    import numpy.typing as npt
-
     from printhammer.control.table.task import Task
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 ROW: Final = 8  # Number of dots of the row that decides
 NOMINAL: Final = 8.0  # How often the hammer that a table is made for counts, beside those that differ
@@ -36,7 +34,7 @@ class Ways(NamedTuple):
     """Ways to fire a dot: arrays of shape (ways,), times after the slot of the dot before, s.
 
     The dot is due at `period`. A brake pulse of width `brake` begins at `delay`, both 0 without one; the dot
-    is `fired` with a pulse of `width`. `cost` tells how far a row of such dots is off, see `costs`.
+    is `fired` with a pulse of `width`. `cost` says how far a row of such dots is off, see `costs`.
     """
 
     period: FloatArray
@@ -77,7 +75,7 @@ def ways_of(cells: Sequence[tuple[float, float, float, float, float]]) -> Ways:
     return Ways(period, delay, brake, fired, width, np.full(period.size, np.inf))
 
 
-def fits(task: Task, ways: Ways) -> npt.NDArray[np.bool_]:
+def fits(task: Task, ways: Ways) -> BoolArray:
     """Return which ways fire after what comes before, and so that a brake pulse may come after."""
     first, last = task.earliest(ways.delay, ways.brake), ways.period + task.latest(ways.width)
     return np.asarray((ways.fired >= first - _ROUNDING) & (ways.fired <= last + _ROUNDING))
@@ -92,12 +90,12 @@ def solved(task: Task, ways: Ways) -> Ways:
         return ways
     first = task.earliest(ways.delay, ways.brake)
 
-    def measure(now: FloatArray, active: npt.NDArray[np.int64], shifts: FloatArray) -> FloatArray:
+    def measure(now: FloatArray, active: IntArray, shifts: FloatArray) -> FloatArray:
         fired, width = (now[active, np.newaxis] + shifts).reshape(-1, 2).T
         tried = ways.take(np.repeat(active, len(shifts)))._replace(fired=fired, width=width)
         return seconds(task, tried).reshape(active.size, len(shifts), 2)
 
-    def bounded(now: FloatArray, active: npt.NDArray[np.int64], _stepped: Any) -> None:
+    def bounded(now: FloatArray, active: IntArray, _stepped: Any) -> None:
         last = ways.period[active] + task.latest(now[active, 1])
         now[active, 0] = np.maximum(np.minimum(now[active, 0], last), first[active])
 
@@ -123,7 +121,7 @@ def costs(task: Task, ways: Ways) -> FloatArray:
     the second dot right is put behind others. Infinite where a dot is lost, or the pulses do not fit between
     each other.
     """
-    found = np.full(ways.size, np.inf)
+    cost = np.full(ways.size, np.inf)
     some = np.flatnonzero(fits(task, ways))
     if some.size:
         part = ways.take(some)
@@ -132,8 +130,8 @@ def costs(task: Task, ways: Ways) -> FloatArray:
         worst = NOMINAL * largest_of(own)
         for hammer in task.spread:
             worst = np.maximum(worst, largest_of(_deviations(task, hammer, part, drives)))
-        found[some] = worst + np.where(largest_of(own[:, 1]) > _RIGHT, _WRONG, 0.0)
-    return found
+        cost[some] = worst + np.where(largest_of(own[:, 1]) > _RIGHT, _WRONG, 0.0)
+    return cost
 
 
 def seconds(task: Task, ways: Ways) -> FloatArray:

@@ -7,24 +7,20 @@ second ones, and so on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from printhammer.results import Declared, column
 from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.ensemble import DotTable
-    from printhammer.support.arrays import FloatArray
-
-    IntArray = npt.NDArray[np.int64]
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 20
 """Extra contacts of one firing that are looked at; what a hammer that chatters on the pack adds is next to
@@ -34,17 +30,13 @@ _AFTER: Final = 1e-9
 """Time after the end of a contact, s, at which the next run begins: outside the pack, and before all else."""
 
 
-@dataclass(frozen=True)
-class ExtraDots:
-    """Extra contacts, E of them."""
+class ExtraDots(Declared):
+    """Extra contacts."""
 
-    member: IntArray = field(repr=False)
-    firing: IntArray = field(repr=False)
-    """To which firing of which member they belong, shape (E,)."""
-    touch: FloatArray = field(repr=False)
-    """Time of touch, s, shape (E,)."""
-    peak_force: FloatArray = field(repr=False)
-    """Largest pack force, N, shape (E,)."""
+    member: IntArray = column("1", "to which member they belong", "extra")
+    firing: IntArray = column("1", "to which firing of it", "extra")
+    touch: FloatArray = column("s", "time of touch", "extra")
+    peak_force: FloatArray = column("N", "largest pack force", "extra")
 
 
 def extra_dots(
@@ -56,34 +48,25 @@ def extra_dots(
     tolerance: float,
     threads: int | None = None,
 ) -> ExtraDots:
-    """Find the extra contacts of an ensemble that started from rest.
+    """Find the extra contacts of an ensemble that started from rest, by what its firings did.
 
-    Parameters
-    ----------
-    hammer, drives, ends, tolerance, threads
-        Those of the ensemble; `ends` in s.
-    dots : DotTable
-        What its firings did.
-
-    Returns
-    -------
-    ExtraDots
-        At most `MOST` of a firing, in the order of members, firings and times.
+    There are at most `MOST` of a firing, in the order of members, firings and times; `ends` are in s.
     """
     assert hammer.front is not None
     member, firing = np.nonzero(dots.extra_contacts > 0)
     begin = _leaving(dots, member, firing)
     known = np.isfinite(begin)
     member, firing, begin = member[known], firing[known], begin[known]
-    found: list[ExtraDots] = []
+    rounds: list[ExtraDots] = []
     if not member.size:
-        return _joined(found)
+        return _joined(rounds)
     involved, row = np.unique(member, return_inverse=True)
-    whole = Ensemble(hammer, [drives[one] for one in involved.tolist()], ends[involved], tolerance=tolerance)
+    whole = Ensemble(hammer, [drives[k] for k in involved.tolist()], ends[involved], tolerance=tolerance)
     state = _states(whole, [begin[row == number] for number in range(involved.size)], threads)
+    # Up to the next firing, or the end of the run.
     end = [
-        _window_end(drives[one], shot, float(ends[one]))
-        for one, shot in zip(member.tolist(), firing.tolist(), strict=True)
+        float(drives[k].times[shot + 1] if shot + 1 < drives[k].times.size else ends[k])
+        for k, shot in zip(member.tolist(), firing.tolist(), strict=True)
     ]
     some = _Windows(member, firing, begin, np.array(end), state)
 
@@ -106,7 +89,7 @@ def extra_dots(
         assert table is not None
         here = np.arange(some.member.size), some.firing
         struck = table.struck[here]
-        found.append(
+        rounds.append(
             ExtraDots(
                 some.member[struck],
                 some.firing[struck],
@@ -120,7 +103,7 @@ def extra_dots(
         if some.member.size:
             state = _states(run(some), [np.array([moment]) for moment in after], threads)
             some = some._replace(begin=after, state=state)
-    return _joined(found)
+    return _joined(rounds)
 
 
 class _Windows(NamedTuple):
@@ -132,16 +115,16 @@ class _Windows(NamedTuple):
     end: FloatArray
     state: FloatArray
 
-    def where(self, kept: npt.NDArray[np.bool_]) -> _Windows:
+    def where(self, kept: BoolArray) -> _Windows:
         """Return some of the windows."""
         member, firing, begin, end, state = self
         return _Windows(member[kept], firing[kept], begin[kept], end[kept], state[kept])
 
 
-def _joined(found: Sequence[ExtraDots]) -> ExtraDots:
+def _joined(parts: Sequence[ExtraDots]) -> ExtraDots:
     """Return contacts found round by round, in the order of members, firings and times."""
     none = np.zeros(0, np.int64)
-    rounds = [ExtraDots(none, none, np.zeros(0), np.zeros(0)), *found]
+    rounds = [ExtraDots(none, none, np.zeros(0), np.zeros(0)), *parts]
     member = np.concatenate([part.member for part in rounds])
     firing = np.concatenate([part.firing for part in rounds])
     touch = np.concatenate([part.touch for part in rounds])
@@ -162,9 +145,3 @@ def _states(ensemble: Ensemble, moments: Sequence[FloatArray], threads: int | No
     assert kept is not None
     asked = np.isfinite(kept.t)
     return np.column_stack([kept.x[asked], kept.v[asked]])
-
-
-def _window_end(drive: Drive, firing: int, end: float) -> float:
-    """Return the next firing after one, or the end of the run."""
-    times = drive.times
-    return float(times[firing + 1]) if firing + 1 < times.size else end

@@ -2,63 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import SinglePulse
+from printhammer.results import Declared, column, part
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.printing.dots.limits import Limits
     from printhammer.run.ensemble import DotTable
-    from printhammer.support.arrays import FloatArray
-
-    BoolArray = npt.NDArray[np.bool_]
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 FAULTS: Final = ("not run", "lost", "extra contacts", "force", "arrival")
-"""What may be wrong with a wanted dot, in the order in which it is told; "not run": the run ended before."""
+"""What may be wrong with a wanted dot, in the order of the search; "not run": the run ended before."""
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """How far dots are off: arrays of shape (members, firings).
+class Judgement(Declared):
+    """How far dots are off."""
 
-    Attributes
-    ----------
-    wanted : bool array
-        Where a dot is judged; the others are False and NaN in all that follows.
-    run : bool array
-        Whether the run came so far.
-    lost : bool array
-        Whether the firing made no dot.
-    force_deviation : array
-        Peak force less that of the single pulse, in parts of it; NaN for a lost dot.
-    arrival_deviation : array
-        Touch less slot time and single-pulse flight time, s; NaN for a lost dot.
-    extra_contacts : int array
-        Further pack contacts.
-    limits : Limits
-        By which it is judged.
-    """
-
-    wanted: BoolArray
-    run: BoolArray
-    lost: BoolArray
-    force_deviation: FloatArray
-    arrival_deviation: FloatArray
-    extra_contacts: npt.NDArray[np.int64]
-    limits: Limits
+    wanted: BoolArray = column(
+        "1", "where a dot is judged; the others are False and NaN in all that follows", "member firing"
+    )
+    run: BoolArray = column("1", "whether the run came so far", "member firing")
+    lost: BoolArray = column("1", "whether the firing made no dot", "member firing")
+    force_deviation: FloatArray = column(
+        "1", "peak force less that of the single pulse, in parts of it; NaN for a lost dot", "member firing"
+    )
+    arrival_deviation: FloatArray = column(
+        "s", "touch less slot time and single-pulse flight time", "member firing", more="NaN for a lost dot"
+    )
+    extra_contacts: IntArray = column("1", "further pack contacts", "member firing")
+    limits: Limits = part("by which it is judged")
 
     @property
-    def faults(self) -> npt.NDArray[np.int64]:
+    def faults(self) -> IntArray:
         """Number of the first fault of each wanted dot in `FAULTS`; -1 for a good one and an unwanted one."""
-        found = np.full(self.wanted.shape, -1)
+        first = np.full(self.wanted.shape, -1)
         # Compared the other way round, a NaN would pass.
         with np.errstate(invalid="ignore"):
             wrong = (
@@ -69,8 +52,8 @@ class Judgement:
                 ~(np.abs(self.arrival_deviation) <= self.limits.arrival),
             )
         for number in range(len(wrong) - 1, -1, -1):
-            found[self.wanted & wrong[number]] = number
-        return found
+            first[self.wanted & wrong[number]] = number
+        return first
 
     @property
     def good(self) -> BoolArray:
@@ -131,8 +114,8 @@ def judge(
         run[early, last[early]] = False
     struck = dots.struck & run & asked
     single = [nominal] if isinstance(nominal, SinglePulse) else nominal
-    single_force = np.array([one.force for one in single])[:, np.newaxis]
-    single_flight = np.array([one.flight_time for one in single])[:, np.newaxis]
+    single_force = np.array([pulse.force for pulse in single])[:, np.newaxis]
+    single_flight = np.array([pulse.flight_time for pulse in single])[:, np.newaxis]
     force = np.where(struck, dots.peak_force / single_force - 1.0, np.nan)
     arrival = dots.fired_at + dots.flight_time - (slot_times + single_flight)
     return Judgement(

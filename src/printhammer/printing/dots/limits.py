@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from printhammer.errors import InputError
+from printhammer.results import Declared, part
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(Declared):
     """How far a dot may differ from that of the single pulse. A lost dot is never within limits.
-
-    Attributes
-    ----------
-    force : float
-        Largest deviation of the peak force to either side, in parts of the single-pulse force.
-    arrival : float
-        Largest deviation of the touch from slot time plus single-pulse flight time, to either side, s.
-    extra_contacts : int
-        Largest number of further pack contacts.
 
     Raises
     ------
@@ -27,9 +17,14 @@ class Limits:
         A limit is negative or not a number.
     """
 
-    force: float = 0.1
-    arrival: float = 50e-6
-    extra_contacts: int = 0
+    force: float = part(
+        "largest deviation of the peak force to either side, in parts of the single-pulse force", default=0.1
+    )
+    arrival: float = part(
+        "largest deviation of the touch from slot time plus single-pulse flight time, to either side, s",
+        default=50e-6,
+    )
+    extra_contacts: int = part("largest number of further pack contacts", default=0)
 
     def __post_init__(self) -> None:
         for name, unit in (("force", ""), ("arrival", " s"), ("extra_contacts", "")):

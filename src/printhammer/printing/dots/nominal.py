@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from printhammer.drive.input import read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
+from printhammer.results import Declared, scalar
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
@@ -22,36 +21,20 @@ WAIT: Final = 4e-3
 """Time after the last firing of a run, s, within which its dot and extra contacts are waited for."""
 
 
-@dataclass(frozen=True)
-class SinglePulse:
+class SinglePulse(Declared):
     """The dot of one pulse from rest, as far as dots are judged by it."""
 
-    force: float
-    """Largest pack force, N."""
-    flight_time: float
-    """From firing to touch, s."""
+    force: float = scalar("N", "largest pack force")
+    flight_time: float = scalar("s", "from firing to touch")
 
 
-@dataclass(frozen=True)
 class Nominal(SinglePulse):
-    """What one pulse from rest prints, beside force and flight time.
+    """What one pulse from rest prints."""
 
-    Attributes
-    ----------
-    impact_speed : float
-        At touch, m/s.
-    indentation : float
-        Largest indentation, m.
-    loading_work : float
-        Work done on the pack up to its largest indentation, J.
-    pack_loss : float
-        Energy that the pack keeps, J.
-    """
-
-    impact_speed: float
-    indentation: float
-    loading_work: float
-    pack_loss: float
+    impact_speed: float = scalar("m/s", "at touch")
+    indentation: float = scalar("m", "largest indentation")
+    loading_work: float = scalar("J", "work done on the pack up to its largest indentation")
+    pack_loss: float = scalar("J", "energy that the pack keeps")
 
 
 def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Nominal:
@@ -71,10 +54,10 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     dot = motion.dots[0]
     values = (dot.peak_force, dot.flight_time, dot.impact_speed, dot.indentation)
     energies = (dot.loading_work, dot.net_loss)
-    found = [value for value in (*values, *energies) if value is not None]
-    if len(found) < len(values) + len(energies) or not found[0] > 0.0:
+    known = [value for value in (*values, *energies) if value is not None]
+    if len(known) < len(values) + len(energies) or not known[0] > 0.0:
         raise InputError(f"{hammer.path}: a single pulse makes no dot, expected a hammer that prints")
-    return Nominal(*found)
+    return Nominal(*known)
 
 
 def single_pulses(
@@ -123,14 +106,3 @@ def pulse_of(hammer: Hammer, waveform: Waveform | None = None) -> Waveform:
     if pulse is None:
         raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")
     return pulse
-
-
-def rate_of(value: float | str, name: str = "rate") -> float:
-    """Read slots per second, Hz, or text with a unit.
-
-    Raises
-    ------
-    InputError
-        Not a positive number or rate.
-    """
-    return read_positive(value, "Hz", name)

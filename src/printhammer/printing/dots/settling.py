@@ -12,6 +12,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import pulse_of
+from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Contact
     from printhammer.run.motion import Motion
+    from printhammer.support.arrays import BoolArray
 
 SETTLED: Final = 0.01
 """Distance from rest, in parts of the stroke, within which the armature counts as settled."""
@@ -31,29 +33,16 @@ _SPACING: Final = 1e-6
 _BISECTIONS: Final = 40
 
 
-@dataclass(frozen=True)
-class Wear:
-    """What the backstop bears.
+class Wear(Declared):
+    """What the backstop bears."""
 
-    Attributes
-    ----------
-    touches : int
-        Number of touches.
-    impulse : float
-        Sum over the touches of the change of momentum of the armature, N s.
-    loss : float
-        Energy that the backstop takes, J.
-    largest_speed : float
-        Largest speed at touch, m/s.
-    largest_force : float or None
-        Largest contact force, N; None on a rigid backstop, where it is not finite.
-    """
-
-    touches: int
-    impulse: float
-    loss: float
-    largest_speed: float
-    largest_force: float | None
+    touches: int = part("number of touches")
+    impulse: float = scalar("N s", "sum over the touches of the change of momentum of the armature")
+    loss: float = scalar("J", "energy that the backstop takes")
+    largest_speed: float = scalar("m/s", "largest speed at touch")
+    largest_force: float | None = scalar(
+        "N", "largest contact force", more="None on a rigid backstop, where it is not finite"
+    )
 
 
 @dataclass(frozen=True)
@@ -70,36 +59,22 @@ class Rebound:
         return self.end - self.start
 
 
-@dataclass(frozen=True)
-class Settling:
-    """What follows a single pulse.
+class Settling(Declared):
+    """What follows a single pulse."""
 
-    Attributes
-    ----------
-    settle_out : float or None
-        Time from the firing until the armature stays within `SETTLED` of the stroke from its rest, s; None
-        where it does not within `CYCLE`.
-    rebounds : int
-        Number of rebounds from the backstop higher than `SETTLED` of the stroke.
-    highest : float
-        Height of the highest rebound, in parts of the stroke; 0 without any.
-    restitution : float or None
-        Speed after the first touch of the backstop over the speed before; None where it does not leave.
-    wear : Wear
-        What the backstop bears until the end of the run.
-    coil_work : float
-        Net work of the coil, J.
-    status : str
-        How the run ended.
-    """
-
-    settle_out: float | None
-    rebounds: int
-    highest: float
-    restitution: float | None
-    wear: Wear
-    coil_work: float
-    status: str
+    settle_out: float | None = scalar(
+        "s",
+        "time from the firing until the armature stays within `SETTLED` of the stroke from its rest",
+        more="None where it does not within `CYCLE`",
+    )
+    rebounds: int = part("number of rebounds from the backstop higher than `SETTLED` of the stroke")
+    highest: float = part("height of the highest rebound, in parts of the stroke; 0 without any")
+    restitution: float | None = part(
+        "speed after the first touch of the backstop over the speed before; None where it does not leave"
+    )
+    wear: Wear = part("what the backstop bears until the end of the run")
+    coil_work: float = scalar("J", "net work of the coil")
+    status: str = part("how the run ended")
 
 
 def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:
@@ -119,7 +94,9 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
     top = motion.peak_after(0)
     stroke = (rest if top is None else top[1]) - hammer.position
     limit = SETTLED * max(stroke, 0.0)
-    heights = [one.height / stroke for one in rebounds(motion, hammer.position) if one.height > limit]
+    heights = [
+        rebound.height / stroke for rebound in rebounds(motion, hammer.position) if rebound.height > limit
+    ]
     first = next(iter(touches(motion)), None)
     left = None if first is None or first.v_out is None or first.v_in == 0.0 else -first.v_out / first.v_in
     return Settling(
@@ -140,14 +117,14 @@ def touches(motion: Motion) -> list[Contact]:
 
 def wear_of(motion: Motion) -> Wear:
     """Return what the backstop bears in a motion."""
-    mass, found = motion.hammer.mass, touches(motion)
-    forces = [contact.peak_force for contact in found if contact.peak_force is not None]
+    mass, contacts = motion.hammer.mass, touches(motion)
+    forces = [contact.peak_force for contact in contacts if contact.peak_force is not None]
     return Wear(
-        touches=len(found),
+        touches=len(contacts),
         # Of a contact that is still open the armature is at rest in the end.
-        impulse=sum(mass * ((contact.v_out or 0.0) - contact.v_in) for contact in found),
+        impulse=sum(mass * ((contact.v_out or 0.0) - contact.v_in) for contact in contacts),
         loss=sum(contact.loss for contact in motion.contacts if contact.surface == "backstop"),
-        largest_speed=max((-contact.v_in for contact in found), default=0.0),
+        largest_speed=max((-contact.v_in for contact in contacts), default=0.0),
         largest_force=max(forces) if forces else None,
     )
 
@@ -155,23 +132,29 @@ def wear_of(motion: Motion) -> Wear:
 def rebounds(motion: Motion, position: float) -> list[Rebound]:
     """List the intervals above a backstop at a position, m, between touches."""
     times, x = motion.maxima
-    found = []
+    intervals = []
     for before, after in itertools.pairwise(touches(motion)):
         if before.t_out is not None:
             inside = (times >= before.t_out) & (times <= after.t_in)
             height = float(x[inside].max()) - position if inside.any() else 0.0
-            found.append(Rebound(before.t_out, after.t_in, height))
-    return found
+            intervals.append(Rebound(before.t_out, after.t_in, height))
+    return intervals
+
+
+def settled_from(away: BoolArray) -> int:
+    """Return the number of the first sample from which on none is away; that of all where the last one is."""
+    places = np.flatnonzero(away)
+    return int(places[-1]) + 1 if places.size else 0
 
 
 def _settled(motion: Motion, rest: float, limit: float) -> float | None:
     """Return the last time at which the armature is farther from its rest than a limit, s."""
     count = round((motion.end - motion.start) / _SPACING) + 1
     grid = np.union1d(np.linspace(motion.start, motion.end, count), motion.maxima[0])
-    away = np.flatnonzero(np.abs(motion.at(grid)[0] - rest) > limit)
-    if not away.size or away[-1] == grid.size - 1:
+    place = settled_from(np.abs(motion.at(grid)[0] - rest) > limit)
+    if place in (0, grid.size):
         return None
-    low, high = float(grid[away[-1]]), float(grid[away[-1] + 1])
+    low, high = float(grid[place - 1]), float(grid[place])
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         if abs(float(motion.at(middle)[0][0]) - rest) > limit:

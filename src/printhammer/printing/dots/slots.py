@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 SLOTS: Final = 8
 """Number of slots of a pattern from rest, and order of the cycle."""
@@ -27,7 +27,7 @@ FIRST_SLOT: Final = 1e-3
 
 
 @cache
-def eight_slot_patterns() -> npt.NDArray[np.bool_]:
+def eight_slot_patterns() -> BoolArray:
     """Return the 255 patterns of eight slots in which at least one dot is wanted.
 
     Returns
@@ -36,13 +36,13 @@ def eight_slot_patterns() -> npt.NDArray[np.bool_]:
         Row n holds the binary digits of n + 1, the most significant one in slot 0; read-only.
     """
     numbers = np.arange(1, 2**SLOTS)
-    rows: npt.NDArray[np.bool_] = (numbers[:, np.newaxis] >> np.arange(SLOTS - 1, -1, -1)) & 1 == 1
+    rows: BoolArray = (numbers[:, np.newaxis] >> np.arange(SLOTS - 1, -1, -1)) & 1 == 1
     rows.setflags(write=False)
     return rows
 
 
 @cache
-def de_bruijn(order: int = SLOTS) -> npt.NDArray[np.bool_]:
+def de_bruijn(order: int = SLOTS) -> BoolArray:
     """Return a binary de Bruijn cycle: read around, it holds every word of `order` slots exactly once.
 
     It is the least one in the order of a dictionary: the Lyndon words whose length divides the order, one
@@ -76,12 +76,12 @@ def de_bruijn(order: int = SLOTS) -> npt.NDArray[np.bool_]:
             word.pop()
         if word:
             word[-1] = 1
-    found = np.array(cycle, dtype=np.bool_)
-    found.setflags(write=False)
-    return found
+    whole = np.array(cycle, dtype=np.bool_)
+    whole.setflags(write=False)
+    return whole
 
 
-def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> npt.NDArray[np.bool_]:
+def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> BoolArray:
     """Return once around the de Bruijn cycle of an order, its own last slots before it.
 
     The run begins at rest, `lead_in` slots before the cycle does, with what the cycle ends with. So at every
@@ -101,8 +101,6 @@ def slots_of(pattern: npt.ArrayLike) -> tuple[int, ...]:
     return tuple(np.flatnonzero(np.asarray(pattern, dtype=np.bool_)).tolist())
 
 
-def slot_times(
-    slots: Sequence[int] | npt.NDArray[np.int64], rate: float, first: float = FIRST_SLOT
-) -> FloatArray:
+def slot_times(slots: Sequence[int] | IntArray, rate: float, first: float = FIRST_SLOT) -> FloatArray:
     """Return the times of some slots, s; of an array of numbers of slots an array of the same shape."""
     return first + np.asarray(slots, dtype=np.float64) / rate

@@ -70,5 +70,5 @@ def checked_drives(
 
 def name_of(strategy: Strategy) -> str:
     """Return the name of a strategy, such as "open loop"."""
-    given = getattr(strategy, "name", None) or getattr(strategy, "__name__", type(strategy).__name__)
-    return str(given).replace("_", " ")
+    name = getattr(strategy, "name", None) or getattr(strategy, "__name__", type(strategy).__name__)
+    return str(name).replace("_", " ")

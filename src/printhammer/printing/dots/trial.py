@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,12 +10,11 @@ from printhammer.printing.dots.judging import judge
 from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.slots import FIRST_SLOT
 from printhammer.printing.dots.strategy import checked_drives, open_loop
+from printhammer.results import Declared, column, part
 from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    import numpy.typing as npt
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.nominal import SinglePulse
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.run.ensemble import DotTable
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
 
 
@@ -37,33 +35,29 @@ class Case(NamedTuple):
     rate: float
 
 
-@dataclass(frozen=True)
-class Trial:
+class Trial(Declared):
     """What became of all patterns in all cases: members by case first, then by pattern."""
 
-    cases: tuple[Case, ...]
-    """Hammers and rates."""
-    patterns: tuple[tuple[int, ...], ...]
-    """Numbers of the slots at which dots are wanted."""
-    drives: tuple[Drive, ...]
-    """What drove each member."""
-    slots: npt.NDArray[np.int64]
-    """Number of the slot of each firing; -1 where there is none. Shape (members, firings)."""
-    due: FloatArray
-    """Time of that slot, s, shape (members, firings)."""
-    ends: FloatArray
-    """Ends of the runs, s, shape (members,)."""
-    dots: DotTable
-    """What the firings did."""
-    judgement: Judgement
-    """How far off they are."""
-    statuses: tuple[str, ...]
-    """How the runs ended."""
+    cases: tuple[Case, ...] = part("hammers and rates")
+    patterns: tuple[tuple[int, ...], ...] = part("numbers of the slots at which dots are wanted")
+    drives: tuple[Drive, ...] = part("what drove each member")
+    slots: IntArray = column(
+        "1", "number of the slot of each firing; -1 where there is none", "member firing"
+    )
+    due: FloatArray = column("s", "time of that slot", "member firing")
+    ends: FloatArray = column("s", "ends of the runs", "member")
+    dots: DotTable = part("what the firings did")
+    judgement: Judgement = part("how far off they are")
+    statuses: tuple[str, ...] = part("how the runs ended")
 
     @property
-    def passed(self) -> npt.NDArray[np.bool_]:
+    def passed(self) -> BoolArray:
         """Whether every pattern passes, for each case."""
         return np.asarray(self.judgement.passed.reshape(len(self.cases), -1).all(axis=1))
+
+    def rows(self, case: int) -> slice:
+        """Return the places of the members of a case, by its number."""
+        return slice(case * len(self.patterns), (case + 1) * len(self.patterns))
 
 
 def attempt(
@@ -79,25 +73,8 @@ def attempt(
 ) -> Trial:
     """Print all of some patterns in all of some cases, from rest.
 
-    Parameters
-    ----------
-    cases : sequence of Case
-        Hammers and rates.
-    patterns : sequence of tuple of int
-        Numbers of the slots at which dots are wanted, at least one each.
-    strategy : Strategy, optional
-        How the hammers are driven.
-    limits : Limits
-        How far a dot may be off.
-    judged_from : int, optional
-        First slot that is judged; those before are a lead-in.
-    tolerance, threads, progress
-        As for `Ensemble` and its `run`.
-
-    Returns
-    -------
-    Trial
-        With a status for each member; a run that could not go on is no exception, and does not pass.
+    Patterns are numbers of the slots at which dots are wanted, at least one each; slots before `judged_from`
+    are a lead-in. Each member has a status: a run that could not go on is no exception, and does not pass.
 
     Raises
     ------

@@ -9,10 +9,11 @@ takes a tenth of an inch; 18 and 24 wires on the same height, thinner.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Final
 
 from printhammer.errors import InputError
+from printhammer.results import Declared, part, scalar
 
 DENSITY: Final = 1.0
 """Optical density of the dot of a single pulse, an assumption: a tenth of the light comes back."""
@@ -23,24 +24,8 @@ LINE_GAP: Final = 1 / 3
 """Between print lines, in parts of the height of the wires."""
 
 
-@dataclass(frozen=True)
-class Head:
+class Head(Declared):
     """A print head: one column of wires on a carriage.
-
-    Attributes
-    ----------
-    wires : int
-        Number of wires.
-    wire_pitch : float
-        From wire to wire, m.
-    pitch : float
-        From slot to slot, m: from one column of dots to the next. Carriage speed = rate of slots x pitch.
-    wire_diameter : float
-        Also that of a dot, m.
-    density : float
-        Optical density of the dot of a single pulse.
-    line_gap : float
-        Between print lines, in parts of the height of the wires; 0 for drawings that go on from line to line.
 
     Raises
     ------
@@ -48,20 +33,26 @@ class Head:
         A number is not positive, or the gap not at least 0, or one is not finite.
     """
 
-    wires: int
-    wire_pitch: float
-    pitch: float
-    wire_diameter: float
-    density: float = DENSITY
-    line_gap: float = LINE_GAP
+    wires: int = part("number of wires")
+    wire_pitch: float = scalar("m", "from wire to wire")
+    pitch: float = scalar(
+        "m", "from one column of dots to the next", more="carriage speed = rate of slots x pitch"
+    )
+    wire_diameter: float = scalar("m", "also that of a dot")
+    density: float = part("optical density of the dot of a single pulse", default=DENSITY)
+    line_gap: float = part(
+        "between print lines, in parts of the height of the wires",
+        more="0 for drawings that go on from line to line",
+        default=LINE_GAP,
+    )
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            value = getattr(self, one.name)
-            least = 0.0 if one.name == "line_gap" else math.ulp(0.0)
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            least = 0.0 if entry.name == "line_gap" else math.ulp(0.0)
             if isinstance(value, bool) or not (value >= least and math.isfinite(value)):
                 expected = "a positive number" if least else "a number not below 0"
-                raise InputError(f"head: {one.name} = {value!r}, expected {expected}")
+                raise InputError(f"head: {entry.name} = {value!r}, expected {expected}")
 
     @property
     def line_pitch(self) -> float:

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray
 
 COLUMNS: Final = 40
-"""Characters of a print line unless told otherwise."""
+"""Characters of a print line by default."""
 
 _NAMED: Final = 8
 
@@ -28,36 +28,25 @@ def broken(text: str, columns: int = COLUMNS) -> list[str]:
 
     Line ends in the text stay, and so do empty lines.
     """
-    found: list[str] = []
+    lines: list[str] = []
     for line in text.splitlines():
         kept = line.rstrip()
         cut = textwrap.wrap(
             kept, columns, replace_whitespace=False, expand_tabs=False, break_on_hyphens=False
         )
-        found += cut if len(kept) > columns else [kept]
-    return found
+        lines += cut if len(kept) > columns else [kept]
+    return lines
 
 
 def lettered(
     text: str, wires: int = matrix_font.WIRES, font: str | Path | None = None, columns: int = COLUMNS
-) -> npt.NDArray[np.bool_]:
-    """Set a text in dots, as `Pattern.from_text` does.
-
-    Returns
-    -------
-    bool array, shape (lines, wires, slots)
-        True where a dot is wanted.
-
-    Raises
-    ------
-    InputError
-        No text, characters that the font lacks, no font, fewer than 1 character in a line.
-    """
+) -> BoolArray:
+    """Set a text in dots, shape (lines, wires, slots), as `Pattern.from_text` does."""
     if columns < 1:
         raise InputError(f"columns = {columns}, expected 1 or more characters in a line")
     if not text.strip():
         raise InputError(f"text = {text!r}, expected something to print")
-    glyph: Callable[[str], npt.NDArray[np.bool_]]
+    glyph: Callable[[str], BoolArray]
     lines = broken(text, columns)
     if font is None and wires == matrix_font.WIRES:
         known = matrix_font.glyphs()

@@ -16,7 +16,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray
 
 NAME: Final = "nine-wire"
 WIRES: Final = 9
@@ -29,10 +29,10 @@ _DOT: Final = "#"
 
 
 @cache
-def glyphs() -> Mapping[str, npt.NDArray[np.bool_]]:
+def glyphs() -> Mapping[str, BoolArray]:
     """Return the dots of every character of the font: arrays (9, 6), wires from the top by columns."""
     text = (files("printhammer.printing.page") / "fonts" / "nine-wire.txt").read_text("utf-8")
-    found = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}
+    drawn = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}
     # Blank lines part the groups; the first one says what the file is.
     for group in text.split("\n\n")[1:]:
         heading, *rows = group.strip("\n").split("\n")
@@ -40,7 +40,7 @@ def glyphs() -> Mapping[str, npt.NDArray[np.bool_]]:
             dots = np.zeros((WIRES, ADVANCE), np.bool_)
             cut = [[mark == _DOT for mark in row[start : start + _COLUMNS]] for row in rows]
             dots[:, :_COLUMNS] = cut
-            found[heading[start]] = dots
-    for dots in found.values():
+            drawn[heading[start]] = dots
+    for dots in drawn.values():
         dots.flags.writeable = False
-    return found
+    return drawn

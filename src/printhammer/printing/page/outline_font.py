@@ -19,8 +19,9 @@ import numpy as np
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     from PIL.ImageFont import FreeTypeFont
+
+    from printhammer.support.arrays import BoolArray
 
 _STANDARD: Final = "mpl-data/fonts/ttf/DejaVuSansMono.ttf"
 _ASCII: Final = string.digits + string.ascii_letters + string.punctuation
@@ -38,16 +39,7 @@ def standard_font() -> Path:
 
 
 class OutlineFont:
-    """A TrueType or OpenType font at the size that fits a number of wires.
-
-    Parameters
-    ----------
-    path : path
-        The font file.
-    wires : int
-        Number of wires.
-    text : str, optional
-        Characters that are to fit beside those of ASCII.
+    """A TrueType or OpenType font at the size at which ASCII and a text fit a number of wires.
 
     Raises
     ------
@@ -68,7 +60,7 @@ class OutlineFont:
         known = _characters(self.path)
         return [mark for mark in dict.fromkeys(text) if ord(mark) not in known]
 
-    def glyph(self, mark: str) -> npt.NDArray[np.bool_]:
+    def glyph(self, mark: str) -> BoolArray:
         """Return the dots of one character, wires from the top by columns; at least one column."""
         from PIL import Image, ImageDraw
 

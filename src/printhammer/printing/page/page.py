@@ -17,11 +17,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.extra_dots import extra_dots
 from printhammer.printing.dots.judging import FAULTS
 from printhammer.printing.dots.limits import PRESETS, Limits
-from printhammer.printing.dots.nominal import Nominal, nominal, rate_of
+from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.slots import slots_of
 from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
 from printhammer.printing.dots.trial import Case, Trial, attempt
@@ -35,11 +36,8 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
     from printhammer.support.threads import Progress
-
-    IntArray = npt.NDArray[np.int64]
-    BoolArray = npt.NDArray[np.bool_]
 
 _HEAD: Final = ("wire_pitch", "pitch", "line_pitch", "wire_diameter", "density")
 _FAULTS: Final = np.array([*FAULTS, "none"], "U16")
@@ -86,7 +84,7 @@ class Page(Result, rows="dot"):
         "1", "print line of the run", "member", more="a wire without a wanted dot in a line has none"
     )
     run_wire: IntArray = column("1", "wire of the run", "member")
-    status: npt.NDArray[np.str_] = column("1", "how the run ended", "member")
+    status: TextArray = column("1", "how the run ended", "member")
     tolerance: float = part("error allowed in one step of the integration")
 
     @property
@@ -245,16 +243,12 @@ def print_page(
     rate : float or str
         Slots per second, Hz, or text with a unit: how often a wire may be fired. The carriage moves one pitch
         in a slot.
-    strategy : Strategy, optional
-        How the hammer is driven; by default `printhammer.printing.dots.strategy.open_loop`.
+    strategy, limits, threads
+        As for `printhammer.safe_rate`.
     head : Head, optional
         Where the wires are, and how thick; by default `printhammer.printing.page.head.head_of` their number.
-    limits : Limits, optional
-        How far a dot may be off; by default those by which drives are compared.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores; the page does not depend on it.
     progress : callable, optional
         Called now and then with the number of runs done and of all.
 
@@ -272,15 +266,15 @@ def print_page(
     pattern = Pattern.from_text(what) if isinstance(what, str) else what
     if not isinstance(pattern, Pattern):
         raise InputError(f"{what!r} is expected to be a pattern or a text")
-    often = rate_of(rate)
+    slot_rate = read_positive(rate, "Hz", "rate")
     if pattern.wanted > _MOST_DOTS:
         raise InputError(f"{pattern.wanted} dots are wanted, expected {_MOST_DOTS} at most")
-    used = head_of(pattern.wires) if head is None else head
-    if used.wires != pattern.wires:
-        raise InputError(f"head: {used.wires} wires, expected {pattern.wires} as the pattern has")
-    by = PRESETS["slots"] if limits is None else limits
+    print_head = head_of(pattern.wires) if head is None else head
+    if print_head.wires != pattern.wires:
+        raise InputError(f"head: {print_head.wires} wires, expected {pattern.wires} as the pattern has")
+    bounds = PRESETS["slots"] if limits is None else limits
     single = nominal(hammer, tolerance=tolerance)
-    options: dict[str, Any] = {"limits": by, "tolerance": tolerance, "threads": threads}
+    options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     run_line, run_wire = np.nonzero(pattern.dots.any(axis=2))
     rows = [slots_of(row) for row in pattern.dots[run_line, run_wire]]
     pieces = []
@@ -291,7 +285,11 @@ def print_page(
                 progress(begun + done, len(rows))
 
         trial = attempt(
-            [Case(hammer, single, often)], rows[first : first + _PIECE], strategy, progress=tell, **options
+            [Case(hammer, single, slot_rate)],
+            rows[first : first + _PIECE],
+            strategy,
+            progress=tell,
+            **options,
         )
         pieces.append(_dots_of(trial, options))
     counts = np.array([len(slots) for slots in rows])
@@ -302,11 +300,11 @@ def print_page(
     return Page(
         hammer=hammer,
         pattern=pattern,
-        head=used,
-        rate=often,
+        head=print_head,
+        rate=slot_rate,
         strategy=name_of(strategy),
         nominal=single,
-        limits=by,
+        limits=bounds,
         line=np.repeat(run_line, counts),
         wire=np.repeat(run_wire, counts),
         slot=np.concatenate([np.asarray(slots) for slots in rows]),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
@@ -11,11 +10,12 @@ from printhammer.errors import InputError
 from printhammer.printing.page import matrix_font
 from printhammer.printing.page.lettering import COLUMNS, lettered
 from printhammer.printing.page.pattern_file import read_pattern, write_pattern
+from printhammer.results import Declared, column, part
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray
 
 MOST_WIRES: Final = 1000
 MOST_CELLS: Final = 50_000_000
@@ -24,17 +24,8 @@ MOST_CELLS: Final = 50_000_000
 _TITLE: Final = 60
 
 
-@dataclass(frozen=True, eq=False)
-class Pattern:
+class Pattern(Declared):
     """The dots that are wanted.
-
-    Attributes
-    ----------
-    name : str
-        What it is.
-    dots : bool array, shape (lines, wires, slots)
-        True where a dot is wanted: print lines from the top, wires from the top, slots from the left, each
-        one column of dots. Read-only.
 
     Raises
     ------
@@ -42,8 +33,13 @@ class Pattern:
         The array is of another shape, too large, or wants no dot at all.
     """
 
-    name: str
-    dots: npt.NDArray[np.bool_] = field(repr=False)
+    name: str = part("what it is")
+    dots: BoolArray = column(
+        "1",
+        "True where a dot is wanted",
+        "line wire slot",
+        more="lines and wires from the top, slots from the left, each one column of dots; read-only",
+    )
 
     def __post_init__(self) -> None:
         dots = np.array(self.dots, dtype=np.bool_)
@@ -97,7 +93,7 @@ class Pattern:
     def load(cls, path: str | Path, wires: int | None = None) -> Self:
         """Read a pattern file (.toml) or a bitmap (.png, .pbm, .bmp).
 
-        The format is told in `printhammer.printing.page.pattern_file`.
+        The format is described in `printhammer.printing.page.pattern_file`.
 
         Parameters
         ----------

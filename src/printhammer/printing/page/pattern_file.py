@@ -32,9 +32,10 @@ from printhammer.errors import InputError
 from printhammer.printing.page import matrix_font
 from printhammer.support.constants import shown
 from printhammer.support.outputs import write_file
+from printhammer.support.sheets import read_text
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray
 
 FORMAT: Final = 1
 """Version of the pattern file format."""
@@ -48,20 +49,10 @@ _DOT, _EMPTY = "#", "."
 _MOST_PIXELS: Final = 50_000_000
 
 
-def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, npt.NDArray[np.bool_]]:
-    """Read a pattern file or a bitmap, as `Pattern.load` does.
+def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, BoolArray]:
+    """Read name and dots, shape (lines, wires, slots), as `Pattern.load` does.
 
-    Returns
-    -------
-    name : str
-        What it is; of a bitmap the name of the file, without its end.
-    dots : bool array, shape (lines, wires, slots)
-        Where dots are wanted.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or is no such file; the sentence names file, key and value.
+    The name of a bitmap is that of the file, without its end.
     """
     source = Path(path)
     suffix = source.suffix.lower()
@@ -69,21 +60,14 @@ def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, npt.N
         return source.stem, _bitmap(source, matrix_font.WIRES if wires is None else wires)
     if suffix != ".toml":
         raise InputError(f"{source}: expected a name that ends in one of {', '.join(SUFFIXES)}")
-    try:
-        text = source.read_text("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{source}: the pattern file is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{source}: the pattern file cannot be read ({reason})") from None
-    name, dots = pattern_from_toml(text, str(source))
+    name, dots = pattern_from_toml(read_text(source, "the pattern file"), str(source))
     if wires is not None and wires != dots.shape[1]:
         raise InputError(f"{source}: wires = {dots.shape[1]}, expected {wires}")
     return name, dots
 
 
-def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, npt.NDArray[np.bool_]]:
-    """Read the text of a pattern file; returns and errors as for `read_pattern`."""
+def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArray]:
+    """Read the text of a pattern file; the sentence of an error names key and value."""
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -109,7 +93,7 @@ def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, npt.NDAr
     return name, _marked(rows, wires, source)
 
 
-def _marked(rows: list[str], wires: int, source: str) -> npt.NDArray[np.bool_]:
+def _marked(rows: list[str], wires: int, source: str) -> BoolArray:
     """Return the dots of rows of marks, print line by print line."""
     if len(rows) % wires:
         raise InputError(f"{source}: rows has {len(rows)} rows, expected a multiple of wires = {wires}")
@@ -125,7 +109,7 @@ def _marked(rows: list[str], wires: int, source: str) -> npt.NDArray[np.bool_]:
     return dots.reshape(-1, wires, len(rows[0]))
 
 
-def _bitmap(path: Path, wires: int) -> npt.NDArray[np.bool_]:
+def _bitmap(path: Path, wires: int) -> BoolArray:
     from PIL import Image
 
     if wires < 1:
@@ -141,8 +125,8 @@ def _bitmap(path: Path, wires: int) -> npt.NDArray[np.bool_]:
         if isinstance(error, InputError):
             raise
         reason = getattr(error, "strerror", None)
-        told = f" ({reason})" if reason else ""
-        raise InputError(f"{path}: expected a bitmap that can be read{told}") from None
+        why = f" ({reason})" if reason else ""
+        raise InputError(f"{path}: expected a bitmap that can be read{why}") from None
     dark = (pixels[:, :, 0] < 128) & (pixels[:, :, 1] >= 128)
     lines = -(-len(dark) // wires)
     dots = np.zeros((lines * wires, dark.shape[1]), np.bool_)
@@ -150,7 +134,7 @@ def _bitmap(path: Path, wires: int) -> npt.NDArray[np.bool_]:
     return dots.reshape(lines, wires, -1)
 
 
-def pattern_toml(name: str, dots: npt.NDArray[np.bool_]) -> str:
+def pattern_toml(name: str, dots: BoolArray) -> str:
     """Return the text of a pattern file; reading it back gives the same name and dots."""
     _lines, wires, slots = dots.shape
     marks = np.where(dots.reshape(-1, slots), _DOT, _EMPTY)
@@ -159,7 +143,7 @@ def pattern_toml(name: str, dots: npt.NDArray[np.bool_]) -> str:
     return f"format = {FORMAT}\nname = {title}\nwires = {wires}\nrows = [\n{rows}\n]\n"
 
 
-def write_pattern(path: str | Path, name: str, dots: npt.NDArray[np.bool_]) -> None:
+def write_pattern(path: str | Path, name: str, dots: BoolArray) -> None:
     """Write a pattern file or a bitmap, as `Pattern.save` does."""
     target = Path(path)
     suffix = target.suffix.lower()

@@ -20,8 +20,7 @@ from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
 from printhammer.printing.dots.settling import settle
 from printhammer.printing.rates.materials import Material, materials
 from printhammer.printing.rates.perturbation import changed
-from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_grid
-from printhammer.printing.rates.safe_rates import safe_rates
+from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_grid, safe_rates
 from printhammer.results import Result, column, derived, part, scalar
 from printhammer.results.declare import columns_of
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
@@ -29,18 +28,16 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, TextArray
     from printhammer.support.threads import Progress
 
 CURRENT: Final = 2.0
-"""Largest current, A, unless told otherwise."""
+"""Largest current by default, A."""
 
 STEP: Final = 25.0
-"""Step of the grid of rates, Hz, unless told otherwise."""
+"""Step of the grid of rates by default, Hz."""
 
 LEAST: Final = 0.6
 MOST: Final = 1.6
@@ -62,7 +59,7 @@ class DampingStudy(Result):
     current_limit: float = scalar("A", "largest current allowed")
     nominal: Nominal = part("single-pulse dot of the hammer", more="its force is kept")
     materials: tuple[Material, ...] = part("what is exchanged")
-    status: npt.NDArray[np.str_] = column(
+    status: TextArray = column(
         "",
         "what became of it",
         "material",
@@ -112,13 +109,13 @@ class DampingStudy(Result):
     @derived("", "what is exchanged", "material")
     def kind(self) -> list[str]:
         """What is exchanged, one of `printhammer.printing.rates.materials.KINDS` each."""
-        return [one.kind for one in self.materials]
+        return [material.kind for material in self.materials]
 
     @property
     @derived("", "for what", "material")
     def label(self) -> list[str]:
         """For what it is exchanged, in a few words each."""
-        return [one.label for one in self.materials]
+        return [material.label for material in self.materials]
 
     @property
     def best(self) -> int | None:
@@ -153,15 +150,11 @@ def damping_study(
         What is exchanged; by default those of `printhammer.printing.rates.materials.materials`.
     current : float or str, optional
         Largest current allowed, A, or text with a unit.
-    limits : Limits, optional
-        How far a dot may be off, for the safe rates; by default 10 % of the force, 50 us, no extra contacts.
-    first, last, step : float or str, optional
-        The grid of rates, Hz.
+    limits, first, last, step, threads
+        As for `printhammer.safe_rate`.
     tolerance : float, optional
         As for `printhammer.simulate`, of print forces and safe rates; by default that for pictures. Settling
         is always computed with the default one of `printhammer.simulate`.
-    threads : int, optional
-        By default as many as there are cores; the result does not depend on it.
     progress : callable, optional
         Called now and then with the number of materials done and of all.
 
@@ -197,11 +190,14 @@ def damping_study(
     status[resting[np.isnan(factors)]] = "force not reached"
     values["peak_current"] = pulse.peak * values["amplitude"]
     left = np.flatnonzero(status == "ok")
-    driven = [_driven(made[k], values["amplitude"][k]) for k in left]
+    driven = []
+    for k, factor in zip(left.tolist(), values["amplitude"][left].tolist(), strict=True):
+        larger = pulse_of(made[k]).scaled(factor)
+        driven.append(made[k].replace("waveform", larger, source="the same print force"))
     dots = single_pulses(driven, tolerance=tolerance, threads=threads)
-    for k, one, dot in zip(left.tolist(), driven, dots, strict=True):
+    for k, exchanged, dot in zip(left.tolist(), driven, dots, strict=True):
         # At the default tolerance: energies of single runs are not worth a risk.
-        settling = settle(one)
+        settling = settle(exchanged)
         wear = settling.wear
         if settling.status != "ok" or dot is None:
             status[k] = settling.status if settling.status != "ok" else "force not reached"
@@ -253,7 +249,7 @@ def tuned(
         NaN where there is none; good to 1e-6.
     """
     scales = np.tile(np.linspace(LEAST, MOST, _COARSE), (len(hammers), 1))
-    found = np.full(len(hammers), np.nan)
+    factors = np.full(len(hammers), np.nan)
     alive = np.arange(len(hammers))
     for last in [False] * _ROUNDS + [True]:
         if not alive.size:
@@ -278,11 +274,6 @@ def tuned(
         low, high = scales[rows, place], scales[rows, place + 1]
         if last:
             below, above = forces[rows, place], forces[rows, place + 1]
-            found[alive] = low + (high - low) * (force - below) / (above - below)
+            factors[alive] = low + (high - low) * (force - below) / (above - below)
         scales = np.linspace(low, high, _FINE, axis=1)
-    return found
-
-
-def _driven(hammer: Hammer, factor: float) -> Hammer:
-    """Return the hammer with its waveform a factor larger."""
-    return hammer.replace("waveform", pulse_of(hammer).scaled(float(factor)), source="the same print force")
+    return factors

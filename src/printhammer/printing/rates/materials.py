@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
@@ -11,6 +10,7 @@ from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,7 +27,7 @@ DAMPINGS: Final = (0.25, 0.5, 2.0, 4.0, 16.0)
 """Factors on stiffness and damping of a hard backstop."""
 
 ELASTOMERS: Final = (8e7, 8e8)
-"""Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about what the paper tells of them, and ten times
+"""Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about what the paper says of them, and ten times
 that."""
 
 RELAXATIONS: Final = (0.0, 10e-6, 30e-6, 100e-6, 300e-6)
@@ -40,23 +40,12 @@ PACK_DAMPINGS: Final = (0.1, 0.4)
 """Damping ratios of packs of a spring and a dashpot."""
 
 
-@dataclass(frozen=True)
-class Material:
-    """What is other than in the hammer that is studied.
+class Material(Declared):
+    """What is other than in the hammer that is studied."""
 
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    label : str
-        What it is, in a few words.
-    changes : mapping
-        Constants, options and parts as `Hammer.replace` takes them.
-    """
-
-    kind: str
-    label: str
-    changes: Mapping[str, Any]
+    kind: str = part("one of `KINDS`")
+    label: str = part("what it is, in a few words")
+    changes: Mapping[str, Any] = part("constants, options and parts as `Hammer.replace` takes them")
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -70,21 +59,21 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
     packs are softer and harder ones of equation (5), and springs with a dashpot, the spring such that the
     loading work of the single-pulse dot presses it with the force of that dot.
     """
-    found = [Material("as it is", "as it is", {})]
+    listed = [Material("as it is", "as it is", {})]
     backstop, pack = hammer.backstop, hammer.pack
     hard = backstop if isinstance(backstop, HertzBackstop) else None
     if hard is not None and hard.damping is not None and hard.stiffness is not None:
         k, damping = hard.stiffness, hard.damping
-        found += [
+        listed += [
             # The rebound depends on l v / k alone: with both a factor larger, only the duration changes.
             Material(
                 "hard", f"k and l x {f:.2g}", {"backstop.stiffness": f * k, "backstop.damping": f * damping}
             )
             for f in STIFFNESSES
         ]
-        found += [Material("hard", f"l x {f:g}", {"backstop.damping": f * damping}) for f in DAMPINGS]
+        listed += [Material("hard", f"l x {f:g}", {"backstop.damping": f * damping}) for f in DAMPINGS]
     if hammer.position is not None:
-        found += [
+        listed += [
             Material(
                 "elastomer",
                 f"k {1e-6 * stiffness:g} MN/m^1.5, A {1e6 * time:g} us",
@@ -98,12 +87,12 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
             for time in RELAXATIONS
         ]
     if isinstance(pack, PowerPack):
-        found += [
+        listed += [
             Material("pack", f"stiffness x {f:g}", {"pack.stiffness": f * pack.stiffness}) for f in PACKS
         ]
         stiff = 0.5 * single.force**2 / single.loading_work
         critical = 2.0 * math.sqrt(stiff * hammer.mass)
-        found += [
+        listed += [
             Material(
                 "pack",
                 f"dashpot, {ratio:g} of critical",
@@ -111,4 +100,4 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
             )
             for ratio in PACK_DAMPINGS
         ]
-    return found
+    return listed

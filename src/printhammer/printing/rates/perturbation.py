@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from printhammer.errors import InputError
@@ -13,6 +13,7 @@ from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -20,41 +21,38 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
 
-@dataclass(frozen=True)
-class Perturbation:
-    """By how much a hammer differs; everything 0 by default.
+class Perturbation(Declared):
+    """By how much a hammer differs; everything 0 by default."""
 
-    Attributes
-    ----------
-    current : float
-        Relative change of every current, as by the supply rail: 0.03 for 3 % more.
-    travel : float
-        By how much pack and platen lie farther from the armature, m: the wire travel.
-    forms : float
-        Relative change of the thickness of the pack, the number of forms. The platen stays, so that the front
-        of the pack comes nearer.
-    magnet : float
-        Relative change of the flux of the permanent magnet, Am of equation (3).
-    damping : float
-        Relative change of the damping of the backstop: l of equation (7), or the relaxation time of an
-        elastomer.
-    """
-
-    current: float = 0.0
-    travel: float = 0.0
-    forms: float = 0.0
-    magnet: float = 0.0
-    damping: float = 0.0
+    current: float = part(
+        "relative change of every current, as by the supply rail: 0.03 for 3 % more", default=0.0
+    )
+    travel: float = part(
+        "by how much pack and platen lie farther from the armature, m: the wire travel", default=0.0
+    )
+    forms: float = part(
+        "relative change of the thickness of the pack, the number of forms",
+        more="the platen stays, so that the front of the pack comes nearer",
+        default=0.0,
+    )
+    magnet: float = part(
+        "relative change of the flux of the permanent magnet, Am of equation (3)", default=0.0
+    )
+    damping: float = part(
+        "relative change of the damping of the backstop",
+        more="that is l of equation (7), or the relaxation time of an elastomer",
+        default=0.0,
+    )
 
     @property
     def name(self) -> str:
         """In words, such as "current +3 %, travel -10 µm"; "nominal" where nothing differs."""
-        told = [
+        words = [
             f"{key} {1e6 * value:+.3g} µm" if key == "travel" else f"{key} {100.0 * value:+.3g} %"
             for key, value in asdict(self).items()
             if value
         ]
-        return ", ".join(told) or "nominal"
+        return ", ".join(words) or "nominal"
 
 
 def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
@@ -108,30 +106,19 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
 def changed(
     hammer: Hammer, changes: Iterable[tuple[Mapping[str, Any], str]]
 ) -> tuple[list[Hammer], list[str]]:
-    """Return hammers with other constants, and what becomes of each.
+    """Return hammers with other constants, and what becomes of each: "ok", "no hammer" or "does not rest".
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer that all of them come from.
-    changes : iterable of (mapping, str)
-        For each what `Hammer.replace` takes, and its source; without changes it is the hammer itself.
-
-    Returns
-    -------
-    hammers : list of Hammer
-        One for each; the hammer itself where there is none with these constants.
-    status : list of str
-        "ok", "no hammer" or "does not rest".
+    For each there is what `Hammer.replace` takes, and its source. Where there are no changes, or there is no
+    hammer with these constants, it is the hammer itself.
     """
     made, status = [], []
     for change, source in changes:
-        one, fate = hammer, "no hammer"
+        other, fate = hammer, "no hammer"
         with suppress(InputError):
-            one = hammer.replace(change, source=source) if change else hammer
+            other = hammer.replace(change, source=source) if change else hammer
             fate = "does not rest"
-            rest_state(one)
+            rest_state(other)
             fate = "ok"
-        made.append(one)
+        made.append(other)
         status.append(fate)
     return made, status

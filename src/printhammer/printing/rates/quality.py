@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,12 +11,12 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.judging import FAULTS, judge
 from printhammer.printing.dots.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
-from printhammer.printing.dots.nominal import WAIT, rate_of
+from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.settling import wear_of
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
 from printhammer.printing.dots.strategy import checked_drives, name_of, open_loop
-from printhammer.results import Result, column, derived, part, scalar
+from printhammer.results import Declared, Result, column, derived, part, scalar
 from printhammer.run.coil_work import squared_current
 from printhammer.run.ensemble import DotTable
 from printhammer.run.problem import TOLERANCE
@@ -30,19 +29,15 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.judging import Judgement
     from printhammer.printing.dots.nominal import Nominal
     from printhammer.printing.dots.settling import Wear
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.run.contacts import Dot
     from printhammer.run.ledger import Ledger
-    from printhammer.support.arrays import FloatArray
-
-    BoolArray = npt.NDArray[np.bool_]
-    IntArray = npt.NDArray[np.int64]
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 PITCH: Final = 25.4e-3 / 60.0
-"""Distance of neighbouring slots on the paper, m, unless told otherwise: sixty to the inch."""
+"""Distance of neighbouring slots on the paper by default, m: sixty to the inch."""
 
 _SPREADS: Final = {"flight_time": "s", "force": "N", "indentation": "m", "arrival": "s", "placement": "m"}
 
@@ -50,25 +45,14 @@ MOST_SLOTS: Final = 20_000
 """Number of slots above which a pattern is refused."""
 
 
-@dataclass(frozen=True)
-class Spread:
-    """How some numbers are spread.
+class Spread(Declared):
+    """How some numbers are spread; of none, all but their number is NaN."""
 
-    Attributes
-    ----------
-    count : int
-        How many there are.
-    mean, deviation : float
-        Mean, and standard deviation about it; NaN without any.
-    low, high : float
-        Least and largest.
-    """
-
-    count: int
-    mean: float
-    deviation: float
-    low: float
-    high: float
+    count: int = part("how many there are")
+    mean: float = part("mean")
+    deviation: float = part("standard deviation about the mean")
+    low: float = part("least")
+    high: float = part("largest")
 
     @property
     def peak_to_peak(self) -> float:
@@ -187,7 +171,7 @@ class Quality(Result):
     def dot_matrix(self) -> bool:
         """Whether no dot is lost and arrivals vary by 200 us at most, what dot matrix printing bears.
 
-        Where every dot is fired at its slot they vary as the flight times do, of which the paper tells.
+        Where every dot is fired at its slot they vary as the flight times do, which are those of the paper.
         """
         return self._within(DOT_MATRIX_SPREAD)
 
@@ -256,16 +240,10 @@ def quality(
         The slots: text such as "10110111", 1 where a dot is wanted; a number of dots without a gap; or truth
         values. By default once around the binary de Bruijn cycle of order 8, in which every word of eight
         slots occurs once, after 64 slots of it that are not judged.
-    strategy : Strategy, optional
-        How it is driven; by default open loop.
-    limits : Limits, optional
-        By which dots are judged; by default 10 % of the force, 50 us, no extra contacts.
-    nominal : Nominal, optional
-        The single-pulse dot by which the others are judged; by default that of the hammer.
+    strategy, limits, nominal, tolerance
+        As for `printhammer.safe_rate`.
     pitch : float or str, optional
         Distance of neighbouring slots on the paper, m, or text with a unit.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
 
     Returns
     -------
@@ -278,26 +256,30 @@ def quality(
         An argument is not what is described above; a hammer whose single pulse makes no dot; a strategy whose
         drives do not fit.
     """
-    often = rate_of(rate)
-    apart = read_positive(pitch, "m", "pitch")
+    slot_rate = read_positive(rate, "Hz", "rate")
+    slot_pitch = read_positive(pitch, "m", "pitch")
     wanted = cycle_with_lead_in() if pattern is None else pattern_of(pattern)
     judged_from = LEAD_IN if pattern is None else 0
     bounds = Limits() if limits is None else limits
     single = single_pulse(hammer, tolerance=tolerance) if nominal is None else nominal
     slots = slots_of(wanted)
-    drive = checked_drives(strategy, hammer, [slots], often)[0]
-    due = slot_times(slots, often)
+    drive = checked_drives(strategy, hammer, [slots], slot_rate)[0]
+    due = slot_times(slots, slot_rate)
     end = max(float(due[-1]), float(drive.times[-1])) + WAIT
     motion = simulate(hammer, drive, duration=end, points=2, tolerance=tolerance)
     dots = dot_table(motion.dots, drive.times)
     judged = np.asarray(slots) >= judged_from
-    found: Judgement = judge(dots, judged[np.newaxis], due[np.newaxis], single, bounds, np.array([motion.ok]))
-    run = found.run[0, judged]
+    judgement = judge(dots, judged[np.newaxis], due[np.newaxis], single, bounds, np.array([motion.ok]))
+    run = judgement.run[0, judged]
+    heat = None
+    if hammer.coil_resistance is not None:
+        squared = squared_current(drive, 0.0, motion.end) if drive.quantity == "current" else 0.0
+        heat = hammer.coil_resistance * squared
     return Quality(
         hammer=hammer,
         strategy=name_of(strategy),
         drive=drive,
-        rate=often,
+        rate=slot_rate,
         wanted=wanted,
         judged_from=judged_from,
         limits=bounds,
@@ -306,21 +288,21 @@ def quality(
         flight_time=np.where(run, dots.flight_time[0, judged], np.nan),
         force=np.where(run, dots.peak_force[0, judged], np.nan),
         indentation=np.where(run, dots.indentation[0, judged], np.nan),
-        arrival_deviation=found.arrival_deviation[0, judged],
-        lost=found.lost[0, judged],
-        extra_contacts=found.extra_contacts[0, judged],
-        fault=found.faults[0, judged],
+        arrival_deviation=judgement.arrival_deviation[0, judged],
+        lost=judgement.lost[0, judged],
+        extra_contacts=judgement.extra_contacts[0, judged],
+        fault=judgement.faults[0, judged],
         wear=wear_of(motion),
         energy=motion.energy,
-        heat=_heat(hammer, drive, motion.end),
+        heat=heat,
         fired=len(motion.dots),
-        pitch=apart,
+        pitch=slot_pitch,
         status=motion.status,
         tolerance=tolerance,
     )
 
 
-def pattern_of(given: str | int | npt.ArrayLike) -> npt.NDArray[np.bool_]:
+def pattern_of(pattern: str | int | npt.ArrayLike) -> BoolArray:
     """Read a pattern as `quality` takes it: where dots are wanted, slot by slot.
 
     Raises
@@ -328,29 +310,21 @@ def pattern_of(given: str | int | npt.ArrayLike) -> npt.NDArray[np.bool_]:
     InputError
         It is none of these, wants no dot, or is too long.
     """
-    if isinstance(given, str):
-        if not given or set(given) - {"0", "1"}:
-            raise InputError(f"pattern = {given!r}, expected slots such as '10110111'")
-        found = np.array([letter == "1" for letter in given])
-    elif isinstance(given, int) and not isinstance(given, bool):
-        if not 1 <= given <= MOST_SLOTS:
-            raise InputError(f"pattern = {given!r}, expected 1 to {MOST_SLOTS} dots")
-        found = np.ones(given, dtype=np.bool_)
+    if isinstance(pattern, str):
+        if not pattern or set(pattern) - {"0", "1"}:
+            raise InputError(f"pattern = {pattern!r}, expected slots such as '10110111'")
+        wanted = np.array([letter == "1" for letter in pattern])
+    elif isinstance(pattern, int) and not isinstance(pattern, bool):
+        if not 1 <= pattern <= MOST_SLOTS:
+            raise InputError(f"pattern = {pattern!r}, expected 1 to {MOST_SLOTS} dots")
+        wanted = np.ones(pattern, dtype=np.bool_)
     else:
-        found = np.asarray(given)
-        if found.dtype != np.bool_ or found.ndim != 1:
+        wanted = np.asarray(pattern)
+        if wanted.dtype != np.bool_ or wanted.ndim != 1:
             raise InputError("pattern: expected text, a number of dots, or truth values in one row")
-    if not found.any() or len(found) > MOST_SLOTS:
+    if not wanted.any() or len(wanted) > MOST_SLOTS:
         raise InputError(f"pattern: expected at least one dot and at most {MOST_SLOTS} slots")
-    return found
-
-
-def _heat(hammer: Hammer, drive: Drive, end: float) -> float | None:
-    """Return the heat of the coil up to the end of a run, J."""
-    if hammer.coil_resistance is None:
-        return None
-    squared = squared_current(drive, 0.0, end) if drive.quantity == "current" else 0.0
-    return hammer.coil_resistance * squared
+    return wanted
 
 
 def spread_of(values: FloatArray) -> Spread:

@@ -4,15 +4,14 @@ R(limits) is the largest rate of a grid such that at it and at every rate of the
 within limits: those of all 255 patterns of eight slots from rest, and those of the binary de Bruijn cycle of
 order 8, in which every word of eight slots occurs once, after 64 slots of it.
 
-The grid begins at 100 Hz unless told otherwise: ten milliseconds are several times the time in which such a
+By default the grid begins at 100 Hz: ten milliseconds are several times the time in which such a
 hammer settles, so that below that every dot is a single pulse from rest.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.slots import LEAD_IN, SLOTS, cycle_with_lead_in, eight_slot_patterns, slots_of
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case, attempt
-from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
@@ -36,10 +35,8 @@ if TYPE_CHECKING:
     from printhammer.printing.dots.nominal import SinglePulse
     from printhammer.printing.dots.strategy import Strategy
     from printhammer.printing.dots.trial import Trial
-    from printhammer.support.arrays import FloatArray
-
-    BoolArray = npt.NDArray[np.bool_]
-    IntArray = npt.NDArray[np.int64]
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+    from printhammer.support.threads import Progress
 
 FIRST: Final = 100.0
 """First rate of the grid, Hz."""
@@ -53,39 +50,27 @@ STEP: Final = 5.0
 MOST_RATES: Final = 10_000
 """Number of rates above which a grid is refused."""
 
-_AT_ONCE: Final = 16
+_AT_ONCE: Final = 16  # Number of rates of one ensemble
+_HAMMERS_AT_ONCE: Final = 32
 
 
-@dataclass(frozen=True)
-class Failure:
-    """The dot that is off first at the first rate that does not pass.
+class Failure(Declared):
+    """The dot that is off first at the first rate that does not pass."""
 
-    Attributes
-    ----------
-    rate : float
-        Slots per second, Hz.
-    pattern : str
-        The slots up to this dot, 1 where a dot is wanted; in the cycle the eight slots that end with it.
-    in_cycle : bool
-        Whether it is a dot of the cycle.
-    slot : int
-        Number of its slot; in the cycle counted from the end of the lead-in.
-    fault : str
-        One of `printhammer.printing.dots.judging.FAULTS`.
-    deviation : float
-        Of the force, in parts of the single-pulse force, or of the arrival, s, or number of extra contacts;
-        NaN where the fault is another one.
-    share : float
-        Part of the patterns that do not pass at this rate; of a failure in the cycle, part of its dots.
-    """
-
-    rate: float
-    pattern: str
-    in_cycle: bool
-    slot: int
-    fault: str
-    deviation: float
-    share: float
+    rate: float = scalar("Hz", "slots per second")
+    pattern: str = part(
+        "the slots up to this dot, 1 where a dot is wanted; in the cycle the eight slots that end with it"
+    )
+    in_cycle: bool = part("whether it is a dot of the cycle")
+    slot: int = part("number of its slot; in the cycle counted from the end of the lead-in")
+    fault: str = part("one of `printhammer.printing.dots.judging.FAULTS`")
+    deviation: float = part(
+        "of the force, in parts of the single-pulse force, or of the arrival, s, or number of extra contacts",
+        more="NaN where the fault is another one",
+    )
+    share: float = part(
+        "part of the patterns that do not pass at this rate; of a failure in the cycle, part of its dots"
+    )
 
     @property
     def text(self) -> str:
@@ -225,7 +210,8 @@ def safe_rate(
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     rows: list[dict[str, Any]] = []
     failure: Failure | None = None
-    safe, best = math.nan, list[_Runs]()
+    safe = math.nan
+    best: list[tuple[Trial, int]] = []
     for begin in range(0, len(grid), _AT_ONCE):
         cases = [Case(hammer, single, rate) for rate in grid[begin : begin + _AT_ONCE].tolist()]
         trial = attempt(cases, patterns, strategy, **options)
@@ -236,9 +222,9 @@ def safe_rate(
         if cycle and good.size:
             around = attempt([cases[k] for k in good], around_it, strategy, judged_from=LEAD_IN, **options)
         for k, case in enumerate(cases):
-            runs = [_Runs(trial, k)]
+            runs = [(trial, k)]
             if around is not None and k in good:
-                runs.append(_Runs(around, int(np.searchsorted(good, k))))
+                runs.append((around, int(np.searchsorted(good, k))))
             rows.append(_row(runs))
             if failure is None and rows[-1]["passed"]:
                 safe, best = case.rate, runs
@@ -260,7 +246,7 @@ def safe_rate(
         rates=grid[: len(rows)],
         # Dear where pulses overlap, so only of the rate that is found.
         peak_drive=max(
-            (drive.peak for runs in best for drive in runs.trial.drives[runs.rows]), default=math.nan
+            (drive.peak for trial, case in best for drive in trial.drives[trial.rows(case)]), default=math.nan
         ),
         step=read_positive(step, "Hz", "step"),
         tolerance=tolerance,
@@ -297,40 +283,26 @@ def grid_notes(grid: FloatArray) -> dict[str, float]:
 def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     """Return the patterns of eight slots, by the numbers of the slots at which dots are wanted.
 
-    Parameters
-    ----------
-    every : bool
-        Whether to return all 255, or only the 128 that begin with a dot: in an open loop from rest the others
-        are some of these, later.
+    That is `every` one of the 255, or only the 128 that begin with a dot: in an open loop from rest the
+    others are some of these, later.
     """
-    found = [slots_of(row) for row in eight_slot_patterns()]
-    return [slots for slots in found if every or slots[0] == 0]
+    patterns = [slots_of(row) for row in eight_slot_patterns()]
+    return [slots for slots in patterns if every or slots[0] == 0]
 
 
-class _Runs(NamedTuple):
-    """The runs of one case of a trial."""
-
-    trial: Trial
-    case: int
-
-    @property
-    def rows(self) -> slice:
-        """Their places among all runs of the trial."""
-        count = len(self.trial.patterns)
-        return slice(self.case * count, (self.case + 1) * count)
-
-
-def _row(parts: Sequence[_Runs]) -> dict[str, Any]:
-    """Return what a safe rate tells of one rate, by the names of its fields."""
+def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
+    """Return what a safe rate says of one rate, by the names of its fields, from the runs of some cases."""
 
     def joined(name: str) -> npt.NDArray[Any]:
-        return np.concatenate([getattr(part.trial.judgement, name)[part.rows].ravel() for part in parts])
+        return np.concatenate(
+            [getattr(trial.judgement, name)[trial.rows(case)].ravel() for trial, case in runs]
+        )
 
     row: dict[str, Any] = {
         "passed": bool(joined("passed").all()),
         "lost": int(joined("lost").sum()),
         "extra_contacts": int(joined("extra_contacts").sum()),
-        "cycle_run": len(parts) > 1,
+        "cycle_run": len(runs) > 1,
     }
     for name in ("force", "arrival"):
         values = joined(f"{name}_deviation")
@@ -343,7 +315,7 @@ def _row(parts: Sequence[_Runs]) -> dict[str, Any]:
 
 def _failure(trial: Trial, case: int, *, in_cycle: bool) -> Failure:
     """Return the failure that comes in the earliest slot, of several that of the first pattern."""
-    rows, judgement = _Runs(trial, case).rows, trial.judgement
+    rows, judgement = trial.rows(case), trial.judgement
     faults, slots = judgement.faults[rows], trial.slots[rows]
     wrong = faults >= 0
     row, dot = np.unravel_index(int(np.argmin(np.where(wrong, slots, np.iinfo(np.int64).max))), slots.shape)
@@ -364,3 +336,63 @@ def _failure(trial: Trial, case: int, *, in_cycle: bool) -> Failure:
         deviation=math.nan if deviation is None else float(deviation[member, dot]),
         share=float(wrong.sum() / judgement.wanted[rows].sum() if in_cycle else wrong.any(axis=1).mean()),
     )
+
+
+def all_pass(
+    cases: Sequence[Case],
+    strategy: Strategy = open_loop,
+    *,
+    limits: Limits,
+    tolerance: float,
+    threads: int | None = None,
+) -> BoolArray:
+    """Return whether all patterns from rest, and the cycle, are within limits, for each hammer at a rate.
+
+    Arguments as for `printhammer.printing.dots.trial.attempt`.
+    """
+    options: dict[str, Any] = {"limits": limits, "tolerance": tolerance, "threads": threads}
+    patterns = from_rest(every=strategy is not open_loop)
+    cycle = [slots_of(cycle_with_lead_in())]
+    passed = np.zeros(len(cases), dtype=np.bool_)
+    for begin in range(0, len(cases), _HAMMERS_AT_ONCE):
+        some = cases[begin : begin + _HAMMERS_AT_ONCE]
+        passed[begin : begin + len(some)] = attempt(some, patterns, strategy, **options).passed
+    left = np.flatnonzero(passed)
+    if left.size:
+        some = [cases[k] for k in left.tolist()]
+        passed[left] = attempt(some, cycle, strategy, judged_from=LEAD_IN, **options).passed
+    return passed
+
+
+def safe_rates(
+    hammers: Sequence[Hammer],
+    singles: Sequence[SinglePulse],
+    grid: FloatArray,
+    strategy: Strategy = open_loop,
+    *,
+    limits: Limits,
+    tolerance: float,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> FloatArray:
+    """Return the safe rates of some hammers on a grid of ascending rates, Hz; arguments as for `all_pass`.
+
+    Each hammer is judged by its own one of `singles`; `progress` is called with the number of hammers whose
+    rate is found, and of all.
+
+    Returns
+    -------
+    array, shape (hammers,)
+        NaN where not even the first rate of the grid passes; its last one where all pass.
+    """
+    rates = np.full(len(hammers), np.nan)
+    alive = np.arange(len(hammers))
+    for rate in grid.tolist():
+        cases = [Case(hammers[k], singles[k], rate) for k in alive.tolist()]
+        alive = alive[all_pass(cases, strategy, limits=limits, tolerance=tolerance, threads=threads)]
+        rates[alive] = rate
+        if progress is not None:
+            progress(len(hammers) - alive.size, len(hammers))
+        if not alive.size:
+            break
+    return rates

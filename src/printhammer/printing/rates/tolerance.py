@@ -8,36 +8,31 @@ from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
 
-from printhammer.drive.input import read_count
+from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.names import unknown
 from printhammer.printing.dots.limits import Limits
-from printhammer.printing.dots.nominal import nominal, rate_of, single_pulses
+from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.strategy import name_of, open_loop
 from printhammer.printing.dots.trial import Case
 from printhammer.printing.rates.perturbation import changed
-from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_grid
-from printhammer.printing.rates.safe_rates import all_pass, safe_rates
+from printhammer.printing.rates.safe_rate import FIRST, LAST, all_pass, grid_notes, rate_grid, safe_rates
 from printhammer.results import Result, column, derived, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.strategy import Strategy
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, TextArray
     from printhammer.support.threads import Progress
 
-    BoolArray = npt.NDArray[np.bool_]
-
 SPREAD: Final = 0.01
-"""Relative spread of a constant, to either side, unless told otherwise."""
+"""Relative spread of a constant, to either side, by default."""
 
 STEP: Final = 25.0
-"""Step of the grid of rates, Hz, unless told otherwise: coarser than that of one safe rate."""
+"""Step of the grid of rates by default, Hz: coarser than that of one safe rate."""
 
 MOST: Final = 100_000
 """Number of hammers above which a yield is refused."""
@@ -66,7 +61,7 @@ class ToleranceYield(Result):
         name="factor",
     )
     judged_by: Judged = scalar("", '"own" or "design"', more="whose single-pulse dot is the measure")
-    status: npt.NDArray[np.str_] = column(
+    status: TextArray = column(
         "1",
         "what became of the hammer",
         "member",
@@ -173,16 +168,10 @@ def tolerance_yield(
     judged_by : str, optional
         "own": the dots of a hammer are judged by its own single pulse, as if each were adjusted; "design": by
         that of the design.
-    strategy : Strategy, optional
-        How they are driven; by default open loop.
-    limits : Limits, optional
-        How far a dot may be off; by default 10 % of the force, 50 us, no extra contacts.
-    first, last, step : float or str, optional
-        The grid of rates, Hz, on which safe rates are looked for.
+    strategy, limits, first, last, step, threads
+        As for `printhammer.safe_rate`.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores; the result does not depend on it.
     progress : callable, optional
         Called now and then with the number of hammers done and of all.
 
@@ -202,7 +191,7 @@ def tolerance_yield(
         raise InputError(f"number = {count}, expected at most {MOST} hammers")
     if judged_by not in get_args(Judged):
         raise InputError(f"judged_by = {judged_by!r}, expected one of {', '.join(get_args(Judged))}")
-    grid = rate_grid(first, last, step) if rate is None else np.array([rate_of(rate)])
+    grid = rate_grid(first, last, step) if rate is None else np.array([read_positive(rate, "Hz", "rate")])
     bounds = Limits() if limits is None else limits
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     spread = spreads_of(hammer, spreads)
@@ -215,12 +204,12 @@ def tolerance_yield(
     resting = np.flatnonzero(status == "ok")
     force, flight = np.full(count, np.nan), np.full(count, np.nan)
     alone = single_pulses([made[k] for k in resting], tolerance=tolerance, threads=threads)
-    for k, one in zip(resting.tolist(), alone, strict=True):
-        if one is None:
+    for k, dot in zip(resting.tolist(), alone, strict=True):
+        if dot is None:
             status[k] = "makes no dot"
         else:
-            force[k], flight[k] = one.force, one.flight_time
-    singles = [one for one in alone if one is not None]
+            force[k], flight[k] = dot.force, dot.flight_time
+    singles = [dot for dot in alone if dot is not None]
     left = np.flatnonzero(status == "ok")
     hammers = [made[k] for k in left]
     judges = [design] * len(left) if judged_by == "design" else singles
@@ -229,7 +218,7 @@ def tolerance_yield(
         rates[left] = safe_rates(hammers, judges, grid, strategy, progress=progress, **options)
         passed = ~np.isnan(rates)
     elif left.size:
-        cases = [Case(one, judge, float(grid[0])) for one, judge in zip(hammers, judges, strict=True)]
+        cases = [Case(other, judge, float(grid[0])) for other, judge in zip(hammers, judges, strict=True)]
         passed[left] = all_pass(cases, strategy, **options)
         if progress is not None:
             progress(count, count)
@@ -252,7 +241,7 @@ def tolerance_yield(
     )
 
 
-def spreads_of(hammer: Hammer, given: float | Mapping[str, float]) -> dict[str, float]:
+def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, float]:
     """Return the spread of each constant of a hammer that varies.
 
     Raises
@@ -262,21 +251,21 @@ def spreads_of(hammer: Hammer, given: float | Mapping[str, float]) -> dict[str, 
     """
     constants = hammer.constants
     wanted: dict[str, Any]
-    if isinstance(given, Mapping):
-        wanted = dict(given)
+    if isinstance(asked, Mapping):
+        wanted = dict(asked)
     else:
         wanted = {
-            key: given for key, constant in constants.items() if key not in FIXED and constant.si != 0.0
+            key: asked for key, constant in constants.items() if key not in FIXED and constant.si != 0.0
         }
     for key, value in wanted.items():
         if key not in constants:
             raise unknown(key, constants, f"{hammer.path}: spread")
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1.0:
             raise InputError(f"spread of {key} = {value!r} is expected to be from 0 to below 1")
-    found = {key: float(value) for key, value in wanted.items() if value > 0.0}
-    if not found:
+    varying = {key: float(value) for key, value in wanted.items() if value > 0.0}
+    if not varying:
         raise InputError("spreads: expected at least one constant that varies")
-    return found
+    return varying
 
 
 def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:

@@ -13,8 +13,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from printhammer.control.least_work.burst import LeastWork
-    from printhammer.control.least_work.supply import SupplyCheck
+    from printhammer.control.least_work.burst import LeastWork, SupplyCheck
     from printhammer.hammer.hammer import Hammer
 
 _MOST_RATES: Final = 200

@@ -69,15 +69,15 @@ def print_(
 
     A hammer on every wire, each print line from rest. Ends with status 1 where a run stopped before its end.
     """
+    from printhammer.drive.input import read_positive
     from printhammer.printing.dots.limits import limits_named
-    from printhammer.printing.dots.nominal import rate_of
     from printhammer.printing.page.head import head_of
     from printhammer.printing.page.page import print_page
     from printhammer.printing.page.pattern_file import BITMAPS
 
     if rate is None:
         raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'")
-    often = rate_of(rate, "--rate")
+    often = read_positive(rate, "Hz", "--rate")
     if not job.outputs:
         *pages, last = (Path(name) for name in _USUAL)
         job.wanted |= {"out": pages, "zoom": [last]}

@@ -37,7 +37,7 @@ def chosen_strategy(
         return {"strategy": loaded.strategy(hammer)}, loaded
     if not feedback:
         return {}, None
-    from printhammer.control.feedback.comparison import FeedbackStrategy
+    from printhammer.control.feedback.closed_loop import FeedbackStrategy
     from printhammer.control.feedback.controller import Controller
     from printhammer.control.feedback.driver import driver_of
 

@@ -75,8 +75,8 @@ class Contacts:
         expected[:, 3] = base[:, 2]
         spread = np.hypot(samples.error, _MODEL_ERROR * stroke)
         rest = np.where(counts, samples.shown - runs[0], 0.0)
-        found, precision = least_squares(slopes, rest, counts / spread**2, prior, expected)
-        left = rest - sum(slope * found[:, [k]] for k, slope in enumerate(slopes))
+        fitted, precision = least_squares(slopes, rest, counts / spread**2, prior, expected)
+        left = rest - sum(slope * fitted[:, [k]] for k, slope in enumerate(slopes))
         number = counts.sum(axis=1)
         strange = np.where(counts, left**2, 0.0).sum(axis=1) > _STRANGE * spread**2 * number
         variances = np.diagonal(np.linalg.inv(precision), axis1=1, axis2=2)
@@ -84,8 +84,8 @@ class Contacts:
             loop.touched = None
             if number[k] == 0 or strange[k]:
                 continue
-            loop.learned.take_front(places[k] * _GRID + float(found[k, 2]), float(variances[k, 2]))
-            loop.learned.take_scale(float(found[k, 3]), float(variances[k, 3]))
+            loop.learned.take_front(places[k] * _GRID + float(fitted[k, 2]), float(variances[k, 2]))
+            loop.learned.take_scale(float(fitted[k, 3]), float(variances[k, 3]))
 
     def _runs(
         self,

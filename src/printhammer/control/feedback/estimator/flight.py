@@ -79,7 +79,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight as the samples tell it."""
+    """A flight as estimated from samples."""
 
     # Time, s, and speed, m/s, of the coming touch, (M,)
     touch: FloatArray
@@ -103,20 +103,20 @@ class Flight:
             once, twice = _integrated(grid, accelerations(along, grid, scale[:, np.newaxis]))
             stepped = accelerations(along, grid, scale[:, np.newaxis] + _SCALE_STEP)
             more_once, more_twice = _integrated(grid, stepped)
-        found = self.state.copy()
-        found[:, 0] += speed * way + twice[:, 0]
-        found[:, 1] += once[:, 0]
+        moved = self.state.copy()
+        moved[:, 0] += speed * way + twice[:, 0]
+        moved[:, 1] += once[:, 0]
         carry = np.broadcast_to(np.eye(3), (len(way), 3, 3)).copy()
         carry[:, 0, 1] = way
         carry[:, 0, 2] = (more_twice[:, 0] - twice[:, 0]) / _SCALE_STEP
         carry[:, 1, 2] = (more_once[:, 0] - once[:, 0]) / _SCALE_STEP
-        return found, _sandwich(carry, self.covariance)
+        return moved, np.einsum("mij,mjk,mlk->mil", carry, self.covariance, carry, optimize=False)
 
 
 def flight_from_samples(
     samples: Samples, expected: Expected, front: FloatArray, accelerations: Accelerations
 ) -> Flight:
-    """Return what samples tell of flights and the coming touches of the pack, whose front is at `front`, m.
+    """Estimate flights and the coming touches of the pack from samples; its front is at `front`, m.
 
     `accelerations` of a flying armature are a function of displacements, m, times, s, and scales, all of
     shape (M, K) or such that they broadcast to it, in m/s².
@@ -185,19 +185,13 @@ def least_squares(
     """
     precision, pull = prior.copy(), np.empty(expected.shape)
     # Sum by sum, so that a run does not depend on the others, as it may in a product of matrices.
-    for i, one in enumerate(slopes):
+    for i, slope in enumerate(slopes):
         pull[:, i] = (prior[:, i] * expected).sum(axis=1)
-        pull[:, i] += np.where(weight > 0.0, weight * one * rest, 0.0).sum(axis=1)
+        pull[:, i] += np.where(weight > 0.0, weight * slope * rest, 0.0).sum(axis=1)
         for j, other in enumerate(slopes):
-            precision[:, i, j] += np.where(weight > 0.0, weight * one * other, 0.0).sum(axis=1)
+            precision[:, i, j] += np.where(weight > 0.0, weight * slope * other, 0.0).sum(axis=1)
     step = np.linalg.solve(precision, pull[..., np.newaxis])[..., 0]
     return np.asarray(step, np.float64), precision
-
-
-def _sandwich(carry: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return J C J^T for each member."""
-    found: FloatArray = np.einsum("mij,mjk,mlk->mil", carry, covariance, carry, optimize=False)
-    return found
 
 
 def _integrated(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -7,17 +7,17 @@ and on the number of the sample only, so that a closed loop is the same to the b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.results import Declared, part, scalar
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
     Words = npt.NDArray[np.uint64]
 
@@ -37,7 +37,7 @@ class Samples(NamedTuple):
 
     times: FloatArray
     shown: FloatArray
-    used: npt.NDArray[np.bool_]
+    used: BoolArray
     error: float
 
     def take(self, which: Any) -> Samples:
@@ -45,22 +45,8 @@ class Samples(NamedTuple):
         return Samples(self.times[which], self.shown[which], self.used[which], self.error)
 
 
-@dataclass(frozen=True)
-class PositionSensor:
+class PositionSensor(Declared):
     """A position sensor.
-
-    Attributes
-    ----------
-    noise : float
-        Standard deviation of a sample, in parts of the way from backstop to pack; normal, white.
-    delay : float
-        From the instant of a sample until it can be used, s.
-    interval : float
-        Between samples, s.
-    step : float
-        Quantisation, in parts of the way from backstop to pack; 0 for none.
-    seed : int
-        Of the noise.
 
     Raises
     ------
@@ -68,11 +54,16 @@ class PositionSensor:
         A number is negative or not finite, an interval not positive, or the seed is not a whole number.
     """
 
-    noise: float = 0.01
-    delay: float = 20e-6
-    interval: float = 2e-6
-    step: float = 2.0**-10
-    seed: int = 0
+    noise: float = part(
+        "standard deviation of a sample, in parts of the way from backstop to pack; normal, white",
+        default=0.01,
+    )
+    delay: float = scalar("s", "from the instant of a sample until it can be used", default=20e-6)
+    interval: float = scalar("s", "between samples", default=2e-6)
+    step: float = part(
+        "quantisation, in parts of the way from backstop to pack; 0 for none", default=2.0**-10
+    )
+    seed: int = part("of the noise", default=0)
 
     def __post_init__(self) -> None:
         for name, unit in (("noise", ""), ("delay", " s"), ("interval", " s"), ("step", "")):
@@ -88,7 +79,11 @@ class PositionSensor:
         """Standard deviation of a sample, in parts of the way from backstop to pack."""
         return max(float(np.hypot(self.noise, self.step / np.sqrt(12.0))), _LEAST_ERROR)
 
-    def numbers(self, since: FloatArray, until: FloatArray, most: int) -> npt.NDArray[np.int64]:
+    def count(self, time: float) -> int:
+        """Return the number of samples within a time, s; at least one."""
+        return max(1, round(time / self.interval))
+
+    def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
         """Return the numbers of the latest samples in some spans of time (M,), s, shape (M, most).
 
         `until` is the instant at which the samples are needed: what is in by then was taken the delay before.
@@ -96,22 +91,22 @@ class PositionSensor:
         """
         last = np.floor((until - self.delay) / self.interval + _SLACK).astype(np.int64)
         first = np.ceil(since / self.interval - _SLACK).astype(np.int64)
-        found = last[:, np.newaxis] - np.arange(most - 1, -1, -1)
-        return np.where(found >= np.maximum(first, 0)[:, np.newaxis], found, -1)
+        latest = last[:, np.newaxis] - np.arange(most - 1, -1, -1)
+        return np.where(latest >= np.maximum(first, 0)[:, np.newaxis], latest, -1)
 
-    def read(self, x: FloatArray, numbers: npt.NDArray[np.int64], runs: Words, stroke: float) -> FloatArray:
+    def read(self, x: FloatArray, numbers: IntArray, runs: Words, stroke: float) -> FloatArray:
         """Return what the sensor shows of true displacements (M, N), m, at samples of some numbers (M, N).
 
-        `runs` (M,) tell the noise of one run from that of another; `stroke` is the way from backstop to pack.
+        `runs` (M,) are the keys of the noise, one a run; `stroke` is the way from backstop to pack.
         """
-        seen = x + self.noise * stroke * normal(self.seed, runs[:, np.newaxis], numbers)
+        shown = x + self.noise * stroke * normal(self.seed, runs[:, np.newaxis], numbers)
         if self.step > 0.0:
             quantum = self.step * stroke
-            seen = quantum * np.round(seen / quantum)
-        return seen
+            shown = quantum * np.round(shown / quantum)
+        return shown
 
 
-def normal(seed: int, runs: Words, numbers: npt.NDArray[np.int64]) -> FloatArray:
+def normal(seed: int, runs: Words, numbers: IntArray) -> FloatArray:
     """Return normally distributed numbers that depend on seed, run and number only.
 
     The bits are those of the generator splitmix64 (G. L. Steele, D. Lea, C. H. Flood, OOPSLA 2014), whose
@@ -124,12 +119,11 @@ def normal(seed: int, runs: Words, numbers: npt.NDArray[np.int64]) -> FloatArray
     state = _mixed(state ^ numbers.astype(np.uint64))
     # The middle of one of 2**53 equal intervals, so that neither 0 nor 1 occurs.
     share = ((state >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
-    values: FloatArray = ndtri(share)
-    return values
+    return np.asarray(ndtri(share))
 
 
 def run_key(slots: tuple[int, ...], rate: float) -> int:
-    """Return what tells the noise of a pattern at a rate from that of others."""
+    """Return the key by which the noise of a pattern at a rate differs from that of others."""
     import hashlib
 
     text = f"{rate!r} {slots!r}".encode()
