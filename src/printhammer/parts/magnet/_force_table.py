@@ -32,19 +32,9 @@ class ForceTable:
 
 
 def gather(rows: Iterable[tuple[float, float, float]], what: str) -> ForceTable:
-    """Make a table of rows (x, current, force) in any order.
+    """Make a table of points in any order: displacement, m, current, A, and force, N.
 
-    Parameters
-    ----------
-    rows : iterable of (float, float, float)
-        Displacement, m, current, A, and force, N.
-    what : str
-        What to name in a message.
-
-    Returns
-    -------
-    ForceTable
-        The complete grid.
+    Messages begin with `what`.
 
     Raises
     ------
@@ -85,16 +75,6 @@ def read_csv(path: Path) -> ForceTable:
 
     The heading names the columns with their units, ``displacement [mm],current [A],force [N]``, in any
     order; the points may come in any order. Blank lines and lines that begin with # are passed over.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    ForceTable
-        In SI.
 
     Raises
     ------
@@ -148,22 +128,12 @@ def _heading(cells: Sequence[str], what: str) -> tuple[list[str], dict[str, str]
 
 
 def packed_spline(table: ForceTable) -> tuple[float, ...]:
-    """Return the bicubic spline of a table, as `printhammer.parts.magnet.table` reads it.
+    """Return the bicubic spline of a table, packed as `printhammer.parts.magnet.table` states.
 
     Cubic splines with not-a-knot ends along x, then along the current (with two or three points in a
     direction: the line or the parabola through them), so that force, slopes and curvatures are continuous;
     C. de Boor, J. Math. Phys. 41 (1962) 212. The energy is the exact integral of the spline at zero
     current.
-
-    Parameters
-    ----------
-    table : ForceTable
-        Forces on a grid.
-
-    Returns
-    -------
-    tuple of float
-        [nx, ni, x, current, 16 coefficients a cell, 5 energy coefficients an x cell].
     """
     import numpy as np
     from scipy.interpolate import CubicSpline
