@@ -23,24 +23,11 @@ Edit = tuple[str, Any]
 
 
 def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, source: str) -> Edit:
-    """Turn a key and a value as a user gives them into an edit.
+    """Turn a key and a value as a user gives them into an edit of a TOML document.
 
-    Parameters
-    ----------
-    document : mapping
-        The TOML document to which the edit is meant.
-    key : str
-        Such as "mass", "pack.stiffness", "pack.reloading", or a table such as "backstop".
-    value : object
-        Text with a unit, a number in SI or a `Constant`; the value of an option; a part, a waveform or a
-        mapping for a whole table; None to take something away.
-    status, source : str
-        Of the constants.
-
-    Returns
-    -------
-    Edit
-        For `apply`.
+    A key is such as "mass", "pack.stiffness", "pack.reloading", or a table such as "backstop". Its value is
+    text with a unit, a number in SI or a `Constant`; the value of an option; a part, a waveform or a mapping
+    for a whole table; None to take something away. Status and source are those of the constants.
 
     Raises
     ------

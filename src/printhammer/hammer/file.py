@@ -102,21 +102,9 @@ def read_document(text: str, where: str) -> dict[str, Any]:
 
 
 def build(document: Mapping[str, Any], where: str, folder: Path) -> Contents:
-    """Build and check the contents of a hammer file.
+    """Build and check the contents of a hammer file, parts and constants in SI, from its TOML document.
 
-    Parameters
-    ----------
-    document : mapping
-        The TOML document.
-    where : str
-        What to name in a message, usually the file.
-    folder : Path
-        Where a force table or a sampled waveform lies.
-
-    Returns
-    -------
-    Contents
-        Parts and constants in SI.
+    Messages begin with `where`, usually the file; `folder` is where a force table or a sampled waveform lies.
 
     Raises
     ------

@@ -47,11 +47,6 @@ def load(name_or_path: str | Path) -> Hammer:
     name_or_path : str or Path
         Name of a shipped hammer, such as "hendriks-1983", or a path to a hammer file.
 
-    Returns
-    -------
-    Hammer
-        The hammer.
-
     Raises
     ------
     InputError
@@ -102,11 +97,6 @@ class Hammer:
         folder : path, optional
             Where a force table or a sampled waveform lies; the working directory by default.
 
-        Returns
-        -------
-        Hammer
-            The hammer.
-
         Raises
         ------
         InputError
@@ -138,11 +128,6 @@ class Hammer:
             Of all constants.
         **parts
             `magnet`, `spring`, `pack`, `backstop`, `waveform`, `platen`, `coil`, each as `replace` takes it.
-
-        Returns
-        -------
-        Hammer
-            The hammer.
 
         Raises
         ------
@@ -270,7 +255,7 @@ class Hammer:
         status: str = "assumed",
         source: str = REPLACED,
     ) -> Hammer:
-        """Return a hammer with constants, options or whole parts replaced.
+        """Return a new hammer with constants, options or whole parts replaced; this one stays as it is.
 
         Parameters
         ----------
@@ -282,11 +267,6 @@ class Hammer:
             value; for a part: a part, or a mapping of its keys with "law"; None takes away what is optional.
         status, source : str, optional
             Of the constants set.
-
-        Returns
-        -------
-        Hammer
-            A new hammer; this one stays as it is.
 
         Raises
         ------
@@ -312,11 +292,6 @@ class Hammer:
 
     def save(self, path: str | Path) -> None:
         """Write the hammer file, and beside it the tables that it names.
-
-        Parameters
-        ----------
-        path : path
-            File to write.
 
         Raises
         ------
@@ -370,11 +345,8 @@ class Hammer:
     def warnings(self) -> list[str]:
         """Say what is odd about a hammer that can still be simulated.
 
-        Returns
-        -------
-        list of str
-            A sentence for each interval between backstop and platen in which the net force of magnet and
-            spring at zero current is positive.
+        A sentence for each interval between backstop and platen in which the net force of magnet and spring
+        at zero current is positive.
 
         Raises
         ------

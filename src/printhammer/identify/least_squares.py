@@ -266,28 +266,12 @@ def variance_of(
     *,
     clipped: bool = False,
 ) -> FloatArray:
-    """Return the variance of each row by maximum likelihood of its components.
+    """Return the variance of each row, shape (m,), by maximum likelihood of its components.
 
     Each step multiplies every component by the root of the ratio of what the residuals ask for to what they
-    have; a component that is not needed goes to zero.
-
-    Parameters
-    ----------
-    spread : array, shape (m, q)
-        How much each component has in each row.
-    residuals : array, shape (m,)
-        Data less law.
-    used : array of bool, shape (m,)
-        Rows that count.
-    parameters : int
-        Number of parameters of the law, which take up as many residuals.
-    clipped : bool, optional
-        Whether large residuals count as smaller ones, while the outliers are not known.
-
-    Returns
-    -------
-    array, shape (m,)
-        Also of the rows that do not count.
+    have; a component that is not needed goes to zero. Each component has its `spread`, shape (m, q), in each
+    row; only the rows used count, and the parameters of the law take up as many residuals. Where the outliers
+    are not known yet, large residuals are clipped.
     """
     from scipy.stats import chi2
 

@@ -78,20 +78,7 @@ class FittedConstant:
         in_file: bool = True,
         how: str = "",
     ) -> Self:
-        """Make a constant with the 95 % interval of Student's t.
-
-        Parameters
-        ----------
-        key, value, standard_error, unit, in_file, how
-            As the attributes.
-        degrees_of_freedom : float
-            Of the estimate of the noise.
-
-        Returns
-        -------
-        FittedConstant
-            The constant.
-        """
+        """Make a constant with the 95 % interval of Student's t, of the freedom of the estimated noise."""
         half = student(degrees_of_freedom) * float(standard_error)
         ends = float(value) - half, float(value) + half
         return cls(key, float(value), float(standard_error), ends, unit, in_file, how)

@@ -65,7 +65,7 @@ def read_table(
     optional: Mapping[str, str] = _NONE,
     text: Mapping[str, tuple[str, ...]] = _NO_WORDS,
 ) -> Table:
-    """Read a table.
+    """Read a table, numbers in SI; a column that was left out is not in it.
 
     Parameters
     ----------
@@ -77,11 +77,6 @@ def read_table(
         Columns of numbers that may be left out.
     text : mapping of str to tuple of str, optional
         Columns of words, which may be left out: name to the words allowed, in lower case. They have no unit.
-
-    Returns
-    -------
-    Table
-        Numbers in SI; a column that was left out is not in it.
 
     Raises
     ------

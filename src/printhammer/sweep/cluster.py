@@ -56,14 +56,8 @@ def run_dask(
 
     A task whose worker is killed is done again elsewhere by the scheduler. A task that the scheduler gives up
     because it has cost several workers is put aside until all others are done, then done alone on the
-    cluster, in ever smaller parts; a member that still kills its worker is recorded as lost.
-
-    Parameters
-    ----------
-    plan, todo, write, told
-        As for `run_local`.
-    client : distributed.Client
-        A client of the scheduler.
+    cluster, in ever smaller parts; a member that still kills its worker is recorded as lost. The arguments
+    are those of `run_local`, and a `distributed.Client` of the scheduler.
 
     Raises
     ------

@@ -73,11 +73,6 @@ def recover(
     folder : path, optional
         Where the tables are left; by default they are not kept.
 
-    Returns
-    -------
-    Recovery
-        What was found.
-
     Raises
     ------
     InputError

@@ -60,16 +60,9 @@ class Pulse:
 def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform | None, tau: float) -> Pulse:
     """Fit the constants of a waveform to a recorded current, or take the record as the waveform.
 
-    Parameters
-    ----------
-    where : str
-        Name of the file, for messages.
-    t, current : array, shape (n,)
-        Times, ascending, s, of which the firing is 0, and currents, A.
-    waveform : Waveform or None
-        Its shape, with constants near which to look.
-    tau : float
-        Time constant of the sensor, s.
+    The record has times, s, ascending, of which the firing is 0, and currents, A, both of shape (n,); the
+    waveform has constants near which to look, and `tau` is the time constant of the sensor, s. Messages begin
+    with `where`.
 
     Raises
     ------

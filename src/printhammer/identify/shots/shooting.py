@@ -99,14 +99,8 @@ class _Run:
 class Shooting:
     """Chains of stretches for several shots, integrated together.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        Its constants that are not fitted stay as they are.
-    pulses : sequence of Pulse
-        The current of each; None where the hammer's own waveform is fired.
-    parameters : Parameters
-        What is fitted.
+    Constants of the hammer that are not fitted stay as they are; where a pulse is None, its own waveform is
+    fired.
     """
 
     def __init__(

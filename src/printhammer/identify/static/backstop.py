@@ -61,7 +61,7 @@ class Stiffness:
         moduli: Sequence[tuple[float, float]],
         ratios: Sequence[tuple[float, float]],
     ) -> Stiffness:
-        """Return the stiffness of two bodies after Hertz.
+        """Return the stiffness of two bodies after Hertz, with the error of first order that follows.
 
         Parameters
         ----------
@@ -71,11 +71,6 @@ class Stiffness:
             Young's moduli of both and their standard errors, Pa.
         ratios : sequence of tuple
             Poisson ratios of both and their standard errors.
-
-        Returns
-        -------
-        Stiffness
-            With the error that follows from those given, to first order.
 
         Raises
         ------

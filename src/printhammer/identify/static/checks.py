@@ -37,23 +37,10 @@ def judge(
     and degrees of freedom as those of the fit. The runs test looks at residuals in the order of the abscissa,
     series by series. The least probability counts once for each test (Bonferroni).
 
-    Parameters
-    ----------
-    solution : Solution
-        Fit of the law.
-    terms : mapping of str to array, shape (m,)
-        What the law lacks, in the unit of the data, by what its need would mean.
-    abscissa : array, shape (m,)
-        Where each datum was measured.
-    series : array of int, shape (m,)
-        To which series each datum belongs.
-
-    Returns
-    -------
-    p_value : float
-        Probability of so much against the law if it holds; NaN where the data are exact or too few.
-    why : str
-        What speaks most against the law; empty unless it is rejected.
+    Terms are what the law lacks, in the unit of the data, by what their need would mean; they, abscissa and
+    series have the shape (m,) of the data. Returned are the probability of so much against the law if it
+    holds, NaN where the data are exact or too few, and what speaks most against it, empty unless it is
+    rejected.
     """
     if solution.exact or solution.degrees_of_freedom < 3:
         return math.nan, ""

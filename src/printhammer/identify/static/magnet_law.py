@@ -15,21 +15,11 @@ if TYPE_CHECKING:
 
 
 class TotalLaw:
-    """Force of magnet and spring at measured displacements and currents.
+    """Force of magnet and spring at measured displacements, m, and currents, A, shape (m,).
 
-    With the position of the backstop p = [F0, Am, Bm, Bs, As]; without it p = [C, Am, Bm, K] and the force is
-    C - K x - (Am - Bm I)^2 / sqrt(x). Where the zero of the displacement is fitted too, it is the last of p.
-
-    Parameters
-    ----------
-    x : array, shape (m,)
-        Displacement as measured, m.
-    current : array, shape (m,)
-        Current, A; NaN where there is no magnet.
-    position : float or None
-        Position b of the backstop, m.
-    zero : float or None
-        What the sensor shows at x = 0, m; None where it is fitted.
+    With the position b of the backstop, m, p = [F0, Am, Bm, Bs, As]; without it p = [C, Am, Bm, K] and the
+    force is C - K x - (Am - Bm I)^2 / sqrt(x). A current that is NaN says that there is no magnet. `zero` is
+    what the sensor shows at x = 0, m; None where it is fitted too, and then it is the last of p.
     """
 
     def __init__(

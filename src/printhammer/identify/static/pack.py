@@ -40,20 +40,10 @@ _MEETS: Final = 0.02
 
 
 class PackLaw:
-    """Equation (5) at measured indentations.
+    """Equation (5) at measured indentations over the thickness of the pack, r, shape (m,).
 
-    p = [S, ln rho of each cycle with unloading rows], and the two exponents at its end if they are fitted.
-
-    Parameters
-    ----------
-    r : array, shape (m,)
-        Indentation over thickness.
-    cycles : Cycles
-        Branch and cycle of each row.
-    exponents : bool
-        Whether the exponents are fitted.
-    thickness : float
-        Of the pack, m; an error of the indentation has its slope over it.
+    p = [S, ln rho of each cycle with unloading rows], and the two exponents at its end if they are fitted. An
+    error of the indentation has its slope over the thickness, m.
     """
 
     def __init__(self, r: FloatArray, cycles: Cycles, exponents: bool, thickness: float) -> None:
