@@ -48,6 +48,7 @@ from printhammer.drive.waveforms.base import QUANTITY_UNITS, Waveform
 from printhammer.drive.waveforms.shapes import SHAPES, Chain, Sampled, Switched
 from printhammer.errors import InputError
 from printhammer.support.constants import quantities, sentence, shown
+from printhammer.support.texts import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -80,14 +81,7 @@ def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
         unit or range; the sentence names file, key and value.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: the drive file is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: the drive file cannot be read ({reason})") from None
-    return read_drive(text, waveform, name=str(path), folder=path.parent)
+    return read_drive(read_text(path, "the drive file"), waveform, name=str(path), folder=path.parent)
 
 
 def read_drive(

@@ -194,15 +194,8 @@ class PulseSequence(Drive):
             result[own] = evaluate(self._tables[k], moments[own], self._times[numbers[own]])
         return result.reshape(np.shape(time))
 
-    def __repr__(self) -> str:
-        count, first, last = len(self._times), self._times[0], self._times[-1]
-        kinds = f"{len(self._tables)} waveform{'s' if len(self._tables) > 1 else ''}"
-        fired = (
-            f"{count} firings from {first:.6g} s to {last:.6g} s"
-            if count > 1
-            else f"1 firing at {first:.6g} s"
-        )
-        return f"<PulseSequence: {kinds} of {self.quantity}, {fired}, overlap {self._overlap}>"
+    def _shapes(self) -> str:
+        return f"{len(self._tables)} waveform{'s' if len(self._tables) > 1 else ''} of {self.quantity}"
 
 
 def _checked(waveforms: Any) -> list[Waveform]:

@@ -52,18 +52,14 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     note = quantities(model).get(name) if model is not None else None
     texts = tuple(TEXTS) if not section else ()
     if model is None or (note is None and name not in file_options(model) and name not in texts):
-        close = get_close_matches(key, _names(document), 1)
+        tables = [name for name in SELECTORS if isinstance(document.get(name), Mapping)]
+        known = [*document, *(f"{table}.{entry}" for table in tables for entry in document[table])]
+        close = get_close_matches(key, known, 1)
         expected = repr(close[0]) if close else "one such as 'pack.stiffness'"
         raise InputError(f"the key {shown(key)} is not known, expected {expected}")
     if note is None or value is None:
         return key, value
     return key, _constant(key, _si_unit(note, document, section, name), value, status, source)
-
-
-def _names(document: Mapping[str, Any]) -> list[str]:
-    """Return the names of everything that a document says, such as "mass" and "pack.stiffness"."""
-    tables = [key for key in SELECTORS if isinstance(document.get(key), Mapping)]
-    return [*document, *(f"{section}.{field}" for section in tables for field in document[section])]
 
 
 def _si_unit(note: Quantity, document: Mapping[str, Any], section: str, name: str) -> str:

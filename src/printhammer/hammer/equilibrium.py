@@ -170,7 +170,8 @@ def release_current(hammer: HammerLike) -> float:
         The hammer has no backstop or magnet, or no current within the range of the magnet's law does it.
     """
     if hammer.backstop is None or hammer.magnet is None:
-        raise InputError(f"{_named(hammer)} has no release current: it has no {_missing(hammer)}")
+        missing = "magnet" if hammer.magnet is None else "backstop"
+        raise InputError(f"{_named(hammer)} has no release current: it has no {missing}")
     force = StaticForce(hammer)
     position = hammer.backstop.position
 
@@ -338,7 +339,3 @@ def _currents(hammer: HammerLike) -> tuple[float, float]:
 
 def _named(hammer: HammerLike) -> str:
     return f"the hammer {hammer.name!r}"
-
-
-def _missing(hammer: HammerLike) -> str:
-    return "magnet" if hammer.magnet is None else "backstop"

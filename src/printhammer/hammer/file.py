@@ -145,7 +145,11 @@ def file_options(model: type[BaseModel]) -> dict[str, Any]:
 
 def _build(document: Mapping[str, Any], folder: Path) -> Contents:
     _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS), "")
-    _check_format(document)
+    if "format" not in document:
+        raise InputError(f"format is missing, expected format = {FORMAT}")
+    given = document["format"]
+    if not isinstance(given, int) or isinstance(given, bool) or given != FORMAT:
+        raise InputError(f"format = {shown(given)}: expected {FORMAT}")
     texts: dict[str, str] = {}
     for name in TEXTS:
         texts[name] = document.get(name, "")
@@ -175,14 +179,6 @@ def _build(document: Mapping[str, Any], folder: Path) -> Contents:
     )
     _check_order(contents)
     return contents
-
-
-def _check_format(document: Mapping[str, Any]) -> None:
-    if "format" not in document:
-        raise InputError(f"format is missing, expected format = {FORMAT}")
-    given = document["format"]
-    if not isinstance(given, int) or isinstance(given, bool) or given != FORMAT:
-        raise InputError(f"format = {shown(given)}: expected {FORMAT}")
 
 
 def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:

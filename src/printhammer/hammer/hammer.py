@@ -392,15 +392,12 @@ def _physics(model: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in (*quantities(kind), *(set(file_options(kind)) - {"file"}), "quantity"):
         value = getattr(model, name, None)
-        if value is not None and value != _default(kind, name):
+        entry = kind.model_fields.get(name)
+        if value is not None and (entry is None or value != entry.default):
             found[name] = value.hex() if isinstance(value, float) else value
     for name, numbers in model.content().items():
         found[name] = _hex(numbers)
     return found
-
-
-def _default(kind: type[BaseModel], name: str) -> Any:
-    return kind.model_fields[name].default if name in kind.model_fields else None
 
 
 def _hex(numbers: Any) -> Any:

@@ -72,10 +72,10 @@ class StaticForce:
 
     def __init__(self, hammer: HammerLike) -> None:
         self.hammer = hammer
-        self._magnet, self._magnet_constants = _law(hammer, hammer.magnet, "magnet_force")
-        self._spring, self._spring_constants = _law(hammer, hammer.spring, "spring_force")
-        self._pack, self._pack_constants = _law(hammer, hammer.pack, "pack_loading")
-        self._backstop, self._backstop_constants = _law(hammer, hammer.backstop, "backstop_elastic")
+        self._magnet, self._magnet_constants = law_of(hammer, hammer.magnet, "magnet_force")
+        self._spring, self._spring_constants = law_of(hammer, hammer.spring, "spring_force")
+        self._pack, self._pack_constants = law_of(hammer, hammer.pack, "pack_loading")
+        self._backstop, self._backstop_constants = law_of(hammer, hammer.backstop, "backstop_elastic")
         self._position = hammer.backstop.position if hammer.backstop is not None else -math.inf
         self.front = hammer.pack.front if hammer.pack is not None else math.inf
         self.rigid = hammer.backstop is not None and bool(_flag(hammer.backstop, "RIGID"))
@@ -177,7 +177,9 @@ def derivative(function: Callable[[float], float], x: float, step: float) -> flo
     return best
 
 
-def _law(hammer: HammerLike, part: Part | None, name: str) -> tuple[Callable[..., float], tuple[float, ...]]:
+def law_of(
+    hammer: HammerLike, part: Part | None, name: str
+) -> tuple[Callable[..., float], tuple[float, ...]]:
     """Return a law function of a part and its packed constants."""
     standard: Callable[..., float] = getattr(absent, name)
     if part is None:

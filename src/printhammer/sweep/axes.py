@@ -120,14 +120,14 @@ def _resolved(
         if name.startswith("at.") and number.isascii() and number.isdigit():
             return "at", number, _FIRING
     if section == "waveforms":
-        one, _, constant = name.rpartition(".")
-        if (note := _constant_of(named.get(one), constant)) is not None:
+        own, _, constant = name.rpartition(".")
+        if (note := _constant_of(named.get(own), constant)) is not None:
             return "waveform", name, note
     elif section == "waveform" and own_waveform is not None:
         if (note := _constant_of(own_waveform, name)) is not None:
             return "waveform", name, note
-    elif (found := quantity_of(hammer, key)) is not None:
-        return "hammer", key, found
+    elif (note := quantity_of(hammer, key)) is not None:
+        return "hammer", key, note
     known = [*(f"drive.{name}" for name in DRIVE), "drive.at.0", *(f"state.{name}" for name in _STATE)]
     known += [f"waveforms.{name}.amplitude" for name in named]
     fired = own_waveform is None and not named
@@ -145,18 +145,16 @@ def _constant_of(waveform: object, name: str) -> Quantity | None:
     if not isinstance(waveform, Mapping) or not isinstance(shape, str) or shape not in kinds_of("waveform"):
         return None
     note = quantities(model_of("waveform", shape)).get(name)
-    return None if note is None else in_unit_of_drive(note, _own_unit(waveform.get(name), note))
-
-
-def _own_unit(given: object, note: Quantity) -> str:
-    """Return the unit of a constant of the drive's own waveform: what its first value is written in."""
+    if note is None:
+        return None
     for unit in note.also:
+        # What its value in the table is written in.
         try:
-            read_quantity(given, unit, "")
+            read_quantity(waveform.get(name), unit, "")
         except InputError:
             continue
-        return unit
-    return note.si
+        return in_unit_of_drive(note, unit)
+    return in_unit_of_drive(note, note.si)
 
 
 def _values(table: AxisTable, told: str, si: str, grid: bool, geometric: bool) -> list[float]:

@@ -23,6 +23,7 @@ from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
 from printhammer.support.outputs import write_file
+from printhammer.support.texts import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -334,13 +335,7 @@ def load_table(path: str | Path) -> CompensationTable:
     target = Path(path)
     if target.suffix.lower() not in (".csv", ".json"):
         raise InputError(f"{target}: expected a table whose name ends in .csv or .json")
-    try:
-        text = target.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{target}: the table is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{target}: the table cannot be read ({reason})") from None
+    text = read_text(target, "the table")
     try:
         return CompensationTable(**read_table(text, target.suffix.lower()))
     except InputError as error:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
+from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.identify.bench.sensor import Amount, Sensor
 
@@ -125,22 +126,12 @@ def _quantities(part: str, given: Any) -> Mapping[str, Any]:
 
 
 def _frequency(value: Any, name: str) -> float | None:
-    from printhammer.drive.input import read_positive
-
     if isinstance(value, str) and value.strip().lower() == NONE:
         return None
     return read_positive(value, "Hz", name)
 
 
-def _rate(value: Any, name: str) -> float:
-    from printhammer.drive.input import read_positive
-
-    return read_positive(value, "Hz", name)
-
-
 def _share(value: Any, name: str) -> float:
-    from printhammer.drive.input import read_number
-
     share = read_number(value, "1", name)
     if not (0.0 <= share <= 0.5 and math.isfinite(share)):
         raise InputError(f"{name} = {value!r}, expected a share from 0 to 50 %")
@@ -148,7 +139,7 @@ def _share(value: Any, name: str) -> float:
 
 
 _READ: Final[dict[str, Callable[[Any, str], float | None]]] = {
-    "sampling_rate": _rate,
+    "sampling_rate": lambda value, name: read_positive(value, "Hz", name),
     "bandwidth": _frequency,
     "outliers": _share,
 }

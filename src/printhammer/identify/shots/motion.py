@@ -88,8 +88,7 @@ def fit_motion(
     touched = any(shot.touching("backstop") for shot in shots)
     keys = _free_keys(hammer, free, shots, touched=touched)
     hammer = _plain(hammer, keys)
-    known = _known(hammer, earlier)
-    keys = (*keys, *(key for key in known if key not in keys))
+    keys = tuple(dict.fromkeys([*keys, *(key for fit in earlier for key in _usable(hammer, fit))]))
     pulses, notes = _pulses(hammer, shots)
     start, parameters, priors, own = _assembled(hammer, keys, pulses, earlier)
     shooting = Shooting(hammer, shots, own, parameters)
@@ -165,17 +164,8 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
     return hammer
 
 
-def _known(hammer: Hammer, earlier: Sequence[Fit]) -> list[str]:
-    """Return the constants of earlier fits that the hammer has."""
-    found: list[str] = []
-    for fit in earlier:
-        for key in _usable(hammer, fit):
-            if key not in found:
-                found.append(key)
-    return found
-
-
 def _usable(hammer: Hammer, fit: Fit) -> list[str]:
+    """Return the constants of an earlier fit that the hammer has."""
     return [key for key in fit.keys if key in hammer.constants and fit.constants[key].in_file]
 
 

@@ -89,7 +89,7 @@ def runs_p_value(values: FloatArray) -> float:
     return float(2.0 * norm.sf(abs(runs - mean) / math.sqrt(variance)))
 
 
-def together(solution: Solution, names: Sequence[str]) -> list[str]:
+def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
     """Say which parameters the data hardly tell apart; nothing where the condition number is small.
 
     A sentence has the parameters whose common change the data resist least; one with an empty name is of no
@@ -103,5 +103,5 @@ def together(solution: Solution, names: Sequence[str]) -> list[str]:
     if len(parts) < 2:
         return []
     listed = f"{', '.join(parts[:-1])} and {parts[-1]}"
-    together = f"{listed} go together (condition number {solution.condition_number:.3g})"
-    return [f"{together}: the data fix a combination of them better than each alone"]
+    tied = f"{listed} go together (condition number {solution.condition_number:.3g})"
+    return [f"{tied}: the data fix a combination of them better than each alone"]

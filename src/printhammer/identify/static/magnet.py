@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.least_squares import solve
-from printhammer.identify.static.assemble import Data, assemble, enough, positive
+from printhammer.identify.static.assemble import Data, assemble, enough
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.magnet_law import TotalLaw, start_of
 from printhammer.identify.static.spring import start_of as spring_start
@@ -68,7 +68,9 @@ def fit_magnet(
     if alone is not None and position is None:
         raise InputError(f"{alone.path}: the position of the backstop is missing, expected it with a spring")
     data = _data(table, alone)
-    x, current = data.abscissa, _current(table, alone)
+    x = data.abscissa
+    # NaN where there is no magnet.
+    current = np.concatenate([table.values["current"], np.full(0 if alone is None else len(alone), math.nan)])
     law = TotalLaw(x, current, position if alone is not None else None, zero)
     enough(data, law.parameters + _SPARE, "the constants of the magnet and their errors")
     levels = _check(table, alone, zero or 0.0, position)
@@ -83,20 +85,19 @@ def fit_magnet(
     solution = solve(law, data.values, start, robust=robust)
     _releases(table, law, solution.p, zero, position)
     p_value, why = judge(solution, law.richer(solution.p, by_current=levels != 2), x, data.series)
-    fit = assemble(
+    wide, strong = "more rows over a wider span of displacement", "more currents over a wider span"
+    remedies = {"magnet.Am": wide, "magnet.Bm": strong, "magnet.F0": wide, "spring.Bs": wide}
+    return assemble(
         data,
         law,
         solution,
         _names(alone is not None, zero is None),
         given=_given(position, zero, alone is not None),
+        remedies={**remedies, "spring.As": wide},
         indistinct=_indistinct(alone is not None, levels),
         rejected=why,
         p_value=p_value,
     )
-    wide, strong = "more rows over a wider span of displacement", "more currents over a wider span"
-    remedies = {"magnet.Am": wide, "magnet.Bm": strong, "magnet.F0": wide, "spring.Bs": wide}
-    positive(fit, table.path, {**remedies, "spring.As": wide})
-    return fit
 
 
 def _data(table: Table, alone: Table | None) -> Data:
@@ -120,12 +121,6 @@ def _data(table: Table, alone: Table | None) -> Data:
         names, files = (*names, "spring alone"), (table.path, alone.path)
     axes = (("displacement", "m"), ("force", "N"))
     return Data(files, "magnet", x, force, axes, series, names, lines)
-
-
-def _current(table: Table, alone: Table | None) -> FloatArray:
-    """Return the current of each row; NaN where there is no magnet."""
-    rest = np.full(0 if alone is None else len(alone), math.nan)
-    return np.concatenate([table.values["current"], rest])
 
 
 def _check(table: Table, alone: Table | None, zero: float, position: float | None) -> int:

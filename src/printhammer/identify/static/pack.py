@@ -17,7 +17,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.least_squares import solve
-from printhammer.identify.static.assemble import Data, assemble, enough, positive
+from printhammer.identify.static.assemble import Data, assemble, enough
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.pack_cycles import Cycles, check_loading, cycles_of
 from printhammer.identify.tables import read_table
@@ -130,18 +130,17 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
     p_value, why = (float("nan"), "") if exponents else _judge(law, data, solution)
     free = [("exponent of loading", "1", False), ("exponent of unloading", "1", False)] if exponents else []
     turns = [("", "", False)] * len(law.turns)
-    fit = assemble(
+    return assemble(
         data,
         law,
         solution,
         [("pack.stiffness", "N", True), *turns, *free],
         given={"pack.thickness": f"{thickness!r} m"},
+        remedies={"pack.stiffness": "more rows at larger indentations"},
         rejected=why,
         p_value=p_value,
         notes=_notes(law, table, solution),
     )
-    positive(fit, table.path, {"pack.stiffness": "more rows at larger indentations"})
-    return fit
 
 
 def _start(law: PackLaw, table: Table) -> FloatArray:

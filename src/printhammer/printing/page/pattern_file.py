@@ -32,6 +32,7 @@ from printhammer.errors import InputError
 from printhammer.printing.page import matrix_font
 from printhammer.support.constants import shown
 from printhammer.support.outputs import write_file
+from printhammer.support.texts import read_text
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -69,14 +70,7 @@ def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, npt.N
         return source.stem, _bitmap(source, matrix_font.WIRES if wires is None else wires)
     if suffix != ".toml":
         raise InputError(f"{source}: expected a name that ends in one of {', '.join(SUFFIXES)}")
-    try:
-        text = source.read_text("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{source}: the pattern file is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{source}: the pattern file cannot be read ({reason})") from None
-    name, dots = pattern_from_toml(text, str(source))
+    name, dots = pattern_from_toml(read_text(source, "the pattern file"), str(source))
     if wires is not None and wires != dots.shape[1]:
         raise InputError(f"{source}: wires = {dots.shape[1]}, expected {wires}")
     return name, dots
