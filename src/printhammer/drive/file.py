@@ -337,8 +337,8 @@ def _switched(data: dict[str, Any], where: str) -> Switched:
     try:
         return Switched.model_validate(fields)
     except ValidationError as error:
-        told = sentence(error, Switched, f"{where}.")
-        raise InputError(told if told.startswith(where) else f"{where}.{told}") from None
+        fault = sentence(error, Switched, f"{where}.")
+        raise InputError(fault if fault.startswith(where) else f"{where}.{fault}") from None
 
 
 def _samples(data: dict[str, Any], where: str) -> Waveform:

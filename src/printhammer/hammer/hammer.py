@@ -234,17 +234,17 @@ class Hammer:
         Names, notes, units, sources, statuses, comments and file names do not enter; an option or constant at
         its default counts as left out.
         """
-        found: dict[str, Any] = {"mass": self.mass.hex()}
+        content: dict[str, Any] = {"mass": self.mass.hex()}
         if self.platen is not None:
-            found["platen"] = self.platen.hex()
+            content["platen"] = self.platen.hex()
         if self.coil_resistance is not None:
-            found["coil.resistance"] = self.coil_resistance.hex()
+            content["coil.resistance"] = self.coil_resistance.hex()
         models: dict[str, tuple[str, Any]] = {role: (part.law, part) for role, part in self.parts.items()}
         if self.waveform is not None:
             models["waveform"] = (self.waveform.shape, self.waveform)
         for section, (kind, model) in models.items():
-            found[section] = {"": kind, **_physics(model)}
-        text = json.dumps(found, sort_keys=True, separators=(",", ":"))
+            content[section] = {"": kind, **_physics(model)}
+        text = json.dumps(content, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
     def replace(
@@ -313,17 +313,17 @@ class Hammer:
 
     def _tables(self, target: Path) -> dict[str, bytes]:
         """Return the files named in the hammer file that are missing beside `target`."""
-        found: dict[str, bytes] = {}
+        missing: dict[str, bytes] = {}
         for model in (self.magnet, self.waveform):
             name = getattr(model, "file", None)
             if not name or Path(name).is_absolute():
                 continue
             data, there = (self._folder / name).read_bytes(), target.parent / name
             if not there.exists():
-                found[name] = data
+                missing[name] = data
             elif there.read_bytes() != data:
                 raise InputError(f"{there}: the file is another table than that of {self.name}")
-        return found
+        return missing
 
     def check(self) -> None:
         """Refuse a hammer that does not rest at its backstop.
@@ -357,14 +357,14 @@ class Hammer:
         from printhammer.units import from_si
 
         self.check()
-        told = []
+        sentences = []
         for ends in positive_intervals(self):
             low, high = (from_si(end, "m", "um") for end in ends)
             where = f"from {low:.4g} to {high:.4g} um"
-            told.append(
+            sentences.append(
                 f"the net force at zero current is positive {where}: the armature may never return from there"
             )
-        return told
+        return sentences
 
     @staticmethod
     def schema() -> dict[str, Any]:
@@ -389,15 +389,15 @@ class Hammer:
 def _physics(model: Any) -> dict[str, Any]:
     """Return what of a part or waveform enters the fingerprint."""
     kind: type[BaseModel] = type(model)
-    found: dict[str, Any] = {}
+    content: dict[str, Any] = {}
     for name in (*quantities(kind), *(set(file_options(kind)) - {"file"}), "quantity"):
         value = getattr(model, name, None)
         entry = kind.model_fields.get(name)
         if value is not None and (entry is None or value != entry.default):
-            found[name] = value.hex() if isinstance(value, float) else value
+            content[name] = value.hex() if isinstance(value, float) else value
     for name, numbers in model.content().items():
-        found[name] = _hex(numbers)
-    return found
+        content[name] = _hex(numbers)
+    return content
 
 
 def _hex(numbers: Any) -> Any:

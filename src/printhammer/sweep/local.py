@@ -27,12 +27,12 @@ def run_local(
     plan: Plan,
     todo: Iterable[Index],
     write: Callable[[Index, Results], None],
-    told: Callable[[float], None],
+    tell: Callable[[float], None],
     threads: int | None = None,
 ) -> None:
     """Do blocks of work in threads, by default as many as there are cores, and write each when it is done.
 
-    `write` takes the place of a block in the chunk grid and its results, in this thread; `told` is called now
+    `write` takes the place of a block in the chunk grid and its results, in this thread; `tell` is called now
     and then with the number of members of blocks under way that are done, possibly not whole.
 
     Raises
@@ -77,7 +77,7 @@ def run_local(
                     index = under_way.pop(future)
                     write(index, future.result())
                     shares.pop(index, None)
-                told(sum(list(shares.values())))
+                tell(sum(list(shares.values())))
         finally:
             stop.set()
             for future in under_way:

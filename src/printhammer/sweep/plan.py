@@ -102,24 +102,24 @@ class Plan:
         return Layout(self.blocks.chunks, (*results, *self._coordinates()), attrs, identity(self.spec))
 
     def _coordinates(self) -> list[Variable]:
-        found = []
+        coordinates = []
         for i, axis in enumerate(self.spec.axes):
             attrs = {"long_name": axis.note.meaning, "units": axis.note.si, "key": axis.key}
             dims = (axis.name,) if self.spec.grid else self.dims
             values = axis.values if self.spec.grid else self._drawn[:, i]
             dtype = "int64" if axis.counts else "float64"
-            found.append(_coordinate(axis.name, dims, values.astype(dtype), attrs))
+            coordinates.append(_coordinate(axis.name, dims, values.astype(dtype), attrs))
         if not self.spec.grid:
             attrs = {"long_name": "number of the member"}
-            found.append(_coordinate(MEMBER, (MEMBER,), np.arange(self.members), attrs))
+            coordinates.append(_coordinate(MEMBER, (MEMBER,), np.arange(self.members), attrs))
         outputs = self.spec.outputs
         if any(output.dim == FIRING for output in outputs.arrays):
             attrs = {"long_name": "number of the firing"}
-            found.append(_coordinate(FIRING, (FIRING,), np.arange(outputs.firings), attrs))
+            coordinates.append(_coordinate(FIRING, (FIRING,), np.arange(outputs.firings), attrs))
         if outputs.times.size:
             attrs = {"long_name": "time", "units": "s"}
-            found.append(_coordinate(TIME, (TIME,), outputs.times, attrs))
-        return found
+            coordinates.append(_coordinate(TIME, (TIME,), outputs.times, attrs))
+        return coordinates
 
     def table(self) -> list[tuple[Output, tuple[int, ...], int]]:
         """List the arrays with their shapes and sizes in bytes, before they are compressed."""

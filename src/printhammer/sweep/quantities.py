@@ -86,10 +86,10 @@ def read_quantities(given: Any, si: str, where: str) -> list[float]:
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
         values = [{"value": value, "unit": unit} for value in column] if isinstance(column, list) else ()
-    found = [read_quantity(value, si, f"{where}[{i}]") for i, value in enumerate(values)]
-    if not found:
+    numbers = [read_quantity(value, si, f"{where}[{i}]") for i, value in enumerate(values)]
+    if not numbers:
         raise InputError(f"{where} = {shown(given)}: expected a list of quantities, at least one")
-    return found
+    return numbers
 
 
 def _columns(table: Mapping[str, Any], names: tuple[str, str]) -> tuple[Any, str]:

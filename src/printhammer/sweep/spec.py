@@ -67,7 +67,7 @@ class Spec:
     def fingerprint(self) -> str:
         """Hexadecimal digest of what is computed and how it is divided; layout and comments do not enter."""
         base = self.base
-        found = {
+        content = {
             "hammer": base.hammer.fingerprint,
             "drive": _plain(base.drive),
             "waveform": None if base.waveform is None else base.waveform.segments().tobytes().hex(),
@@ -80,7 +80,7 @@ class Spec:
             "outputs": [output.name for output in self.outputs.arrays],
             "times": self.outputs.times.tobytes().hex(),
         }
-        return sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
+        return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
@@ -107,8 +107,8 @@ def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
         raise InputError(f"{where}: expected TOML ({' '.join(str(error).split())})") from None
 
 
-def _spec(found: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
-    table = read_tables(found)
+def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
+    table = read_tables(content)
     grid = table.design == "grid"
     for name, value in (("members", table.members), ("seed", table.seed)):
         if grid != (value is None):

@@ -99,8 +99,12 @@ def read_tables(document: dict[str, Any]) -> SpecTable:
 
 def schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of specs."""
-    found = SpecTable.model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found, "title": "printhammer sweep"}
+    content = SpecTable.model_json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **content,
+        "title": "printhammer sweep",
+    }
 
 
 def _sentence(error: ValidationError) -> str:
@@ -126,18 +130,18 @@ def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:
         "outputs": OutputsTable,
         "displacement": TimesTable,
     }
-    found: type[BaseModel] = table
+    owner: type[BaseModel] = table
     for place, step in enumerate(steps):
         if isinstance(step, int):
             key += f"[{step}]"
-        elif place and step not in found.model_fields and step in _CHOICES:
+        elif place and step not in owner.model_fields and step in _CHOICES:
             # Which of several types a value was tried for is no part of the key.
             break
         else:
             key += f".{step}" if key else step
             if place < len(steps) - 1:
-                found = inner.get(step, found)
-    return key, found
+                owner = inner.get(step, owner)
+    return key, owner
 
 
 _CHOICES: Final = ("str", "dict[str,any]", "list[str]", "literal['all']", "int", "float")

@@ -72,7 +72,7 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
         pairs = []
     if not pairs or any(len(pair) != 2 for pair in pairs):
         raise InputError(f"parts = {parts!r} is expected to be pairs of an offset and a waveform")
-    found: list[tuple[float, Waveform]] = []
+    checked: list[tuple[float, Waveform]] = []
     for number, (given, waveform) in enumerate(pairs):
         if not isinstance(waveform, Waveform):
             raise InputError(f"parts[{number}]: {waveform!r} is expected to be a waveform")
@@ -83,11 +83,11 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
         if not math.isfinite(waveform.support):
             raise InputError(f"parts[{number}] is a {waveform.shape}, expected a waveform that ends")
         offset = _offset(given, number)
-        if not (_over(*found[-1], offset) if found else offset >= 0.0):
-            sooner = f"parts[{number - 1}] is over" if found else "the firing"
+        if not (_over(*checked[-1], offset) if checked else offset >= 0.0):
+            sooner = f"parts[{number - 1}] is over" if checked else "the firing"
             raise InputError(f"parts[{number}] begins at {offset:.9g} s, expected a time not before {sooner}")
-        found.append((offset, waveform))
-    return tuple(found)
+        checked.append((offset, waveform))
+    return tuple(checked)
 
 
 def _over(begun: float, waveform: Waveform, time: float) -> bool:

@@ -103,9 +103,9 @@ def switched_table(
         current = level + (current - level) * math.exp(-(start - now) / edge)
         rows.append((start, EXPONENTIAL, following, current - following, 1.0 / edge, 0.0))
         now, level = start, following
-    found = table(rows, now + DECAY_TIMES * edge)
-    found.setflags(write=False)
-    return found
+    segments = table(rows, now + DECAY_TIMES * edge)
+    segments.setflags(write=False)
+    return segments
 
 
 def _has_text(entries: object) -> bool:

@@ -217,10 +217,10 @@ def motion(
     if not shot.ok:
         raise InputError(f"{hammer.path}: the shot did not reach its end: {shot.message}")
     tau = time_constant(sensor.bandwidth)
-    seen = lowpass_motion(shot.t, shot.x[:, np.newaxis], shot.v[:, np.newaxis], tau)[::each, 0]
+    shown = lowpass_motion(shot.t, shot.x[:, np.newaxis], shot.v[:, np.newaxis], tau)[::each, 0]
     after = t >= 0.0
-    x = np.full(len(t), seen[0])
-    x[after] = seen
+    x = np.full(len(t), shown[0])
+    x[after] = shown
     true = {"time": t, "displacement": x}
     if hammer.waveform.unit == "A":
         current = hammer.waveform.value(t)
@@ -240,12 +240,12 @@ BENCHES: Final[dict[str, Callable[..., Bench]]] = {
 
 def _array(values: npt.ArrayLike, name: str) -> FloatArray:
     try:
-        found = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        numbers = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError):
-        found = np.empty(0)
-    if found.ndim != 1 or not found.size or not np.isfinite(found).all():
+        numbers = np.empty(0)
+    if numbers.ndim != 1 or not numbers.size or not np.isfinite(numbers).all():
         raise InputError(f"{name} are expected to be a list of finite numbers in SI")
-    return found
+    return numbers
 
 
 def _places(hammer: Hammer, displacements: npt.ArrayLike | None) -> FloatArray:

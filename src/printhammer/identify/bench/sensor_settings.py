@@ -61,14 +61,14 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings that are about what a sensor has: its quantities, and records if it makes them."""
-    found = dict(settings)
+    kept = dict(settings)
     for part in PARTS:
-        if part in found:
-            given = _quantities(part, found[part])
-            found[part] = {name: value for name, value in given.items() if name in sensor.channels}
+        if part in kept:
+            given = _quantities(part, kept[part])
+            kept[part] = {name: value for name, value in given.items() if name in sensor.channels}
     if sensor.sampling_rate is None:
-        found = {name: value for name, value in found.items() if name not in ("sampling_rate", "bandwidth")}
-    return found
+        kept = {name: value for name, value in kept.items() if name not in ("sampling_rate", "bandwidth")}
+    return kept
 
 
 def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> dict[str, str]:
@@ -81,21 +81,21 @@ def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> d
     InputError
         A quantity is not known, given twice, or none has the dimension.
     """
-    found: dict[str, str] = {}
+    amounts: dict[str, str] = {}
     for text in texts:
         name, equals, amount = text.partition("=")
         name = " ".join(name.lower().split())
         names = [name] if equals else _of_dimension(text, part, quantities)
-        for one in names:
-            if one not in quantities:
+        for quantity in names:
+            if quantity not in quantities:
                 known = ", ".join(quantities)
                 raise InputError(
-                    f"{part} {text!r}: the quantity {one!r} is not known, expected one of {known}"
+                    f"{part} {text!r}: the quantity {quantity!r} is not known, expected one of {known}"
                 )
-            if one in found:
-                raise InputError(f"{part} {text!r}: {one} is given twice, expected it once")
-            found[one] = amount.strip() if equals else text.strip()
-    return found
+            if quantity in amounts:
+                raise InputError(f"{part} {text!r}: {quantity} is given twice, expected it once")
+            amounts[quantity] = amount.strip() if equals else text.strip()
+    return amounts
 
 
 def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[str]:

@@ -249,7 +249,7 @@ class GaussNewton:
         best = solution.values[which]
         held = np.zeros(len(solution.values), bool)
         held[which] = True
-        found = {best: 0.0}
+        increases = {best: 0.0}
         for side in (-1.0, 1.0):
             values, states = solution.values, solution.states
             for number in range(1, _POINTS // 2 + 1):
@@ -262,10 +262,10 @@ class GaussNewton:
                     other = self.solve(start, states, held=held, noise=solution)
                 except InputError:
                     break
-                found[place] = max(other.cost - solution.cost, 0.0)
+                increases[place] = max(other.cost - solution.cost, 0.0)
                 values, states = other.values, other.states
-        places = np.array(sorted(found))
-        increase = np.array([found[place] for place in places])
+        places = np.array(sorted(increases))
+        increase = np.array([increases[place] for place in places])
         return Profile(places, increase, _interval(places, increase, best, student(degrees_of_freedom)))
 
 

@@ -133,14 +133,14 @@ class Shooting:
         """Return hammer, rest state and drives at the values, and with each parameter changed a little."""
         parameters = self.parameters
         count = len(parameters.keys)
-        found = []
+        variants = []
         base, drives = self.hammer_at(values), []
         for shot, pulse in enumerate(self.pulses):
             own = values[parameters.of_shot(shot)]
             drives.append(_drive(base, pulse, own))
-        found.append((base, rest_state(base), drives))
+        variants.append((base, rest_state(base), drives))
         if not derivatives:
-            return found
+            return variants
         for number in range(parameters.count):
             moved = values.copy()
             moved[number] += _STEP * parameters.scales[number]
@@ -150,13 +150,13 @@ class Shooting:
                     _drive(other, None, moved) if pulse is None else drive
                     for pulse, drive in zip(self.pulses, drives, strict=True)
                 ]
-                found.append((other, rest_state(other), fired))
+                variants.append((other, rest_state(other), fired))
             else:
                 shot = parameters.owners[number - count]
                 fired = list(drives)
                 fired[shot] = _drive(base, self.pulses[shot], moved[parameters.of_shot(shot)])
-                found.append((base, found[0][1], fired))
-        return found
+                variants.append((base, variants[0][1], fired))
+        return variants
 
     def chains(
         self, values: FloatArray, states: Sequence[FloatArray], *, derivatives: bool

@@ -149,29 +149,29 @@ def find_touches(
         levels.append(("backstop", hammer.position - smooth))
     if hammer.front is not None:
         levels.append(("pack", smooth - hammer.front))
-    found = [touch for surface, depth in levels for touch in _visits(surface, depth, clear)]
-    return sorted(found, key=lambda touch: touch.first), smooth, clear
+    touches = [touch for surface, depth in levels for touch in _visits(surface, depth, clear)]
+    return sorted(touches, key=lambda touch: touch.first), smooth, clear
 
 
 def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
     """Return the runs of samples behind a surface; crossings within the noise do not end them."""
-    found: list[Touch] = []
+    touches: list[Touch] = []
     inside, outside = np.flatnonzero(depth > clear), np.flatnonzero(depth < -clear)
     row = 0
     while True:
         after = inside[np.searchsorted(inside, row) :]
         if len(after) == 0:
-            return found
+            return touches
         first = int(after[0])
         while first > 0 and depth[first - 1] > 0.0:
             first -= 1
         away = outside[np.searchsorted(outside, after[0]) :]
         if len(away) == 0:
-            return [*found, Touch(surface, first, len(depth) - 1)]
+            return [*touches, Touch(surface, first, len(depth) - 1)]
         row = last = int(away[0])
         while depth[last] <= 0.0:
             last -= 1
-        found.append(Touch(surface, first, last))
+        touches.append(Touch(surface, first, last))
 
 
 def _check(
@@ -213,10 +213,10 @@ def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> 
     weights = np.ones(len(s))
     for _ in range(4):
         inverse = np.linalg.pinv(powers.T @ (powers * weights[:, np.newaxis]))
-        found = inverse @ (powers.T @ (weights * x[rows]))
-        left = np.abs(x[rows] - powers @ found)
+        parabola = inverse @ (powers.T @ (weights * x[rows]))
+        left = np.abs(x[rows] - powers @ parabola)
         weights = 1.0 / np.maximum(1.0, left / max(3.0 * float(np.median(left)), noise, 1e-15))
-    return float(found[0]), float(found[1] / scale)
+    return float(parabola[0]), float(parabola[1] / scale)
 
 
 def _bandwidth(table: Table) -> float | None:

@@ -175,10 +175,10 @@ def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
     order = np.argsort(speed[used], kind="stable")
     middle = len(order) // 2
     slow, fast = (float(np.median(share[half])) for half in (order[:middle], order[middle:]))
-    told = f"the restitution is {slow:.3g} at the slower impacts and {fast:.3g} at the faster ones"
+    trend = f"the restitution is {slow:.3g} at the slower impacts and {fast:.3g} at the faster ones"
     if flat_misses < law_misses:
-        return f"{told}, and a constant restitution of {constant:.3g} describes the rebounds better"
-    return f"{told}, which no value of l/k gives; slow rebounds would have to lose nearly nothing"
+        return f"{trend}, and a constant restitution of {constant:.3g} describes the rebounds better"
+    return f"{trend}, which no value of l/k gives; slow rebounds would have to lose nearly nothing"
 
 
 def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
@@ -200,13 +200,13 @@ def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
     )
     # What is known of k and of l/k has nothing in common; l follows from both.
     slopes = {constant.key: (0.0, 1.0), damping.key: (k.value, ratio.value)}
-    found = {RATIO: ratio, constant.key: constant, damping.key: damping}
+    constants = {RATIO: ratio, constant.key: constant, damping.key: damping}
     given = dict(fit.given)
     if not k.how:
-        del slopes[constant.key], found[constant.key]
+        del slopes[constant.key], constants[constant.key]
         given[constant.key] = f"{k.value!r} N/m^1.5"
     rows = np.array(list(slopes.values())) * (ratio.standard_error, k.standard_error)
-    return replace(fit, constants=found, keys=tuple(slopes), covariance=rows @ rows.T, given=given)
+    return replace(fit, constants=constants, keys=tuple(slopes), covariance=rows @ rows.T, given=given)
 
 
 def _constant(k: Stiffness) -> FittedConstant:

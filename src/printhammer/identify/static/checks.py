@@ -44,10 +44,10 @@ def judge(
     """
     if solution.exact or solution.degrees_of_freedom < 3:
         return math.nan, ""
-    found = {why: _need(solution, term) for why, term in terms.items()}
+    p_values = {why: _need(solution, term) for why, term in terms.items()}
     order = np.lexsort((abscissa, series))
-    found[_RUNS] = runs_p_value(solution.residuals[order][solution.used[order]])
-    known = {why: p for why, p in found.items() if not math.isnan(p)}
+    p_values[_RUNS] = runs_p_value(solution.residuals[order][solution.used[order]])
+    known = {why: p for why, p in p_values.items() if not math.isnan(p)}
     if not known:
         return math.nan, ""
     why = min(known, key=lambda name: known[name])

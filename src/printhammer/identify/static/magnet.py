@@ -181,26 +181,26 @@ def _given(position: float | None, zero: float | None, with_spring: bool) -> dic
 
 
 def _indistinct(with_spring: bool, levels: int) -> list[str]:
-    told = []
+    sentences = []
     if not with_spring:
-        told.append(
+        sentences.append(
             "F0, Bs and As cannot be told apart by forces of magnet and spring together: only"
             f" {_COMBINED} and {_SLOPE} are found; a table of the spring alone would tell them apart"
         )
     if levels == 2:
-        told.append(
+        sentences.append(
             "two currents do not tell a current that weakens the pull from one beyond Am / Bm, where the pull"
             " grows again; it is taken as weakening"
         )
-    return told
+    return sentences
 
 
 def clusters(values: FloatArray) -> int:
     """Count the groups into which values fall, with gaps of a twentieth of their span; 0 for a continuum."""
     if float(np.ptp(values)) <= 1e-3 * float(np.abs(values).max()):
         return 1
-    found = 1 + int(group_of(values).max())
-    return found if found > 1 else 0
+    groups = 1 + int(group_of(values).max())
+    return groups if groups > 1 else 0
 
 
 def group_of(values: FloatArray) -> npt.NDArray[np.int64]:

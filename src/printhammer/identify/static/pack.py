@@ -170,29 +170,29 @@ def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
     p_value, why = judge(solution, terms, data.abscissa, data.series)
     if why not in terms:
         return p_value, why
-    told = "its force does not grow with the power 2.7 of the indentation"
+    flaw = "its force does not grow with the power 2.7 of the indentation"
     if out:
         r = data.abscissa / law.thickness
         free = PackLaw(r, law.cycles, True, law.thickness)
         start = np.array([*solution.p, LOADING, UNLOADING])
         low, high = free.exponents(solve(free, data.values, start).p)
-        told = f"exponents of {low:.3g} and {high:.3g} describe it better than {LOADING:g} and {UNLOADING:g}"
-    return p_value, told
+        flaw = f"exponents of {low:.3g} and {high:.3g} describe it better than {LOADING:g} and {UNLOADING:g}"
+    return p_value, flaw
 
 
 def _notes(law: PackLaw, table: Table, solution: Solution) -> list[str]:
     """Say what is missing, and where the branches meet elsewhere than at the largest indentation."""
     if not len(law.turns):
         return ["without rows of unloading the hysteresis of the pack is taken from equation (5), not tested"]
-    told = []
+    sentences = []
     depth = table.values["indentation"]
     for k, turn in enumerate(law.turns):
         largest = float(depth[law.cycles.cycle == turn].max())
         meeting = float(np.exp(solution.p[1 + k])) * law.thickness
         error = solution.standard_errors[1 + k] * meeting
         if abs(meeting - largest) > max(_MEETS * largest, 5.0 * error):
-            told.append(
+            sentences.append(
                 f"cycle {turn + 1}: loading and unloading meet at an indentation of {meeting:.4g} m, while"
                 f" the largest measured is {largest:.4g} m"
             )
-    return told
+    return sentences

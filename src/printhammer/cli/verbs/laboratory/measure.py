@@ -105,7 +105,7 @@ def _places(
     else:
         if out.exists() and not out.is_dir():
             raise InputError(f"--out {out}: expected a folder, this is a file")
-        paths = {one: out / f"{one}.csv" for one in KINDS}
+        paths = {each: out / f"{each}.csv" for each in KINDS}
         if out.is_dir():
             check_outputs(paths.values(), inputs)
     check_new(paths.values(), force=force)
