@@ -112,13 +112,7 @@ class PulseSequence(Drive):
         return largest_sum(np.unique(np.concatenate([some.ravel() for some in edges])), self.value)
 
     def scaled(self, factor: float) -> Self:
-        """Return the same drive with every value multiplied by a factor.
-
-        Raises
-        ------
-        InputError
-            The factor is not a finite number.
-        """
+        """Return the same drive with every value multiplied by a factor; errors as for `Drive.scaled`."""
         number = read_number(factor, "1", "factor")
         scaled = {id(waveform): waveform.scaled(number) for waveform in self._waveforms}
         result = copy(self)

@@ -16,25 +16,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.hammer.static_force import FAR, HammerLike, StaticForce
+from printhammer.hammer.static_force import HammerLike, StaticForce
 from printhammer.support.roots import Root, bisect, roots
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.support.arrays import FloatArray
-
-__all__ = [
-    "FAR",
-    "Equilibrium",
-    "EquilibriumPicture",
-    "equilibria",
-    "equilibrium_picture",
-    "holding_margin",
-    "positive_intervals",
-    "release_current",
-    "rest_state",
-]
 
 _NEAREST: Final = 1e-18
 _LARGEST_CURRENT: Final = 1e6

@@ -26,13 +26,19 @@ CONFIDENCE: Final = 0.95
 LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
 """Laws whose constants are fitted, by role."""
 
-_REPLACED: Final = {
-    # A stiffness found takes the place of the bodies, a damping that of the rebound.
-    "backstop.stiffness": (
-        *("radius1", "radius2", "youngs_modulus1", "youngs_modulus2", "poisson_ratio1", "poisson_ratio2"),
-    ),
-    "backstop.damping": ("restitution", "restitution_speed"),
+_BODIES: Final = (
+    "radius1",
+    "radius2",
+    "youngs_modulus1",
+    "youngs_modulus2",
+    "poisson_ratio1",
+    "poisson_ratio2",
+)
+REPLACED: Final = {
+    "backstop.stiffness": [f"backstop.{name}" for name in _BODIES],
+    "backstop.damping": ["backstop.restitution", "backstop.restitution_speed"],
 }
+"""Constants from which another one follows, and which go where that one is given itself, by its key."""
 
 
 @dataclass(frozen=True)
@@ -269,7 +275,7 @@ class Fit(Result):
                 raise InputError(f"{hammer.path}: the {section} {law}, expected the law {LAWS[section]!r}")
         for key, text in self.given.items():
             _agrees(hammer, key, text)
-        gone = [f"{key.rpartition('.')[0]}.{name}" for key in constants for name in _REPLACED.get(key, ())]
+        gone = [other for key in constants for other in REPLACED.get(key, ())]
         taken = {key: None for key in gone if key in hammer.constants}
         return hammer.replace({**taken, **constants})
 

@@ -24,12 +24,7 @@ ROLES: tuple[str, ...] = ("magnet", "spring", "pack", "backstop")
 class Part(BaseModel):
     """A replaceable part of a hammer: constants in SI, and the module that holds its law.
 
-    Attributes
-    ----------
-    role : str
-        "magnet", "spring", "pack" or "backstop".
-    law : str
-        Name of the law in hammer files.
+    Its `role` is "magnet", "spring", "pack" or "backstop", `law` the name of the law in hammer files.
 
     Raises
     ------

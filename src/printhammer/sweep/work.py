@@ -11,7 +11,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.run.ensemble import Ensemble
 from printhammer.support.threads import in_threads
-from printhammer.sweep.members import Maker, check_tables
+from printhammer.sweep.members import Maker
 from printhammer.sweep.outputs import (
     DISPLACEMENT,
     DOTS,
@@ -57,7 +57,8 @@ def run_chunk(
     InputError
         The tables that the hammer names have changed.
     """
-    check_tables(base)
+    if base.hammer.replace({}).fingerprint != base.hammer.fingerprint:
+        raise InputError(f"{base.hammer.path}: a table that it names has changed since the sweep began")
     results = outputs.empty(len(rows))
     results["status"][:] = NO_HAMMER
     results["reached"][:] = np.nan

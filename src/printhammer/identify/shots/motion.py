@@ -12,7 +12,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.lowpass import time_constant
-from printhammer.identify.result import Fit, FittedConstant
+from printhammer.identify.result import REPLACED, Fit, FittedConstant
 from printhammer.identify.shots.approach import Prior
 from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
 from printhammer.identify.shots.identifiable import condition_number, refuse_degenerate, tied_constants, weak
@@ -144,17 +144,10 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
     """Return the hammer with stiffness and damping of its backstop given as such where they are fitted."""
     backstop = hammer.backstop
     changes: dict[str, float | None] = {}
-    for key, value, others in (
-        (
-            "backstop.stiffness",
-            getattr(backstop, "k", None),
-            ("radius1", "radius2", "youngs_modulus1", "youngs_modulus2", "poisson_ratio1", "poisson_ratio2"),
-        ),
-        (_DAMPING, getattr(backstop, "l", None), ("restitution", "restitution_speed")),
-    ):
+    for key, name in (("backstop.stiffness", "k"), (_DAMPING, "l")):
         if key in keys and key not in hammer.constants:
-            changes |= {f"backstop.{name}": None for name in others if f"backstop.{name}" in hammer.constants}
-            changes[key] = value
+            changes |= {other: None for other in REPLACED[key] if other in hammer.constants}
+            changes[key] = getattr(backstop, name, None)
     if _DAMPING in keys and getattr(backstop, "l", None) == 0.0:
         changes[_DAMPING] = _FIRST_GUESS * float(getattr(backstop, "k", 0.0))
     hammer = hammer.replace(changes) if changes else hammer
