@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import import_module
@@ -269,17 +270,13 @@ _WANTED: Final = {
 
 def si_unit_of(note: Quantity, unit: str) -> str:
     """Return the SI unit that goes with a unit, of a constant that may have several dimensions."""
-    return next((other for other in note.also if _fits(unit, other)), note.si)
-
-
-def _fits(unit: str, si_unit: str) -> bool:
     from printhammer.units import to_si
 
-    try:
-        to_si(1.0, unit, si_unit)
-    except InputError:
-        return False
-    return True
+    for other in note.also:
+        with suppress(InputError):
+            to_si(1.0, unit, other)
+            return other
+    return note.si
 
 
 def _check_order(contents: Contents) -> None:

@@ -80,7 +80,9 @@ class StaticForce:
         self.front = hammer.pack.front if hammer.pack is not None else math.inf
         self.rigid = hammer.backstop is not None and bool(_flag(hammer.backstop, "RIGID"))
         self.memory = hammer.pack is not None and bool(_flag(hammer.pack, "MEMORY"))
-        self.limits = self._limits()
+        low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
+        self._domain = low, high
+        self.limits = (max(low, self._position) if self.rigid else low), high
         self.low, self.high = self._reach()
         self.end = self.high
         if hammer.platen is None and hammer.pack is not None:
@@ -118,8 +120,7 @@ class StaticForce:
         Each part is differentiated by itself, within its contact or range; the backstop with respect to
         sqrt(depth), in which its laws are smooth.
         """
-        low, high = self.hammer.magnet.domain if self.hammer.magnet is not None else (-math.inf, math.inf)
-        room = min(x - low, high - x)
+        room = min(x - self._domain[0], self._domain[1] - x)
         step = 0.05 * room if math.isfinite(room) else 1e-3
         total = derivative(self.spring, x, 1e-3)
         if self.hammer.magnet is not None:
@@ -136,11 +137,6 @@ class StaticForce:
         """Places about which forces vary on short scales, m."""
         places = [self.low, self.high, self._position, self.front, self.hammer.origin, 0.0]
         return sorted({place for place in places if self.low <= place <= self.high})
-
-    def _limits(self) -> tuple[float, float]:
-        magnet = self.hammer.magnet
-        low, high = magnet.domain if magnet is not None else (-math.inf, math.inf)
-        return (max(low, self._position) if self.rigid else low), high
 
     def _reach(self) -> tuple[float, float]:
         hammer = self.hammer

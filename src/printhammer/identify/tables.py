@@ -90,7 +90,9 @@ def read_table(
         raise InputError(f"{source}: there is no such file, expected a table of measurements")
     sheet = read_sheet(source, "the table")
     lines = sheet.rows
-    wanted = _wanted(columns, optional, text)
+    must = ",".join(f"{name} [{si}]" for name, si in columns.items())
+    may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
+    wanted = f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")
     if not lines:
         raise InputError(f"{source}: the file has no heading, expected {wanted}")
     names, units = _heading(source, lines[0], {**columns, **optional}, text, wanted)
@@ -172,12 +174,3 @@ def _word(cell: str, allowed: Sequence[str], where: str) -> str:
     if word not in allowed:
         raise InputError(f"{where}: {cell.strip()!r}, expected {' or '.join(allowed)}")
     return word
-
-
-def _wanted(
-    columns: Mapping[str, str], optional: Mapping[str, str], text: Mapping[str, tuple[str, ...]]
-) -> str:
-    """Return the phrase that says which columns are expected."""
-    must = ",".join(f"{name} [{si}]" for name, si in columns.items())
-    may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
-    return f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from types import MappingProxyType
@@ -149,11 +150,9 @@ def _constant_of(waveform: object, name: str) -> Quantity | None:
         return None
     for unit in note.also:
         # What its value in the table is written in.
-        try:
+        with suppress(InputError):
             read_quantity(waveform.get(name), unit, "")
-        except InputError:
-            continue
-        return in_unit_of_drive(note, unit)
+            return in_unit_of_drive(note, unit)
     return in_unit_of_drive(note, note.si)
 
 

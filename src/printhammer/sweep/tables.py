@@ -112,7 +112,8 @@ def _sentence(error: ValidationError) -> str:
     fault = error.errors(include_url=False)[0]
     key, table = _place(fault["loc"])
     if fault["type"] == "missing":
-        return f"{key} is missing, expected {_meaning(table, fault['loc'][-1])}"
+        field = table.model_fields.get(str(fault["loc"][-1]))
+        return f"{key} is missing, expected {(field.description if field else None) or 'a value'}"
     if fault["type"] == "extra_forbidden":
         known = ", ".join(table.model_fields)
         return f"the key {shown(key, quotes=False)} is not known, expected one of {known}"
@@ -145,8 +146,3 @@ def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:
 
 
 _CHOICES: Final = ("str", "dict[str,any]", "list[str]", "literal['all']", "int", "float")
-
-
-def _meaning(table: type[BaseModel], name: int | str) -> str:
-    field = table.model_fields.get(str(name))
-    return field.description or "a value" if field is not None else "a value"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -103,11 +104,9 @@ def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[s
 
     names = []
     for name, si in quantities.items():
-        try:
+        with suppress(InputError):
             parse(text, si)
-        except InputError:
-            continue
-        names.append(name)
+            names.append(name)
     if not names:
         such = next(iter(quantities))
         raise InputError(
