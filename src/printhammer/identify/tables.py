@@ -31,7 +31,7 @@ _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Readings:
     """Columns of a file in the order of its rows.
 
     Attributes
@@ -64,7 +64,7 @@ def read_table(
     *,
     optional: Mapping[str, str] = _NONE,
     text: Mapping[str, tuple[str, ...]] = _NO_WORDS,
-) -> Table:
+) -> Readings:
     """Read a table, numbers in SI; a column that was left out is not in it.
 
     Parameters
@@ -115,7 +115,7 @@ def read_table(
             else:
                 values[name][row] = _number(cell, *units[name], where)
     rows = np.array([number for number, _cells in lines[1:]], dtype=np.int64)
-    return Table(source, values, words, rows, sheet.comments)
+    return Readings(source, values, words, rows, sheet.comments)
 
 
 def _heading(

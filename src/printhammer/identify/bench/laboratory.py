@@ -202,7 +202,7 @@ def _comments(
         if name in exact:
             continue
         channel = sensor.channels.get(name, Channel())
-        comments[name] = channel.told(*UNITS[name], full_scale(values))
+        comments[name] = channel.described(*UNITS[name], full_scale(values))
     if kind == "motion":
         comments["sampling rate"] = _frequency(sensor.sampling_rate)
         comments["bandwidth"] = _frequency(sensor.bandwidth)

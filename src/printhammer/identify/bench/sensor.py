@@ -113,7 +113,7 @@ class Channel:
         digit = max(digit for digit in (1, 2, 5) if digit <= max(size / 10.0**power, 1.0))
         return float(f"{digit}e{power}")
 
-    def told(self, si: str, unit: str, full: float) -> str:
+    def described(self, si: str, unit: str, full: float) -> str:
         """Return noise, resolution and offset as text in a unit, for a full scale, SI."""
         from printhammer.units import from_si
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.tables import Table
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 Surface = Literal["pack", "backstop"]
@@ -219,7 +219,7 @@ def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> 
     return float(parabola[0]), float(parabola[1] / scale)
 
 
-def _bandwidth(table: Table) -> float | None:
+def _bandwidth(table: Readings) -> float | None:
     """Return the bandwidth that a comment of the file tells, Hz."""
     text = table.comments.get("bandwidth", "")
     if text in ("", "none", "unlimited"):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.identify.result import Fit
-    from printhammer.identify.tables import Table
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 _SPARE: Final = 4
@@ -100,7 +100,7 @@ def fit_magnet(
     )
 
 
-def _data(table: Table, alone: Table | None) -> Data:
+def _data(table: Readings, alone: Readings | None) -> Data:
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     series = np.zeros(len(x), dtype=np.int64)
     names: tuple[str, ...] = ("magnet and spring",)
@@ -123,7 +123,7 @@ def _data(table: Table, alone: Table | None) -> Data:
     return Data(files, "magnet", x, force, axes, series, names, lines)
 
 
-def _check(table: Table, alone: Table | None, zero: float, position: float | None) -> int:
+def _check(table: Readings, alone: Readings | None, zero: float, position: float | None) -> int:
     """Refuse a table that allows no fit; return the number of different currents, 0 for very many."""
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     low = int(np.argmin(x))
@@ -148,7 +148,7 @@ def _check(table: Table, alone: Table | None, zero: float, position: float | Non
     return levels
 
 
-def _never(table: Table, place: float, force: float) -> str:
+def _never(table: Readings, place: float, force: float) -> str:
     largest = table.values["current"].max()
     return (
         f"{table.path}: the force never releases the armature, at {place:.4g} m it is {force:.3g} N at best,"
@@ -156,7 +156,9 @@ def _never(table: Table, place: float, force: float) -> str:
     )
 
 
-def _releases(table: Table, law: TotalLaw, p: FloatArray, zero: float | None, position: float | None) -> None:
+def _releases(
+    table: Readings, law: TotalLaw, p: FloatArray, zero: float | None, position: float | None
+) -> None:
     """Refuse constants with which the force never becomes positive where the armature rests."""
     offset = float(p[-1]) if zero is None else zero
     place = float(table.values["displacement"].min()) - offset if position is None else position

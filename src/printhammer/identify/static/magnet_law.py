@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.identify.tables import Table
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 
@@ -88,7 +88,7 @@ class TotalLaw:
         return slope
 
 
-def start_of(table: Table, levels: int, zero: float) -> FloatArray:
+def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
     """Return C, Am, Bm and K to begin with, from a fit that is linear in Am^2, Am Bm and Bm^2.
 
     `levels` is the number of different currents, 0 for very many, `zero` what the sensor shows at x = 0, m.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from printhammer.identify.least_squares import Solution
     from printhammer.identify.result import Fit
-    from printhammer.identify.tables import Table
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 LOADING, UNLOADING = 2.7, 11.0
@@ -143,7 +143,7 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
     )
 
 
-def _start(law: PackLaw, table: Table) -> FloatArray:
+def _start(law: PackLaw, table: Readings) -> FloatArray:
     """Return the parameters to begin with; refuse too few or negative forces of loading in the pack."""
     force, cycles = table.values["force"], law.cycles
     rows = np.flatnonzero(law.inside & ~cycles.unloading)
@@ -180,7 +180,7 @@ def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
     return p_value, flaw
 
 
-def _notes(law: PackLaw, table: Table, solution: Solution) -> list[str]:
+def _notes(law: PackLaw, table: Readings, solution: Solution) -> list[str]:
     """Say what is missing, and where the branches meet elsewhere than at the largest indentation."""
     if not len(law.turns):
         return ["without rows of unloading the hysteresis of the pack is taken from equation (5), not tested"]
