@@ -36,6 +36,7 @@ Every quantity is written with its unit, as a string or as ``{ value = 1.2, unit
 from __future__ import annotations
 
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -46,7 +47,7 @@ from printhammer.drive.text import FORMAT
 from printhammer.drive.trains import Burst, Drive, PulseTrain, SineForce
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, Waveform
 from printhammer.drive.waveforms.shapes import SHAPES, Chain, Sampled, Switched
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.support.constants import quantities, sentence, shown
 from printhammer.support.texts import read_text
 
@@ -160,10 +161,8 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
 
 
 def _named(kind: str, maker: Callable[..., Drive], arguments: Mapping[str, Any]) -> Drive:
-    try:
+    with located(kind):
         return maker(**arguments)
-    except InputError as error:
-        raise InputError(f"{kind}: {error}") from None
 
 
 def _table(value: Any, name: str) -> dict[str, Any]:
@@ -207,10 +206,8 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
     from printhammer.units import split, to_si
 
     if isinstance(value, str):
-        try:
+        with located(where):
             number, unit = split(value, units[0])
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
     elif isinstance(value, dict):
         _known(value, {"value", "unit"}, where)
         _required(value, ("value", "unit"), where)
@@ -220,14 +217,10 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
     else:
         raise InputError(f"{where} = {shown(value)} has no unit, expected a string such as '1 {units[0]}'")
     for si in units[1:]:
-        try:
+        with suppress(InputError):
             return to_si(number, unit, si), si
-        except InputError:
-            continue
-    try:
+    with located(where):
         return to_si(number, unit, units[0]), units[0]
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def _column(value: Any, si: str, where: str) -> list[float]:

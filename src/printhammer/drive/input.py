@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -35,10 +35,8 @@ def read_number(value: float | str, si: str, name: str) -> float:
     if isinstance(value, str):
         from printhammer.units import parse
 
-        try:
+        with located(name):
             return parse(value, si)
-        except InputError as error:
-            raise InputError(f"{name}: {error}") from None
     try:
         number = math.nan if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):

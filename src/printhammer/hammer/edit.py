@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.hammer.file import SELECTORS, TEXTS, Body, file_options, kinds_of, model_of, si_unit_of
 from printhammer.support.constants import Constant, Quantity, quantities, shown
 
@@ -79,10 +79,8 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
     if isinstance(value, Constant):
         return {"value": value.value, "unit": value.unit, "status": value.status, "source": value.source}
     if isinstance(value, str):
-        try:
+        with located(key):
             number, unit = split(value, si_unit)
-        except InputError as error:
-            raise InputError(f"{key}: {error}") from None
     else:
         try:
             number, unit = float(value), si_unit

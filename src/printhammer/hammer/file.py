@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
 from printhammer.support.constants import (
     STATUSES,
@@ -113,10 +113,8 @@ def build(document: Mapping[str, Any], where: str, folder: Path) -> Contents:
         A key is unknown or missing, a value is of the wrong kind, dimension or range, or positions are out of
         order.
     """
-    try:
+    with located(where):
         return _build(document, folder)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def model_of(section: str, kind: str) -> type[BaseModel]:
@@ -251,10 +249,8 @@ def _constant(key: str, given: Any, note: Quantity) -> Constant:
     if texts["status"] not in STATUSES:
         raise InputError(f"{key}.status = {shown(texts['status'])}: expected one of {', '.join(STATUSES)}")
     si_unit = si_unit_of(note, texts["unit"])
-    try:
+    with located(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}"):
         si = to_si(value, texts["unit"], si_unit)
-    except InputError as error:
-        raise InputError(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}: {error}") from None
     return Constant(
         key=key, value=value, **texts, si=si, meaning=note.meaning, symbol=note.symbol, si_unit=si_unit
     )

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart
@@ -276,13 +276,11 @@ class Hammer:
         wanted = {key: value} if isinstance(key, str) else dict(key)
         document = dict(self._document)
         edits: list[Edit] = []
-        try:
-            for name, given in wanted.items():
-                edit = edit_of(document, name, given, status, source)
+        with located(self._where):
+            for name, entry in wanted.items():
+                edit = edit_of(document, name, entry, status, source)
                 document = changed(document, [edit])
                 edits.append(edit)
-        except InputError as error:
-            raise InputError(f"{self._where}: {error}") from None
         contents = build(document, self._where, self._folder)
         return Hammer(contents, document, self._text, (*self._edits, *edits), self._where, self._folder)
 
@@ -337,10 +335,8 @@ class Hammer:
         from printhammer.hammer.equilibrium import rest_state
 
         if self.magnet is not None and self.backstop is not None:
-            try:
+            with located(self._where):
                 rest_state(self)
-            except InputError as error:
-                raise InputError(f"{self._where}: {error}") from None
 
     def warnings(self) -> list[str]:
         """Say what is odd about a hammer that can still be simulated.

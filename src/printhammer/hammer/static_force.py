@@ -57,17 +57,10 @@ class StaticForce:
     """The force of the parts on an armature at rest at x, and where it is defined.
 
     Magnet, spring and the elastic force of the backstop are functions of x; the pack acts with the loading
-    branch at rest, as when fresh paper is slowly pressed.
-
-    Attributes
-    ----------
-    rigid : bool
-        Whether the backstop is rigid: positions below it do not exist.
-    limits : tuple of float
-        Where the law of the magnet holds and a rigid backstop lets the armature be, m.
-    low, high : float
-        Where equilibria are sought by default, m: from the lower limit of the magnet's law, or the rigid
-        backstop, up to the platen, or to where the pack ends, or to the upper limit of the magnet's law.
+    branch at rest, as when fresh paper is slowly pressed. Below a `rigid` backstop there are no positions. In
+    the `limits`, m, the law of the magnet holds and a rigid backstop lets the armature be; between `low` and
+    `high`, m, equilibria are sought by default: from the lower limit, at most 1 m off the origin, up to the
+    platen, or to where the pack ends, or to the upper limit.
     """
 
     def __init__(self, hammer: HammerLike) -> None:

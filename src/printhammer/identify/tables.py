@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import describe, to_si
 
@@ -146,10 +146,8 @@ def _heading(
             raise InputError(
                 f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}"
             )
-        try:
+        with located(f"{where}: heading {cell.strip()!r}"):
             to_si(1.0, unit, numbers[name])
-        except InputError as error:
-            raise InputError(f"{where}: heading {cell.strip()!r}: {error}") from None
         units[name] = unit, numbers[name]
     return names, units
 
@@ -163,10 +161,8 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
         raise InputError(
             f"{where}: {cell.strip()!r} is expected to be a finite number, {describe(si)} in {unit}"
         )
-    try:
+    with located(where):
         return to_si(number, unit, si)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def _word(cell: str, allowed: Sequence[str], where: str) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import WithJsonSchema
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.support.constants import shown
 from printhammer.units import describe, parse, to_si
 
@@ -56,7 +56,7 @@ def read_quantity(given: Any, si: str, where: str) -> float:
     InputError
         It is none of these, or of another dimension than the unit `si`.
     """
-    try:
+    with located(where):
         if isinstance(given, str):
             return parse(given, si)
         if isinstance(given, Mapping):
@@ -64,8 +64,6 @@ def read_quantity(given: Any, si: str, where: str) -> float:
             return to_si(value, unit, si)
         if si == "1":
             return to_si(given, "1", "1")
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
     raise InputError(
         f"{where} = {shown(given)} has no unit, expected {describe(si)} as text such as '1 {si}'"
     )
@@ -81,10 +79,8 @@ def read_quantities(given: Any, si: str, where: str) -> list[float]:
     """
     values: Iterable[Any] = given if isinstance(given, list) else ()
     if isinstance(given, Mapping):
-        try:
+        with located(where):
             column, unit = _columns(given, ("values", "unit"))
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
         values = [{"value": value, "unit": unit} for value in column] if isinstance(column, list) else ()
     numbers = [read_quantity(value, si, f"{where}[{i}]") for i, value in enumerate(values)]
     if not numbers:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 import numpy as np
 from pydantic import model_validator
 
+from printhammer.drive.input import read_number
 from printhammer.drive.segments import evaluate, largest, table
 from printhammer.drive.waveforms.base import Waveform
 from printhammer.errors import InputError
@@ -107,12 +108,7 @@ def _over(begun: float, waveform: Waveform, time: float) -> bool:
 def _offset(given: object, number: int) -> float:
     """Read the offset of a part: a number in s, or a string with a unit."""
     if isinstance(given, str):
-        from printhammer.units import parse
-
-        try:
-            return parse(given, "s")
-        except InputError as error:
-            raise InputError(f"parts[{number}]: {error}") from None
+        return read_number(given, "s", f"parts[{number}]")
     if isinstance(given, bool) or not isinstance(given, float | int) or not math.isfinite(given):
         raise InputError(f"parts[{number}]: offset {given!r} is expected to be a finite number in s")
     return float(given)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.identify.lowpass import time_constant
 from printhammer.identify.result import REPLACED, Fit, FittedConstant
 from printhammer.identify.shots.approach import Prior
@@ -97,10 +97,8 @@ def fit_motion(
     names = (*keys, *(f"the current of {shots[owner].name}" for owner in parameters.owners))
     states = [shot.states for shot in shots]
     refuse_degenerate(where, fit.design(start, states), names)
-    try:
+    with located(where):
         solution = fit.solve(start, states)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
     if not touched and hammer.backstop is not None:
         notes.append("no record touches the backstop after the shot: its damping cannot be found from them")
     return _result(hammer, shots, fit, solution, keys, notes)

@@ -259,12 +259,8 @@ class Shooting:
     def opened(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray]:
         """Return what the sensor shows of a shot whose stretches are independent, and how that changes.
 
-        Returns
-        -------
-        shown : array, shape (n,)
-            At the samples.
-        derivatives : array, shape (n, p + 2 j)
-            With respect to the parameters, in their scales, and to the states at the joints, in `units`.
+        At the samples, shape (n,), and its derivatives with respect to the parameters, in their scales, and
+        to the states at the joints, in `units`, shape (n, p + 2 j).
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]
@@ -283,16 +279,10 @@ class Shooting:
     def condensed(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Eliminate the states at the joints: the linear model of a shot in which no gap is left.
 
-        Returns
-        -------
-        shown : array, shape (n,)
-            What the sensor would show if the gaps were closed and the parameters as they are.
-        by_parameter : array, shape (n, p)
-            How that changes with the parameters, counted in their scales.
-        closing : array, shape (j, 2)
-            Change of the states at the joints that closes the gaps.
-        states_by_parameter : array, shape (j, 2, p)
-            How they change with the parameters.
+        Returned are what the sensor would show if the gaps were closed and the parameters as they are, shape
+        (n,); how that changes with the parameters, counted in their scales, shape (n, p); the change of the
+        states at the joints that closes the gaps, shape (j, 2), and how it changes with the parameters, shape
+        (j, 2, p).
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.identify.residuals import noise_of_record, running_median
 from printhammer.identify.tables import read_table
-from printhammer.units import from_si, parse
+from printhammer.units import from_si
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -224,12 +225,10 @@ def _bandwidth(table: Readings) -> float | None:
     text = table.comments.get("bandwidth", "")
     if text in ("", "none", "unlimited"):
         return None
-    try:
-        value = parse(text, "Hz")
-    except InputError as error:
-        raise InputError(f"{table.path}: the comment 'bandwidth': {error}") from None
+    where = f"{table.path}: the comment 'bandwidth'"
+    value = read_number(text, "Hz", where)
     if not (np.isfinite(value) and value > 0.0):
-        raise InputError(f"{table.path}: the comment 'bandwidth': {text}, expected a positive number")
+        raise InputError(f"{where}: {text}, expected a positive number")
     return value
 
 

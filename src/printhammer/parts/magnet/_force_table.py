@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.support.sheets import finite, read_sheet, split_heading
 
 if TYPE_CHECKING:
@@ -94,10 +94,8 @@ def read_csv(path: Path) -> ForceTable:
         if len(cells) != len(order):
             raise InputError(f"{what}: line {number} has {len(cells)} cells, expected {len(order)}")
         row = dict(zip(order, (finite(cell, f"{what}: line {number}") for cell in cells), strict=True))
-        try:
+        with located(f"{what}: line {number}"):
             x, current, force = (to_si(row[name], units[name], si) for name, si in COLUMNS.items())
-        except InputError as error:
-            raise InputError(f"{what}: line {number}: {error}") from None
         rows.append((x, current, force))
     return gather(rows, what)
 
@@ -116,10 +114,8 @@ def _heading(cells: Sequence[str], what: str) -> tuple[list[str], dict[str, str]
             raise InputError(
                 f"{what}: column {cell.strip()!r} has no unit, expected the heading {_HEADING!r}"
             )
-        try:
+        with located(f"{what}: column {cell.strip()!r}"):
             to_si(1.0, unit, COLUMNS[name])
-        except InputError as error:
-            raise InputError(f"{what}: column {cell.strip()!r}: {error}") from None
         units[name] = unit
     if len(units) != len(COLUMNS) or len(cells) != len(COLUMNS):
         given = ",".join(cell.strip() for cell in cells)
