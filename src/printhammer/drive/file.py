@@ -124,9 +124,9 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
         raise InputError(f"format = {shown(data.get('format'))} is expected to be {FORMAT}")
     kinds = [kind for kind in _KEYS if kind in data]
     if len(kinds) != 1:
-        given = " and ".join(f"[{kind}]" for kind in kinds) or "none"
+        several = " and ".join(f"[{kind}]" for kind in kinds) or "none"
         raise InputError(
-            f"{given} given, expected one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}"
+            f"{several} given, expected one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}"
         )
     kind = kinds[0]
     arguments = _arguments(_table(data[kind], kind), kind)

@@ -48,12 +48,12 @@ def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:
     Rows ``(start, kind, p0, p1, p2, p3)`` are in ascending order of start; a first start above 0 gets a zero
     segment before it. The end of the support, s, is ``inf`` for a drive that never ends.
     """
-    given = [[float(entry) for entry in row] for row in rows]
-    if given and given[0][0] > 0.0:
-        given.insert(0, [0.0] * COLUMNS)
-    given.append([float(end), 0.0, 0.0, 0.0, 0.0, 0.0])
-    kept = [row for row, after in itertools.pairwise(given) if row[0] < after[0]]
-    result = np.array([*kept, given[-1]], dtype=np.float64)
+    listed = [[float(entry) for entry in row] for row in rows]
+    if listed and listed[0][0] > 0.0:
+        listed.insert(0, [0.0] * COLUMNS)
+    listed.append([float(end), 0.0, 0.0, 0.0, 0.0, 0.0])
+    kept = [row for row, after in itertools.pairwise(listed) if row[0] < after[0]]
+    result = np.array([*kept, listed[-1]], dtype=np.float64)
     result.flags.writeable = False
     return result
 

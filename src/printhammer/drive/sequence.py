@@ -59,14 +59,14 @@ class PulseSequence(Drive):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> None:
-        given = _checked(waveforms)
+        fired = _checked(waveforms)
         times = read_times(at) + read_start(start)
-        if times.size != len(given):
+        if times.size != len(fired):
             raise InputError(
-                f"{times.size} firing times are expected to be as many as the waveforms, {len(given)}"
+                f"{times.size} firing times are expected to be as many as the waveforms, {len(fired)}"
             )
-        super().__init__(given[0], times, overlap, None)
-        self._place(given)
+        super().__init__(fired[0], times, overlap, None)
+        self._place(fired)
 
     @property
     def waveform(self) -> Waveform:
@@ -195,18 +195,18 @@ class PulseSequence(Drive):
 def _checked(waveforms: Any) -> list[Waveform]:
     """Return the waveforms of a sequence, all of one quantity and with an end."""
     try:
-        given = [] if isinstance(waveforms, Waveform) else list(waveforms)
+        fired = [] if isinstance(waveforms, Waveform) else list(waveforms)
     except TypeError:
-        given = []
-    if not given:
+        fired = []
+    if not fired:
         raise InputError(f"waveforms = {waveforms!r} is expected to be a list of waveforms, one a firing")
-    for number, waveform in enumerate(given):
+    for number, waveform in enumerate(fired):
         if not isinstance(waveform, Waveform):
             raise InputError(f"waveforms[{number}] = {waveform!r} is expected to be a waveform")
         if not math.isfinite(waveform.support):
             raise InputError(f"waveforms[{number}] is a {waveform.shape}, expected a waveform that ends")
-        if waveform.quantity != given[0].quantity:
+        if waveform.quantity != fired[0].quantity:
             raise InputError(
-                f"waveforms[{number}] is a {waveform.quantity}, expected a {given[0].quantity} like the first"
+                f"waveforms[{number}] is a {waveform.quantity}, expected a {fired[0].quantity} like the first"
             )
-    return given
+    return fired

@@ -92,14 +92,14 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
 def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]:
     """Return the TOML table of a part, a waveform or a mapping of what `edit_of` takes."""
     selector = SELECTORS[section]
-    given = dict(value) if isinstance(value, Mapping) else _fields(section, value)
-    if selector and given.get(selector) not in kinds_of(section):
+    content = dict(value) if isinstance(value, Mapping) else _fields(section, value)
+    if selector and content.get(selector) not in kinds_of(section):
         known = ", ".join(kinds_of(section))
-        raise InputError(f"{section}.{selector} = {shown(given.get(selector))}: expected one of {known}")
+        raise InputError(f"{section}.{selector} = {shown(content.get(selector))}: expected one of {known}")
     result: dict[str, Any] = {}
     if selector:
-        result[selector] = given.pop(selector)
-    for name, entry in given.items():
+        result[selector] = content.pop(selector)
+    for name, entry in content.items():
         key, item = edit_of({section: result}, f"{section}.{name}", entry, status, source)
         if item is not None:
             result[key.rpartition(".")[2]] = item

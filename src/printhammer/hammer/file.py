@@ -146,9 +146,9 @@ def _build(document: Mapping[str, Any], folder: Path) -> Contents:
     _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS), "")
     if "format" not in document:
         raise InputError(f"format is missing, expected format = {FORMAT}")
-    given = document["format"]
-    if not isinstance(given, int) or isinstance(given, bool) or given != FORMAT:
-        raise InputError(f"format = {shown(given)}: expected {FORMAT}")
+    version = document["format"]
+    if not isinstance(version, int) or isinstance(version, bool) or version != FORMAT:
+        raise InputError(f"format = {shown(version)}: expected {FORMAT}")
     texts: dict[str, str] = {}
     for name in TEXTS:
         texts[name] = document.get(name, "")
@@ -226,23 +226,23 @@ def _read(
         raise InputError(sentence(error, model, prefix, written)) from None
 
 
-def _constant(key: str, given: Any, note: Quantity) -> Constant:
+def _constant(key: str, written: Any, note: Quantity) -> Constant:
     from printhammer.units import describe, to_si
 
-    if not isinstance(given, Mapping):
+    if not isinstance(written, Mapping):
         raise InputError(
-            f"{key} = {shown(given)}: expected {describe(note.si)} as "
+            f"{key} = {shown(written)}: expected {describe(note.si)} as "
             '{ value = ..., unit = "...", status = "...", source = "..." }'
         )
-    _only(given, CONSTANT_KEYS, f"{key}.")
-    value = given.get("value")
+    _only(written, CONSTANT_KEYS, f"{key}.")
+    value = written.get("value")
     for name in CONSTANT_KEYS:
-        if name not in given:
+        if name not in written:
             what = f"the constant {key} = {shown(value)}" if name != "value" else f"the constant {key}"
             raise InputError(f"{what} has no {name}, expected {describe(note.si)} with {_WANTED[name]}")
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:
         raise InputError(f"{key} = {shown(value)}: expected a finite number")
-    texts = {name: given[name] for name in CONSTANT_KEYS[1:]}
+    texts = {name: written[name] for name in CONSTANT_KEYS[1:]}
     for name, text in texts.items():
         if not isinstance(text, str) or not text.strip():
             raise InputError(f"{key}.{name} = {shown(text)}: expected {_WANTED[name]}")

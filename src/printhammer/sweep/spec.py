@@ -165,11 +165,11 @@ def _replaced(hammer: Hammer, constants: Mapping[str, Any]) -> Hammer:
     return hammer.replace(changes, source="constants of a sweep") if changes else hammer
 
 
-def _drive_tables(given: dict[str, Any] | str, folder: Path) -> tuple[dict[str, Any], Path]:
+def _drive_tables(source: dict[str, Any] | str, folder: Path) -> tuple[dict[str, Any], Path]:
     """Return the tables of a drive, and where what they name lies."""
-    if not isinstance(given, str):
-        return dict(given), folder
-    path = folder / given
+    if not isinstance(source, str):
+        return dict(source), folder
+    path = folder / source
     try:
         return tomllib.loads(path.read_text(encoding="utf-8")), path.parent
     except OSError as error:

@@ -45,11 +45,11 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
         sensor = sensor.exact()
     channels = dict(sensor.channels)
     for part in PARTS:
-        for name, given in _quantities(part, settings.get(part)).items():
+        for name, written in _quantities(part, settings.get(part)).items():
             if name not in channels:
                 known = ", ".join(channels)
                 raise InputError(f"{part}: the quantity {name!r} is not measured, expected one of {known}")
-            amount = Amount.read(given, units[name], f"{part} of {name}", signed=part == "offset")
+            amount = Amount.read(written, units[name], f"{part} of {name}", signed=part == "offset")
             channels[name] = replace(channels[name], **{part: amount})
     changes: dict[str, Any] = {"channels": channels}
     for name, read in _READ.items():
@@ -65,8 +65,8 @@ def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
     kept = dict(settings)
     for part in PARTS:
         if part in kept:
-            given = _quantities(part, kept[part])
-            kept[part] = {name: value for name, value in given.items() if name in sensor.channels}
+            amounts = _quantities(part, kept[part])
+            kept[part] = {name: value for name, value in amounts.items() if name in sensor.channels}
     if sensor.sampling_rate is None:
         kept = {name: value for name, value in kept.items() if name not in ("sampling_rate", "bandwidth")}
     return kept
@@ -116,12 +116,12 @@ def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[s
     return names
 
 
-def _quantities(part: str, given: Any) -> Mapping[str, Any]:
-    if given is None:
+def _quantities(part: str, amounts: Any) -> Mapping[str, Any]:
+    if amounts is None:
         return {}
-    if not isinstance(given, Mapping):
-        raise InputError(f"{part} = {given!r}, expected amounts by quantity, such as {{'force': '0.5 %'}}")
-    return given
+    if not isinstance(amounts, Mapping):
+        raise InputError(f"{part} = {amounts!r}, expected amounts by quantity, such as {{'force': '0.5 %'}}")
+    return amounts
 
 
 def _frequency(value: Any, name: str) -> float | None:

@@ -118,8 +118,8 @@ def _heading(cells: Sequence[str], what: str) -> tuple[list[str], dict[str, str]
             to_si(1.0, unit, COLUMNS[name])
         units[name] = unit
     if len(units) != len(COLUMNS) or len(cells) != len(COLUMNS):
-        given = ",".join(cell.strip() for cell in cells)
-        raise InputError(f"{what}: the heading is {given!r}, expected {_HEADING!r}")
+        listed = ",".join(cell.strip() for cell in cells)
+        raise InputError(f"{what}: the heading is {listed!r}, expected {_HEADING!r}")
     return list(units), units
 
 
