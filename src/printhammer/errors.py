@@ -1,5 +1,13 @@
 """The errors that printhammer raises on purpose."""
 
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 
 class PrinthammerError(Exception):
     """Base of every error that printhammer raises on purpose."""
@@ -11,3 +19,12 @@ class InputError(PrinthammerError, ValueError):
     The message is one sentence that names the file, the key, the value and what was expected. The command
     line prints it and ends with status 2.
     """
+
+
+@contextmanager
+def located(where: str) -> Iterator[None]:
+    """Begin the message of an `InputError` with where it comes from, such as a file or a key."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None

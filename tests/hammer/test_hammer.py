@@ -16,7 +16,7 @@ from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
 from printhammer.parts.magnet.table import TableMagnet
-from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.parts.spring.linear import PreloadSpring
 
 OSCILLATOR = """
 format = 1

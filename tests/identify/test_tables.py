@@ -6,14 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from printhammer.errors import InputError
-from printhammer.identify.tables import Table, read_table
+from printhammer.identify.tables import Readings, read_table
 from printhammer.units import from_si
 
 COLUMNS = {"displacement": "m", "force": "N"}
 WORDS = {"branch": ("loading", "unloading")}
 
 
-def read(folder: Path, text: str) -> Table:
+def read(folder: Path, text: str) -> Readings:
     path = folder / "table.csv"
     path.write_text(text, "utf-8")
     return read_table(path, COLUMNS, optional={"current": "A"}, text=WORDS)

@@ -23,7 +23,7 @@ from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
-from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.parts.spring.linear import PreloadSpring
 from printhammer.reference.integrator import reference
 
 MASS = 4e-4

@@ -14,8 +14,7 @@ from printhammer.parts import BackstopPart, MagnetPart, PackPart, SpringPart
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
-from printhammer.parts.spring.linear import LinearSpring
-from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.parts.spring.linear import LinearSpring, PreloadSpring
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.magnet.table import TableMagnet
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
-from printhammer.parts.spring.linear import LinearSpring
-from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.parts.spring.linear import LinearSpring, PreloadSpring
 from printhammer.reference.integrator import ReferenceRun, _Run, horizon, reference
 from printhammer.reference.series import ORDER
 

@@ -70,13 +70,7 @@ app: Final = _built()
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line and exit.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        By default those of the process.
-    """
+    """Run the command line, by default that of the process, and exit."""
     try:
         status = app(
             None if arguments is None else list(arguments), prog_name="printhammer", standalone_mode=False

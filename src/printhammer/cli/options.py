@@ -25,45 +25,32 @@ DATA: Final = (".nc", ".zarr", ".csv", ".parquet", ".json")
 
 @dataclass(frozen=True)
 class Option:
-    """An option or argument of a verb.
-
-    Attributes
-    ----------
-    help, metavar, panel : str
-        What it means, what stands for its value in the help, and the heading there under which it stands.
-    flag : str, optional
-        How it is written; by default as the parameter is called.
-    default : object
-        Value where it is not given; an ellipsis if it must be.
-    type : type
-        What typer makes of its text: str, Path, int, float, bool or an enumeration.
-    read : callable, optional
-        Makes the value of its text and its name instead; raises `InputError`.
-    many : bool
-        Whether it may be given repeatedly.
-    least : float, optional
-        Least number that is accepted.
-    argument : bool
-        Whether it stands without a flag.
-    is_input : bool
-        Whether it names files that are read, which no output may be.
-    hammer : str, optional
-        The hammer that is worked on: "named", "loaded" with its warnings shown, or "fired", which has a
-        waveform too.
-    """
+    """An option or argument of a verb."""
 
     help: str
     metavar: str | None = None
+    """What it means, and what stands for its value in the help."""
     default: Any = None
+    """Value where it is not given; an ellipsis if it must be."""
     flag: str | None = None
+    """How it is written; by default as the parameter is called."""
     panel: str | None = None
+    """Heading in the help under which it stands."""
     type: Any = str
+    """What typer makes of its text: str, Path, int, float, bool or an enumeration."""
     read: Callable[[str, str], Any] | None = None
+    """Makes the value of its text and its name instead; raises `InputError`."""
     many: bool = False
+    """Whether it may be given repeatedly."""
     least: float | None = None
+    """Least number that is accepted."""
     argument: bool = False
+    """Whether it stands without a flag."""
     is_input: bool = False
+    """Whether it names files that are read, which no output may be."""
     hammer: Literal["named", "loaded", "fired"] | None = None
+    """Of the hammer that is worked on: "named", "loaded" with its warnings shown, or "fired", which has a
+    waveform too."""
 
     def flag_of(self, name: str) -> str:
         """Return how the option of a parameter is written."""

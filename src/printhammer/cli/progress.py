@@ -13,19 +13,9 @@ if TYPE_CHECKING:
 
 @contextmanager
 def counting(name: str, *, remaining: bool = True) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar while something is done in a number of steps.
+    """Show a bar while something, called `name`, is counted; yield a function of the steps done and of all.
 
-    Parameters
-    ----------
-    name : str
-        What is counted.
-    remaining : bool, optional
-        Whether the time that is left is told too; it says nothing where most steps may not be needed.
-
-    Yields
-    ------
-    callable
-        To be called with the number of steps done and of all.
+    The time that is left is told too where `remaining`; it says nothing where most steps may not be needed.
     """
     from rich.progress import (
         BarColumn,
@@ -43,18 +33,7 @@ def counting(name: str, *, remaining: bool = True) -> Iterator[Callable[[int, in
 
 @contextmanager
 def telling(first: str = "…") -> Iterator[Callable[[str], None]]:
-    """Show a line while something is done whose end is not known.
-
-    Parameters
-    ----------
-    first : str, optional
-        What the line says at first.
-
-    Yields
-    ------
-    callable
-        To be called with what it says from then on.
-    """
+    """Show a line while something is done whose end is not known; yield a function of what it says next."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     with _shown(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()) as line:

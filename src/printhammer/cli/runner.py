@@ -90,28 +90,19 @@ class Answer:
 
 
 class Job:
-    """One call of a verb.
-
-    Attributes
-    ----------
-    hammer : Hammer or None
-        The hammer that is worked on.
-    wanted : dict of str to list of Path
-        Files to write, by the name of their option.
-    inputs : list of Path
-        Files that are read.
-    screen : Console
-        The standard output.
-    seconds : float
-        How long the last work took whose progress was shown.
-    """
+    """One call of a verb."""
 
     def __init__(self, declared: Mapping[str, Files], wanted: Mapping[str, list[Path]]) -> None:
         self.hammer: Hammer | None = None
+        """The hammer that is worked on."""
         self.declared, self.wanted = declared, dict(wanted)
+        """Options that name files to write, and these files, by the name of the option."""
         self.inputs: list[Path] = []
+        """Files that are read."""
         self.screen = console()
+        """The standard output."""
         self.seconds = 0.0
+        """How long the last work took whose progress was shown."""
         self._headed = False
 
     @property
@@ -210,25 +201,12 @@ class Verb:
 def verb(
     name: str, example: str, passed: Mapping[str, Option] | None = None, **files: Files
 ) -> Callable[[Callable[..., Answer]], Verb]:
-    """Make a function the verb `name`.
+    """Make a function the verb `name`, with an example of a command line that runs.
 
-    Parameters
-    ----------
-    name : str
-        What it is called.
-    example : str
-        A command line that runs.
-    passed : dict of str to Option, optional
-        Options that the library takes under the same name. The function gets those that are given as further
-        keywords, to pass them on; the others have the defaults of the library.
-    **files : Files
-        Options that name files to write, in the order of writing.
-
-    Returns
-    -------
-    callable
-        A decorator of a function whose parameters have options as their defaults; the `Job` is passed too
-        where there is a parameter `job`.
+    The function has options as defaults of its parameters, and gets the `Job` too where it has a parameter
+    `job`. Options that are `passed` are those that the library takes under the same name: the function gets
+    those that are given as further keywords, to pass them on; the others have the defaults of the library.
+    `files` name files to write, in the order of writing.
     """
 
     def made(function: Callable[..., Answer]) -> Verb:

@@ -23,30 +23,19 @@ STATUS_STYLES: Final = {"stated": "green", "derived": "cyan", "reconstructed": "
 
 @dataclass(frozen=True)
 class Column(Generic[Row]):
-    """A column of a table.
-
-    Attributes
-    ----------
-    heading : str
-        What stands above.
-    value : callable
-        Returns of a row a number in SI, None or NaN if there is none, or text with markup.
-    kind : str, optional
-        Kind of quantity, such as "time", which is shown in a unit of the system that is asked for.
-    unit : str, optional
-        Unit in the heading of numbers that are shown as they are.
-    format : str, optional
-        How numbers without kind are written.
-    left : bool
-        Whether the cells stand to the left.
-    """
+    """A column of a table."""
 
     heading: str
     value: Callable[[Row], Any]
+    """Returns of a row a number in SI, None or NaN if there is none, or text with markup."""
     kind: str = ""
+    """Kind of quantity, such as "time", which is shown in a unit of the system that is asked for."""
     unit: str = ""
+    """Unit in the heading of numbers that are shown as they are."""
     format: str = ""
+    """How numbers without kind are written."""
     left: bool = False
+    """Whether the cells stand to the left."""
 
     def head(self, units: Units) -> str:
         """Return the heading, with the unit below."""

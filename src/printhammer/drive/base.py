@@ -199,10 +199,11 @@ class Drive:
 
     def __repr__(self) -> str:
         count, first, last = len(self._times), self._times[0], self._times[-1]
-        fired = (
-            f"{count} firings from {first:.6g} s to {last:.6g} s"
-            if count > 1
-            else f"1 firing at {first:.6g} s"
-        )
-        shape = f"{self._waveform.shape} {self.quantity}"
-        return f"<{type(self).__name__}: {shape}, {fired}, overlap {self._overlap}>"
+        fired = f"1 firing at {first:.6g} s"
+        if count > 1:
+            fired = f"{count} firings from {first:.6g} s to {last:.6g} s"
+        return f"<{type(self).__name__}: {self._shapes()}, {fired}, overlap {self._overlap}>"
+
+    def _shapes(self) -> str:
+        """Say what is fired."""
+        return f"{self._waveform.shape} {self.quantity}"

@@ -36,6 +36,7 @@ Every quantity is written with its unit, as a string or as ``{ value = 1.2, unit
 from __future__ import annotations
 
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -46,8 +47,9 @@ from printhammer.drive.text import FORMAT
 from printhammer.drive.trains import Burst, Drive, PulseTrain, SineForce
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, Waveform
 from printhammer.drive.waveforms.shapes import SHAPES, Chain, Sampled, Switched
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.support.constants import quantities, sentence, shown
+from printhammer.support.texts import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -80,14 +82,7 @@ def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
         unit or range; the sentence names file, key and value.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: the drive file is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: the drive file cannot be read ({reason})") from None
-    return read_drive(text, waveform, name=str(path), folder=path.parent)
+    return read_drive(read_text(path, "the drive file"), waveform, name=str(path), folder=path.parent)
 
 
 def read_drive(
@@ -129,9 +124,9 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
         raise InputError(f"format = {shown(data.get('format'))} is expected to be {FORMAT}")
     kinds = [kind for kind in _KEYS if kind in data]
     if len(kinds) != 1:
-        given = " and ".join(f"[{kind}]" for kind in kinds) or "none"
+        several = " and ".join(f"[{kind}]" for kind in kinds) or "none"
         raise InputError(
-            f"{given} given, expected one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}"
+            f"{several} given, expected one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}"
         )
     kind = kinds[0]
     arguments = _arguments(_table(data[kind], kind), kind)
@@ -166,10 +161,8 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
 
 
 def _named(kind: str, maker: Callable[..., Drive], arguments: Mapping[str, Any]) -> Drive:
-    try:
+    with located(kind):
         return maker(**arguments)
-    except InputError as error:
-        raise InputError(f"{kind}: {error}") from None
 
 
 def _table(value: Any, name: str) -> dict[str, Any]:
@@ -213,10 +206,8 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
     from printhammer.units import split, to_si
 
     if isinstance(value, str):
-        try:
+        with located(where):
             number, unit = split(value, units[0])
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
     elif isinstance(value, dict):
         _known(value, {"value", "unit"}, where)
         _required(value, ("value", "unit"), where)
@@ -226,14 +217,10 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
     else:
         raise InputError(f"{where} = {shown(value)} has no unit, expected a string such as '1 {units[0]}'")
     for si in units[1:]:
-        try:
+        with suppress(InputError):
             return to_si(number, unit, si), si
-        except InputError:
-            continue
-    try:
+    with located(where):
         return to_si(number, unit, units[0]), units[0]
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def _column(value: Any, si: str, where: str) -> list[float]:
@@ -343,8 +330,8 @@ def _switched(data: dict[str, Any], where: str) -> Switched:
     try:
         return Switched.model_validate(fields)
     except ValidationError as error:
-        told = sentence(error, Switched, f"{where}.")
-        raise InputError(told if told.startswith(where) else f"{where}.{told}") from None
+        fault = sentence(error, Switched, f"{where}.")
+        raise InputError(fault if fault.startswith(where) else f"{where}.{fault}") from None
 
 
 def _samples(data: dict[str, Any], where: str) -> Waveform:

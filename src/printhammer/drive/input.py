@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -35,10 +35,8 @@ def read_number(value: float | str, si: str, name: str) -> float:
     if isinstance(value, str):
         from printhammer.units import parse
 
-        try:
+        with located(name):
             return parse(value, si)
-        except InputError as error:
-            raise InputError(f"{name}: {error}") from None
     try:
         number = math.nan if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):
@@ -49,16 +47,12 @@ def read_number(value: float | str, si: str, name: str) -> float:
     return number
 
 
-def _written(si: str) -> str:
-    """Return a unit as it follows a number, nothing for pure numbers."""
-    return "" if si == "1" else f" {si}"
-
-
 def read_positive(value: float | str, si: str, name: str) -> float:
     """Read a number above 0 whose inverse is finite; errors as for `read_number`."""
     number = read_number(value, si, name)
     if number <= 0.0 or not math.isfinite(1.0 / number):
-        raise InputError(f"{name} = {value!r} is expected to be greater than 0{_written(si)}")
+        unit = "" if si == "1" else f" {si}"
+        raise InputError(f"{name} = {value!r} is expected to be greater than 0{unit}")
     return number
 
 

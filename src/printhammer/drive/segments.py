@@ -43,26 +43,17 @@ _ROUNDS: Final = 9
 
 
 def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:
-    """Build a segment table, leaving out segments that rounding has made empty.
+    """Build a segment table, shape (segments + 1, 6), read-only, without segments that are empty by rounding.
 
-    Parameters
-    ----------
-    rows
-        ``(start, kind, p0, p1, p2, p3)`` in ascending order of start; a first start above 0 gets a zero
-        segment before it.
-    end
-        End of the support, s; ``inf`` for a drive that never ends.
-
-    Returns
-    -------
-    Array of shape (segments + 1, 6), read-only.
+    Rows ``(start, kind, p0, p1, p2, p3)`` are in ascending order of start; a first start above 0 gets a zero
+    segment before it. The end of the support, s, is ``inf`` for a drive that never ends.
     """
-    given = [[float(entry) for entry in row] for row in rows]
-    if given and given[0][0] > 0.0:
-        given.insert(0, [0.0] * COLUMNS)
-    given.append([float(end), 0.0, 0.0, 0.0, 0.0, 0.0])
-    kept = [row for row, after in itertools.pairwise(given) if row[0] < after[0]]
-    result = np.array([*kept, given[-1]], dtype=np.float64)
+    listed = [[float(entry) for entry in row] for row in rows]
+    if listed and listed[0][0] > 0.0:
+        listed.insert(0, [0.0] * COLUMNS)
+    listed.append([float(end), 0.0, 0.0, 0.0, 0.0, 0.0])
+    kept = [row for row, after in itertools.pairwise(listed) if row[0] < after[0]]
+    result = np.array([*kept, listed[-1]], dtype=np.float64)
     result.flags.writeable = False
     return result
 
@@ -157,18 +148,12 @@ def largest(segments: FloatArray) -> float:
 
 
 def largest_sum(edges: FloatArray, value: Callable[[FloatArray], FloatArray]) -> float:
-    """Find the largest absolute value of a sum of pulses.
+    """Find the largest absolute value of a sum of pulses, given as a function of times, s.
 
-    Every interval between neighbouring edges, inside which the sum is smooth, is sampled (densely near its
-    start, where exponentials change), and the intervals with the largest samples are refined until the
-    place of their largest value is known to 1e-9 of the interval.
-
-    Parameters
-    ----------
-    edges
-        Times at which a segment of one of them begins or ends, s, ascending, at least two.
-    value
-        The sum at given times.
+    Every interval between neighbouring edges, the times at which a segment of one of them begins or ends, s,
+    ascending, at least two, is smooth inside. It is sampled (densely near its start, where exponentials
+    change), and the intervals with the largest samples are refined until the place of their largest value is
+    known to 1e-9 of the interval.
     """
     fractions = np.union1d(np.linspace(0.0, 1.0, 33), np.geomspace(1e-6, 1.0, 31))
     starts, ends = edges[:-1], np.nextafter(edges[1:], -np.inf)

@@ -59,14 +59,14 @@ class PulseSequence(Drive):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> None:
-        given = _checked(waveforms)
+        fired = _checked(waveforms)
         times = read_times(at) + read_start(start)
-        if times.size != len(given):
+        if times.size != len(fired):
             raise InputError(
-                f"{times.size} firing times are expected to be as many as the waveforms, {len(given)}"
+                f"{times.size} firing times are expected to be as many as the waveforms, {len(fired)}"
             )
-        super().__init__(given[0], times, overlap, None)
-        self._place(given)
+        super().__init__(fired[0], times, overlap, None)
+        self._place(fired)
 
     @property
     def waveform(self) -> Waveform:
@@ -112,13 +112,7 @@ class PulseSequence(Drive):
         return largest_sum(np.unique(np.concatenate([some.ravel() for some in edges])), self.value)
 
     def scaled(self, factor: float) -> Self:
-        """Return the same drive with every value multiplied by a factor.
-
-        Raises
-        ------
-        InputError
-            The factor is not a finite number.
-        """
+        """Return the same drive with every value multiplied by a factor; errors as for `Drive.scaled`."""
         number = read_number(factor, "1", "factor")
         scaled = {id(waveform): waveform.scaled(number) for waveform in self._waveforms}
         result = copy(self)
@@ -194,32 +188,25 @@ class PulseSequence(Drive):
             result[own] = evaluate(self._tables[k], moments[own], self._times[numbers[own]])
         return result.reshape(np.shape(time))
 
-    def __repr__(self) -> str:
-        count, first, last = len(self._times), self._times[0], self._times[-1]
-        kinds = f"{len(self._tables)} waveform{'s' if len(self._tables) > 1 else ''}"
-        fired = (
-            f"{count} firings from {first:.6g} s to {last:.6g} s"
-            if count > 1
-            else f"1 firing at {first:.6g} s"
-        )
-        return f"<PulseSequence: {kinds} of {self.quantity}, {fired}, overlap {self._overlap}>"
+    def _shapes(self) -> str:
+        return f"{len(self._tables)} waveform{'s' if len(self._tables) > 1 else ''} of {self.quantity}"
 
 
 def _checked(waveforms: Any) -> list[Waveform]:
     """Return the waveforms of a sequence, all of one quantity and with an end."""
     try:
-        given = [] if isinstance(waveforms, Waveform) else list(waveforms)
+        fired = [] if isinstance(waveforms, Waveform) else list(waveforms)
     except TypeError:
-        given = []
-    if not given:
+        fired = []
+    if not fired:
         raise InputError(f"waveforms = {waveforms!r} is expected to be a list of waveforms, one a firing")
-    for number, waveform in enumerate(given):
+    for number, waveform in enumerate(fired):
         if not isinstance(waveform, Waveform):
             raise InputError(f"waveforms[{number}] = {waveform!r} is expected to be a waveform")
         if not math.isfinite(waveform.support):
             raise InputError(f"waveforms[{number}] is a {waveform.shape}, expected a waveform that ends")
-        if waveform.quantity != given[0].quantity:
+        if waveform.quantity != fired[0].quantity:
             raise InputError(
-                f"waveforms[{number}] is a {waveform.quantity}, expected a {given[0].quantity} like the first"
+                f"waveforms[{number}] is a {waveform.quantity}, expected a {fired[0].quantity} like the first"
             )
-    return given
+    return fired

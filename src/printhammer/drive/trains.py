@@ -109,11 +109,9 @@ class PulseTrain(_Pulsed):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> None:
-        given = [
-            name for name, value in (("rate", rate), ("period", period), ("at", at)) if value is not None
-        ]
-        if len(given) > 1:
-            raise InputError(f"{given[0]} and {given[1]} are given, expected one of rate, period and at")
+        ways = [name for name, value in (("rate", rate), ("period", period), ("at", at)) if value is not None]
+        if len(ways) > 1:
+            raise InputError(f"{ways[0]} and {ways[1]} are given, expected one of rate, period and at")
         first = read_start(start)
         self._spacing: tuple[str, float] | None = None
         if at is not None:
@@ -123,12 +121,10 @@ class PulseTrain(_Pulsed):
                 )
             super().__init__(waveform, read_times(at) + first, overlap, None)
             return
-        count = read_count(1 if pulses is None and not given else pulses, "pulses")
-        if not given and count > 1:
+        count = read_count(1 if pulses is None and not ways else pulses, "pulses")
+        if not ways and count > 1:
             raise InputError(f"pulses = {count} is expected to come with a rate, a period or firing times")
-        steps, self._spacing, spacing = (
-            even_times(rate, period, count) if given else (np.zeros(1), None, None)
-        )
+        steps, self._spacing, spacing = even_times(rate, period, count) if ways else (np.zeros(1), None, None)
         super().__init__(waveform, first + steps, overlap, spacing)
 
     def _table(self) -> tuple[str, dict[str, Any]]:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.hammer.file import SELECTORS, TEXTS, Body, file_options, kinds_of, model_of, si_unit_of
 from printhammer.support.constants import Constant, Quantity, quantities, shown
 
@@ -23,24 +23,11 @@ Edit = tuple[str, Any]
 
 
 def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, source: str) -> Edit:
-    """Turn a key and a value as a user gives them into an edit.
+    """Turn a key and a value as a user gives them into an edit of a TOML document.
 
-    Parameters
-    ----------
-    document : mapping
-        The TOML document to which the edit is meant.
-    key : str
-        Such as "mass", "pack.stiffness", "pack.reloading", or a table such as "backstop".
-    value : object
-        Text with a unit, a number in SI or a `Constant`; the value of an option; a part, a waveform or a
-        mapping for a whole table; None to take something away.
-    status, source : str
-        Of the constants.
-
-    Returns
-    -------
-    Edit
-        For `apply`.
+    A key is such as "mass", "pack.stiffness", "pack.reloading", or a table such as "backstop". Its value is
+    text with a unit, a number in SI or a `Constant`; the value of an option; a part, a waveform or a mapping
+    for a whole table; None to take something away. Status and source are those of the constants.
 
     Raises
     ------
@@ -65,18 +52,14 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     note = quantities(model).get(name) if model is not None else None
     texts = tuple(TEXTS) if not section else ()
     if model is None or (note is None and name not in file_options(model) and name not in texts):
-        close = get_close_matches(key, _names(document), 1)
+        tables = [name for name in SELECTORS if isinstance(document.get(name), Mapping)]
+        known = [*document, *(f"{table}.{entry}" for table in tables for entry in document[table])]
+        close = get_close_matches(key, known, 1)
         expected = repr(close[0]) if close else "one such as 'pack.stiffness'"
         raise InputError(f"the key {shown(key)} is not known, expected {expected}")
     if note is None or value is None:
         return key, value
     return key, _constant(key, _si_unit(note, document, section, name), value, status, source)
-
-
-def _names(document: Mapping[str, Any]) -> list[str]:
-    """Return the names of everything that a document says, such as "mass" and "pack.stiffness"."""
-    tables = [key for key in SELECTORS if isinstance(document.get(key), Mapping)]
-    return [*document, *(f"{section}.{field}" for section in tables for field in document[section])]
 
 
 def _si_unit(note: Quantity, document: Mapping[str, Any], section: str, name: str) -> str:
@@ -96,10 +79,8 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
     if isinstance(value, Constant):
         return {"value": value.value, "unit": value.unit, "status": value.status, "source": value.source}
     if isinstance(value, str):
-        try:
+        with located(key):
             number, unit = split(value, si_unit)
-        except InputError as error:
-            raise InputError(f"{key}: {error}") from None
     else:
         try:
             number, unit = float(value), si_unit
@@ -111,14 +92,14 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
 def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]:
     """Return the TOML table of a part, a waveform or a mapping of what `edit_of` takes."""
     selector = SELECTORS[section]
-    given = dict(value) if isinstance(value, Mapping) else _fields(section, value)
-    if selector and given.get(selector) not in kinds_of(section):
+    content = dict(value) if isinstance(value, Mapping) else _fields(section, value)
+    if selector and content.get(selector) not in kinds_of(section):
         known = ", ".join(kinds_of(section))
-        raise InputError(f"{section}.{selector} = {shown(given.get(selector))}: expected one of {known}")
+        raise InputError(f"{section}.{selector} = {shown(content.get(selector))}: expected one of {known}")
     result: dict[str, Any] = {}
     if selector:
-        result[selector] = given.pop(selector)
-    for name, entry in given.items():
+        result[selector] = content.pop(selector)
+    for name, entry in content.items():
         key, item = edit_of({section: result}, f"{section}.{name}", entry, status, source)
         if item is not None:
             result[key.rpartition(".")[2]] = item

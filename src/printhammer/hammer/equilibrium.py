@@ -16,25 +16,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.hammer.static_force import FAR, HammerLike, StaticForce
+from printhammer.hammer.static_force import HammerLike, StaticForce
 from printhammer.support.roots import Root, bisect, roots
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.support.arrays import FloatArray
-
-__all__ = [
-    "FAR",
-    "Equilibrium",
-    "EquilibriumPicture",
-    "equilibria",
-    "equilibrium_picture",
-    "holding_margin",
-    "positive_intervals",
-    "release_current",
-    "rest_state",
-]
 
 _NEAREST: Final = 1e-18
 _LARGEST_CURRENT: Final = 1e6
@@ -102,14 +90,14 @@ def rest_state(hammer: HammerLike) -> float:
         if pressing < 0.0:
             rest = position if force.rigid else _compressed(force, position)
             if rest is None:
-                told = f"at zero current the backstop is crushed down to {force.low:.6g} m"
+                because = f"at zero current the backstop is crushed down to {force.low:.6g} m"
                 raise InputError(
-                    f"{_named(hammer)} has no rest state: {told}, expected it to hold the armature"
+                    f"{_named(hammer)} has no rest state: {because}, expected it to hold the armature"
                 )
             return rest
         if hammer.magnet is not None:
-            told = f"at the backstop the net force at zero current is {pressing:.6g} N"
-            raise InputError(f"{_named(hammer)} has no rest state: {told}, expected a negative force")
+            because = f"at the backstop the net force at zero current is {pressing:.6g} N"
+            raise InputError(f"{_named(hammer)} has no rest state: {because}, expected a negative force")
     stable = [
         root.x
         for root in _roots(force, 0.0)
@@ -145,16 +133,16 @@ def equilibria(
     """
     smallest, largest = _currents(hammer)
     if not smallest <= current <= largest:
-        told = f"is expected to be from {smallest:g} to {largest:g} A"
-        raise InputError(f"current = {current!r} {told}, where the law of the magnet holds")
+        bounds = f"is expected to be from {smallest:g} to {largest:g} A"
+        raise InputError(f"current = {current!r} {bounds}, where the law of the magnet holds")
     force = StaticForce(hammer)
-    found = [_described(force, root, current) for root in _same_rest(force, current, within)]
+    resting = [_described(force, root, current) for root in _same_rest(force, current, within)]
     if force.rigid and hammer.backstop is not None:
         position = hammer.backstop.position
         inside = within is None or within[0] <= position <= within[1]
         if inside and force.free(position, current) < 0.0:
-            found.insert(0, Equilibrium(position, True, None, "backstop"))
-    return found
+            resting.insert(0, Equilibrium(position, True, None, "backstop"))
+    return resting
 
 
 def release_current(hammer: HammerLike) -> float:
@@ -170,7 +158,8 @@ def release_current(hammer: HammerLike) -> float:
         The hammer has no backstop or magnet, or no current within the range of the magnet's law does it.
     """
     if hammer.backstop is None or hammer.magnet is None:
-        raise InputError(f"{_named(hammer)} has no release current: it has no {_missing(hammer)}")
+        missing = "magnet" if hammer.magnet is None else "backstop"
+        raise InputError(f"{_named(hammer)} has no release current: it has no {missing}")
     force = StaticForce(hammer)
     position = hammer.backstop.position
 
@@ -180,16 +169,16 @@ def release_current(hammer: HammerLike) -> float:
     if net(0.0) >= 0.0:
         return 0.0
     low, high = _currents(hammer)
-    found: list[float] = []
+    lifting: list[float] = []
     for sign, limit in ((1.0, high), (-1.0, -low)):
         if limit > 0.0:
             grid = [sign * size for size in _away_from_zero(1e-9, limit)]
             crossed = [root.x for root in roots(net, sorted(grid))]
-            found += sorted(crossed, key=abs)[:1]
-    if not found:
-        told = f"none from {low:g} to {high:g} A lifts the armature"
-        raise InputError(f"{_named(hammer)} has no release current: {told}")
-    return min(found, key=abs)
+            lifting += sorted(crossed, key=abs)[:1]
+    if not lifting:
+        because = f"none from {low:g} to {high:g} A lifts the armature"
+        raise InputError(f"{_named(hammer)} has no release current: {because}")
+    return min(lifting, key=abs)
 
 
 def holding_margin(hammer: HammerLike, x: npt.ArrayLike) -> FloatArray:
@@ -300,15 +289,15 @@ def _roots(force: StaticForce, current: float, within: tuple[float, float] | Non
 
 def _same_rest(force: StaticForce, current: float, within: tuple[float, float] | None) -> list[Root]:
     """Find all roots, the one next to the surface of the backstop to the same bits as `rest_state`."""
-    found = _roots(force, current, within)
+    crossings = _roots(force, current, within)
     backstop = force.hammer.backstop
     if backstop is None or force.rigid or not force.free(backstop.position, current) < 0.0:
-        return found
+        return crossings
     rest = _compressed(force, backstop.position, current)
     if rest is None:
-        return found
+        return crossings
     same = 1e-9 * (backstop.position - rest) + 4.0 * math.ulp(rest)
-    return [replace(root, x=rest) if abs(root.x - rest) <= same else root for root in found]
+    return [replace(root, x=rest) if abs(root.x - rest) <= same else root for root in crossings]
 
 
 def _grid(force: StaticForce, low: float, high: float) -> list[float]:
@@ -338,7 +327,3 @@ def _currents(hammer: HammerLike) -> tuple[float, float]:
 
 def _named(hammer: HammerLike) -> str:
     return f"the hammer {hammer.name!r}"
-
-
-def _missing(hammer: HammerLike) -> str:
-    return "magnet" if hammer.magnet is None else "backstop"

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import import_module
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
 from printhammer.support.constants import (
     STATUSES,
@@ -102,21 +103,9 @@ def read_document(text: str, where: str) -> dict[str, Any]:
 
 
 def build(document: Mapping[str, Any], where: str, folder: Path) -> Contents:
-    """Build and check the contents of a hammer file.
+    """Build and check the contents of a hammer file, parts and constants in SI, from its TOML document.
 
-    Parameters
-    ----------
-    document : mapping
-        The TOML document.
-    where : str
-        What to name in a message, usually the file.
-    folder : Path
-        Where a force table or a sampled waveform lies.
-
-    Returns
-    -------
-    Contents
-        Parts and constants in SI.
+    Messages begin with `where`, usually the file; `folder` is where a force table or a sampled waveform lies.
 
     Raises
     ------
@@ -124,10 +113,8 @@ def build(document: Mapping[str, Any], where: str, folder: Path) -> Contents:
         A key is unknown or missing, a value is of the wrong kind, dimension or range, or positions are out of
         order.
     """
-    try:
+    with located(where):
         return _build(document, folder)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def model_of(section: str, kind: str) -> type[BaseModel]:
@@ -157,7 +144,11 @@ def file_options(model: type[BaseModel]) -> dict[str, Any]:
 
 def _build(document: Mapping[str, Any], folder: Path) -> Contents:
     _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS), "")
-    _check_format(document)
+    if "format" not in document:
+        raise InputError(f"format is missing, expected format = {FORMAT}")
+    version = document["format"]
+    if not isinstance(version, int) or isinstance(version, bool) or version != FORMAT:
+        raise InputError(f"format = {shown(version)}: expected {FORMAT}")
     texts: dict[str, str] = {}
     for name in TEXTS:
         texts[name] = document.get(name, "")
@@ -187,14 +178,6 @@ def _build(document: Mapping[str, Any], folder: Path) -> Contents:
     )
     _check_order(contents)
     return contents
-
-
-def _check_format(document: Mapping[str, Any]) -> None:
-    if "format" not in document:
-        raise InputError(f"format is missing, expected format = {FORMAT}")
-    given = document["format"]
-    if not isinstance(given, int) or isinstance(given, bool) or given != FORMAT:
-        raise InputError(f"format = {shown(given)}: expected {FORMAT}")
 
 
 def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
@@ -243,33 +226,31 @@ def _read(
         raise InputError(sentence(error, model, prefix, written)) from None
 
 
-def _constant(key: str, given: Any, note: Quantity) -> Constant:
+def _constant(key: str, written: Any, note: Quantity) -> Constant:
     from printhammer.units import describe, to_si
 
-    if not isinstance(given, Mapping):
+    if not isinstance(written, Mapping):
         raise InputError(
-            f"{key} = {shown(given)}: expected {describe(note.si)} as "
+            f"{key} = {shown(written)}: expected {describe(note.si)} as "
             '{ value = ..., unit = "...", status = "...", source = "..." }'
         )
-    _only(given, CONSTANT_KEYS, f"{key}.")
-    value = given.get("value")
+    _only(written, CONSTANT_KEYS, f"{key}.")
+    value = written.get("value")
     for name in CONSTANT_KEYS:
-        if name not in given:
+        if name not in written:
             what = f"the constant {key} = {shown(value)}" if name != "value" else f"the constant {key}"
             raise InputError(f"{what} has no {name}, expected {describe(note.si)} with {_WANTED[name]}")
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:
         raise InputError(f"{key} = {shown(value)}: expected a finite number")
-    texts = {name: given[name] for name in CONSTANT_KEYS[1:]}
+    texts = {name: written[name] for name in CONSTANT_KEYS[1:]}
     for name, text in texts.items():
         if not isinstance(text, str) or not text.strip():
             raise InputError(f"{key}.{name} = {shown(text)}: expected {_WANTED[name]}")
     if texts["status"] not in STATUSES:
         raise InputError(f"{key}.status = {shown(texts['status'])}: expected one of {', '.join(STATUSES)}")
     si_unit = si_unit_of(note, texts["unit"])
-    try:
+    with located(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}"):
         si = to_si(value, texts["unit"], si_unit)
-    except InputError as error:
-        raise InputError(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}: {error}") from None
     return Constant(
         key=key, value=value, **texts, si=si, meaning=note.meaning, symbol=note.symbol, si_unit=si_unit
     )
@@ -285,17 +266,13 @@ _WANTED: Final = {
 
 def si_unit_of(note: Quantity, unit: str) -> str:
     """Return the SI unit that goes with a unit, of a constant that may have several dimensions."""
-    return next((other for other in note.also if _fits(unit, other)), note.si)
-
-
-def _fits(unit: str, si_unit: str) -> bool:
     from printhammer.units import to_si
 
-    try:
-        to_si(1.0, unit, si_unit)
-    except InputError:
-        return False
-    return True
+    for other in note.also:
+        with suppress(InputError):
+            to_si(1.0, unit, other)
+            return other
+    return note.si
 
 
 def _check_order(contents: Contents) -> None:

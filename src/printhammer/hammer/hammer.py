@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart
@@ -46,11 +46,6 @@ def load(name_or_path: str | Path) -> Hammer:
     ----------
     name_or_path : str or Path
         Name of a shipped hammer, such as "hendriks-1983", or a path to a hammer file.
-
-    Returns
-    -------
-    Hammer
-        The hammer.
 
     Raises
     ------
@@ -102,11 +97,6 @@ class Hammer:
         folder : path, optional
             Where a force table or a sampled waveform lies; the working directory by default.
 
-        Returns
-        -------
-        Hammer
-            The hammer.
-
         Raises
         ------
         InputError
@@ -138,11 +128,6 @@ class Hammer:
             Of all constants.
         **parts
             `magnet`, `spring`, `pack`, `backstop`, `waveform`, `platen`, `coil`, each as `replace` takes it.
-
-        Returns
-        -------
-        Hammer
-            The hammer.
 
         Raises
         ------
@@ -249,17 +234,17 @@ class Hammer:
         Names, notes, units, sources, statuses, comments and file names do not enter; an option or constant at
         its default counts as left out.
         """
-        found: dict[str, Any] = {"mass": self.mass.hex()}
+        content: dict[str, Any] = {"mass": self.mass.hex()}
         if self.platen is not None:
-            found["platen"] = self.platen.hex()
+            content["platen"] = self.platen.hex()
         if self.coil_resistance is not None:
-            found["coil.resistance"] = self.coil_resistance.hex()
+            content["coil.resistance"] = self.coil_resistance.hex()
         models: dict[str, tuple[str, Any]] = {role: (part.law, part) for role, part in self.parts.items()}
         if self.waveform is not None:
             models["waveform"] = (self.waveform.shape, self.waveform)
         for section, (kind, model) in models.items():
-            found[section] = {"": kind, **_physics(model)}
-        text = json.dumps(found, sort_keys=True, separators=(",", ":"))
+            content[section] = {"": kind, **_physics(model)}
+        text = json.dumps(content, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
     def replace(
@@ -270,7 +255,7 @@ class Hammer:
         status: str = "assumed",
         source: str = REPLACED,
     ) -> Hammer:
-        """Return a hammer with constants, options or whole parts replaced.
+        """Return a new hammer with constants, options or whole parts replaced; this one stays as it is.
 
         Parameters
         ----------
@@ -283,11 +268,6 @@ class Hammer:
         status, source : str, optional
             Of the constants set.
 
-        Returns
-        -------
-        Hammer
-            A new hammer; this one stays as it is.
-
         Raises
         ------
         InputError
@@ -296,13 +276,11 @@ class Hammer:
         wanted = {key: value} if isinstance(key, str) else dict(key)
         document = dict(self._document)
         edits: list[Edit] = []
-        try:
-            for name, given in wanted.items():
-                edit = edit_of(document, name, given, status, source)
+        with located(self._where):
+            for name, entry in wanted.items():
+                edit = edit_of(document, name, entry, status, source)
                 document = changed(document, [edit])
                 edits.append(edit)
-        except InputError as error:
-            raise InputError(f"{self._where}: {error}") from None
         contents = build(document, self._where, self._folder)
         return Hammer(contents, document, self._text, (*self._edits, *edits), self._where, self._folder)
 
@@ -312,11 +290,6 @@ class Hammer:
 
     def save(self, path: str | Path) -> None:
         """Write the hammer file, and beside it the tables that it names.
-
-        Parameters
-        ----------
-        path : path
-            File to write.
 
         Raises
         ------
@@ -338,17 +311,17 @@ class Hammer:
 
     def _tables(self, target: Path) -> dict[str, bytes]:
         """Return the files named in the hammer file that are missing beside `target`."""
-        found: dict[str, bytes] = {}
+        missing: dict[str, bytes] = {}
         for model in (self.magnet, self.waveform):
             name = getattr(model, "file", None)
             if not name or Path(name).is_absolute():
                 continue
             data, there = (self._folder / name).read_bytes(), target.parent / name
             if not there.exists():
-                found[name] = data
+                missing[name] = data
             elif there.read_bytes() != data:
                 raise InputError(f"{there}: the file is another table than that of {self.name}")
-        return found
+        return missing
 
     def check(self) -> None:
         """Refuse a hammer that does not rest at its backstop.
@@ -362,19 +335,14 @@ class Hammer:
         from printhammer.hammer.equilibrium import rest_state
 
         if self.magnet is not None and self.backstop is not None:
-            try:
+            with located(self._where):
                 rest_state(self)
-            except InputError as error:
-                raise InputError(f"{self._where}: {error}") from None
 
     def warnings(self) -> list[str]:
         """Say what is odd about a hammer that can still be simulated.
 
-        Returns
-        -------
-        list of str
-            A sentence for each interval between backstop and platen in which the net force of magnet and
-            spring at zero current is positive.
+        A sentence for each interval between backstop and platen in which the net force of magnet and spring
+        at zero current is positive.
 
         Raises
         ------
@@ -385,14 +353,14 @@ class Hammer:
         from printhammer.units import from_si
 
         self.check()
-        told = []
+        sentences = []
         for ends in positive_intervals(self):
             low, high = (from_si(end, "m", "um") for end in ends)
             where = f"from {low:.4g} to {high:.4g} um"
-            told.append(
+            sentences.append(
                 f"the net force at zero current is positive {where}: the armature may never return from there"
             )
-        return told
+        return sentences
 
     @staticmethod
     def schema() -> dict[str, Any]:
@@ -417,18 +385,15 @@ class Hammer:
 def _physics(model: Any) -> dict[str, Any]:
     """Return what of a part or waveform enters the fingerprint."""
     kind: type[BaseModel] = type(model)
-    found: dict[str, Any] = {}
+    content: dict[str, Any] = {}
     for name in (*quantities(kind), *(set(file_options(kind)) - {"file"}), "quantity"):
         value = getattr(model, name, None)
-        if value is not None and value != _default(kind, name):
-            found[name] = value.hex() if isinstance(value, float) else value
+        entry = kind.model_fields.get(name)
+        if value is not None and (entry is None or value != entry.default):
+            content[name] = value.hex() if isinstance(value, float) else value
     for name, numbers in model.content().items():
-        found[name] = _hex(numbers)
-    return found
-
-
-def _default(kind: type[BaseModel], name: str) -> Any:
-    return kind.model_fields[name].default if name in kind.model_fields else None
+        content[name] = _hex(numbers)
+    return content
 
 
 def _hex(numbers: Any) -> Any:

@@ -25,13 +25,10 @@ _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON schema (draft 2020-12) of hammer files.
+    """Return the JSON schema (draft 2020-12) of hammer files: what a file may hold.
 
-    Returns
-    -------
-    dict
-        What a file may hold. Dimensions, the order of positions and constants that stand in the place of
-        others are left to `printhammer hammer check`.
+    Dimensions, the order of positions and constants that stand in the place of others are left to
+    `printhammer hammer check`.
     """
     properties: dict[str, Any] = {"format": {"const": FORMAT, "description": "version of the file format"}}
     properties |= {name: {"type": "string", "description": meaning} for name, meaning in TEXTS.items()}

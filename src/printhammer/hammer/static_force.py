@@ -57,30 +57,25 @@ class StaticForce:
     """The force of the parts on an armature at rest at x, and where it is defined.
 
     Magnet, spring and the elastic force of the backstop are functions of x; the pack acts with the loading
-    branch at rest, as when fresh paper is slowly pressed.
-
-    Attributes
-    ----------
-    rigid : bool
-        Whether the backstop is rigid: positions below it do not exist.
-    limits : tuple of float
-        Where the law of the magnet holds and a rigid backstop lets the armature be, m.
-    low, high : float
-        Where equilibria are sought by default, m: from the lower limit of the magnet's law, or the rigid
-        backstop, up to the platen, or to where the pack ends, or to the upper limit of the magnet's law.
+    branch at rest, as when fresh paper is slowly pressed. Below a `rigid` backstop there are no positions. In
+    the `limits`, m, the law of the magnet holds and a rigid backstop lets the armature be; between `low` and
+    `high`, m, equilibria are sought by default: from the lower limit, at most 1 m off the origin, up to the
+    platen, or to where the pack ends, or to the upper limit.
     """
 
     def __init__(self, hammer: HammerLike) -> None:
         self.hammer = hammer
-        self._magnet, self._magnet_constants = _law(hammer, hammer.magnet, "magnet_force")
-        self._spring, self._spring_constants = _law(hammer, hammer.spring, "spring_force")
-        self._pack, self._pack_constants = _law(hammer, hammer.pack, "pack_loading")
-        self._backstop, self._backstop_constants = _law(hammer, hammer.backstop, "backstop_elastic")
+        self._magnet, self._magnet_constants = law_of(hammer, hammer.magnet, "magnet_force")
+        self._spring, self._spring_constants = law_of(hammer, hammer.spring, "spring_force")
+        self._pack, self._pack_constants = law_of(hammer, hammer.pack, "pack_loading")
+        self._backstop, self._backstop_constants = law_of(hammer, hammer.backstop, "backstop_elastic")
         self._position = hammer.backstop.position if hammer.backstop is not None else -math.inf
         self.front = hammer.pack.front if hammer.pack is not None else math.inf
         self.rigid = hammer.backstop is not None and bool(_flag(hammer.backstop, "RIGID"))
         self.memory = hammer.pack is not None and bool(_flag(hammer.pack, "MEMORY"))
-        self.limits = self._limits()
+        low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
+        self._domain = low, high
+        self.limits = (max(low, self._position) if self.rigid else low), high
         self.low, self.high = self._reach()
         self.end = self.high
         if hammer.platen is None and hammer.pack is not None:
@@ -118,8 +113,7 @@ class StaticForce:
         Each part is differentiated by itself, within its contact or range; the backstop with respect to
         sqrt(depth), in which its laws are smooth.
         """
-        low, high = self.hammer.magnet.domain if self.hammer.magnet is not None else (-math.inf, math.inf)
-        room = min(x - low, high - x)
+        room = min(x - self._domain[0], self._domain[1] - x)
         step = 0.05 * room if math.isfinite(room) else 1e-3
         total = derivative(self.spring, x, 1e-3)
         if self.hammer.magnet is not None:
@@ -136,11 +130,6 @@ class StaticForce:
         """Places about which forces vary on short scales, m."""
         places = [self.low, self.high, self._position, self.front, self.hammer.origin, 0.0]
         return sorted({place for place in places if self.low <= place <= self.high})
-
-    def _limits(self) -> tuple[float, float]:
-        magnet = self.hammer.magnet
-        low, high = magnet.domain if magnet is not None else (-math.inf, math.inf)
-        return (max(low, self._position) if self.rigid else low), high
 
     def _reach(self) -> tuple[float, float]:
         hammer = self.hammer
@@ -177,7 +166,9 @@ def derivative(function: Callable[[float], float], x: float, step: float) -> flo
     return best
 
 
-def _law(hammer: HammerLike, part: Part | None, name: str) -> tuple[Callable[..., float], tuple[float, ...]]:
+def law_of(
+    hammer: HammerLike, part: Part | None, name: str
+) -> tuple[Callable[..., float], tuple[float, ...]]:
     """Return a law function of a part and its packed constants."""
     standard: Callable[..., float] = getattr(absent, name)
     if part is None:

@@ -93,8 +93,8 @@ class Solution:
     @property
     def weights(self) -> FloatArray:
         """Proportional to 1 / variance, the largest 1, shape (m,)."""
-        found: FloatArray = self.variance.min() / self.variance
-        return found
+        weights: FloatArray = self.variance.min() / self.variance
+        return weights
 
 
 def solve(law: Law, data: FloatArray, start: FloatArray, *, robust: bool = True) -> Solution:
@@ -113,7 +113,7 @@ def solve(law: Law, data: FloatArray, start: FloatArray, *, robust: bool = True)
             p = _least_squares(law, data, np.full(m, scale * scale), used, p, loss="soft_l1")
     exact = _is_exact(data, data - law.value(p))
     variance = np.ones(m)
-    seen: set[bytes] = set()
+    tried: set[bytes] = set()
     for step in range(_ROUNDS):
         residuals = data - law.value(p)
         exact = _is_exact(data, residuals[used])
@@ -122,19 +122,19 @@ def solve(law: Law, data: FloatArray, start: FloatArray, *, robust: bool = True)
         else:
             variance = variance_of(law.spread(p), residuals, used, n, clipped=robust and step == 0)
         if robust and not exact:
-            found = _inside(law.jacobian(p), residuals, variance, used)
-            if found.tobytes() in seen:
+            inside = _inside(law.jacobian(p), residuals, variance, used)
+            if inside.tobytes() in tried:
                 # Where rows come and go by turns they stay out.
-                found &= used
-            seen.add(found.tobytes())
+                inside &= used
+            tried.add(inside.tobytes())
         else:
-            found = used
-        if found.sum() <= n:
-            found = used
-        after = _least_squares(law, data, variance, found, p)
-        same = bool(np.array_equal(found, used))
+            inside = used
+        if inside.sum() <= n:
+            inside = used
+        after = _least_squares(law, data, variance, inside, p)
+        same = bool(np.array_equal(inside, used))
         moved = bool(np.any(np.abs(after - p) > 1e-9 * np.abs(after)))
-        p, used = after, found
+        p, used = after, inside
         if step > 0 and same and (exact or not moved):
             break
     return _solution(law, data, p, variance, used, exact=exact)
@@ -204,8 +204,8 @@ def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArr
 
 def leverage(rows: FloatArray) -> FloatArray:
     """Return how much each row determines its own fitted value, 0 to 1, shape (m,)."""
-    found: FloatArray = np.sum(_basis(rows) ** 2, axis=1)
-    return found
+    shares: FloatArray = np.sum(_basis(rows) ** 2, axis=1)
+    return shares
 
 
 def _basis(rows: FloatArray) -> FloatArray:
@@ -216,9 +216,9 @@ def _basis(rows: FloatArray) -> FloatArray:
 
 def _lengths(rows: FloatArray) -> FloatArray:
     """Return the lengths of the columns; 1 for a column of zeros."""
-    found: FloatArray = np.linalg.norm(rows, axis=0)
-    found[found == 0.0] = 1.0
-    return found
+    lengths: FloatArray = np.linalg.norm(rows, axis=0)
+    lengths[lengths == 0.0] = 1.0
+    return lengths
 
 
 def _least_squares(
@@ -239,7 +239,7 @@ def _least_squares(
     def jacobian(p: FloatArray) -> FloatArray:
         return law.jacobian(p)[used] / root[:, None]
 
-    found = least_squares(
+    solution = least_squares(
         residuals,
         start,
         jac=jacobian,
@@ -251,7 +251,7 @@ def _least_squares(
         gtol=1e-15,
         max_nfev=200,
     )
-    return np.asarray(found.x, dtype=np.float64)
+    return np.asarray(solution.x, dtype=np.float64)
 
 
 def _is_exact(data: FloatArray, residuals: FloatArray) -> bool:
@@ -266,28 +266,12 @@ def variance_of(
     *,
     clipped: bool = False,
 ) -> FloatArray:
-    """Return the variance of each row by maximum likelihood of its components.
+    """Return the variance of each row, shape (m,), by maximum likelihood of its components.
 
     Each step multiplies every component by the root of the ratio of what the residuals ask for to what they
-    have; a component that is not needed goes to zero.
-
-    Parameters
-    ----------
-    spread : array, shape (m, q)
-        How much each component has in each row.
-    residuals : array, shape (m,)
-        Data less law.
-    used : array of bool, shape (m,)
-        Rows that count.
-    parameters : int
-        Number of parameters of the law, which take up as many residuals.
-    clipped : bool, optional
-        Whether large residuals count as smaller ones, while the outliers are not known.
-
-    Returns
-    -------
-    array, shape (m,)
-        Also of the rows that do not count.
+    have; a component that is not needed goes to zero. Each component has its `spread`, shape (m, q), in each
+    row; only the rows used count, and the parameters of the law take up as many residuals. Where the outliers
+    are not known yet, large residuals are clipped.
     """
     from scipy.stats import chi2
 
@@ -312,8 +296,8 @@ def variance_of(
             break
     # Weights that rest on a handful of residuals would follow their noise: no row counts 1e4 times another.
     v = kept @ theta
-    found: FloatArray = np.maximum(v, 1e-4 * v.max())
-    return found
+    variance: FloatArray = np.maximum(v, 1e-4 * v.max())
+    return variance
 
 
 def _inside(

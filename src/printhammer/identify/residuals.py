@@ -76,7 +76,7 @@ def memory_factor(residuals: FloatArray) -> float:
         error *= 1.0 - reflection * reflection
         if error <= 0.0:
             break
-        told = count * np.log(error) + order * np.log(count)
-        if told < best:
-            best, factor = told, error / (1.0 - a.sum()) ** 2 / r[0]
+        criterion = count * np.log(error) + order * np.log(count)
+        if criterion < best:
+            best, factor = criterion, error / (1.0 - a.sum()) ** 2 / r[0]
     return float(factor)

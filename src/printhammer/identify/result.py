@@ -26,13 +26,19 @@ CONFIDENCE: Final = 0.95
 LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
 """Laws whose constants are fitted, by role."""
 
-_REPLACED: Final = {
-    # A stiffness found takes the place of the bodies, a damping that of the rebound.
-    "backstop.stiffness": (
-        *("radius1", "radius2", "youngs_modulus1", "youngs_modulus2", "poisson_ratio1", "poisson_ratio2"),
-    ),
-    "backstop.damping": ("restitution", "restitution_speed"),
+_BODIES: Final = (
+    "radius1",
+    "radius2",
+    "youngs_modulus1",
+    "youngs_modulus2",
+    "poisson_ratio1",
+    "poisson_ratio2",
+)
+REPLACED: Final = {
+    "backstop.stiffness": [f"backstop.{name}" for name in _BODIES],
+    "backstop.damping": ["backstop.restitution", "backstop.restitution_speed"],
 }
+"""Constants from which another one follows, and which go where that one is given itself, by its key."""
 
 
 @dataclass(frozen=True)
@@ -78,20 +84,7 @@ class FittedConstant:
         in_file: bool = True,
         how: str = "",
     ) -> Self:
-        """Make a constant with the 95 % interval of Student's t.
-
-        Parameters
-        ----------
-        key, value, standard_error, unit, in_file, how
-            As the attributes.
-        degrees_of_freedom : float
-            Of the estimate of the noise.
-
-        Returns
-        -------
-        FittedConstant
-            The constant.
-        """
+        """Make a constant with the 95 % interval of Student's t, of the freedom of the estimated noise."""
         half = student(degrees_of_freedom) * float(standard_error)
         ends = float(value) - half, float(value) + half
         return cls(key, float(value), float(standard_error), ends, unit, in_file, how)
@@ -191,19 +184,19 @@ class Fit(Result):
             ("abscissa", "data", "fitted", "residuals"), (self.axes[0], *[self.axes[1]] * 3), strict=True
         ):
             note, values = entries[name]
-            told = meaning if name in ("abscissa", "data") else f"{meaning}, {note.meaning}"
-            entries[name] = replace(note, unit=unit, meaning=told), values
+            described = meaning if name in ("abscissa", "data") else f"{meaning}, {note.meaning}"
+            entries[name] = replace(note, unit=unit, meaning=described), values
         if self.lines.size:
             entries["line"] = Column("1", "line of the file", ("datum",)), self.lines
         entries["other_key"] = replace(entries["key"][0], dims=("other_key",)), self.keys
-        found = list(self.constants.values())
+        constants = list(self.constants.values())
         for name, unit, meaning, values in (
-            ("value", "SI", "value in its own unit", [one.value for one in found]),
-            ("standard_error", "SI", "standard error", [one.standard_error for one in found]),
-            ("low", "SI", "lower end of the 95 % interval", [one.interval[0] for one in found]),
-            ("high", "SI", "upper end of the 95 % interval", [one.interval[1] for one in found]),
-            ("unit", "", "SI unit", [one.unit for one in found]),
-            ("how", "", "how it was found if not by the fit", [one.how for one in found]),
+            ("value", "SI", "value in its own unit", [each.value for each in constants]),
+            ("standard_error", "SI", "standard error", [each.standard_error for each in constants]),
+            ("low", "SI", "lower end of the 95 % interval", [each.interval[0] for each in constants]),
+            ("high", "SI", "upper end of the 95 % interval", [each.interval[1] for each in constants]),
+            ("unit", "", "SI unit", [each.unit for each in constants]),
+            ("how", "", "how it was found if not by the fit", [each.how for each in constants]),
         ):
             entries[name] = Column(unit, meaning, ("constant",)), values
         key = Column("", "dotted key of the hammer file, or another name", ("constant",), "coordinate")
@@ -217,8 +210,8 @@ class Fit(Result):
         """Correlation of the constants in `keys`, shape (n, n); 0 where a standard error is 0."""
         errors = np.sqrt(np.diag(self.covariance))
         safe = np.where(errors > 0.0, errors, 1.0)
-        found: FloatArray = self.covariance / np.outer(safe, safe)
-        return found
+        correlation: FloatArray = self.covariance / np.outer(safe, safe)
+        return correlation
 
     @property
     def for_file(self) -> dict[str, dict[str, str | float]]:
@@ -250,12 +243,12 @@ class Fit(Result):
         remarks += self.indistinct
         if self.rejected:
             remarks.append(f"the data reject the law: {self.rejected}")
-        found = self.for_file
-        sections = {key.rpartition(".")[0]: None for key in found}
+        constants = self.for_file
+        sections = {key.rpartition(".")[0]: None for key in constants}
         laws = [(f"{section}.law", LAWS[section]) for section in sections if section in LAWS]
         comments = "".join(f"# {' '.join(remark.split())}\n" for remark in remarks)
         # Tables come last, or the constants at the top would become theirs.
-        return changed_text(comments, sorted([*laws, *found.items()], key=lambda edit: "." in edit[0]))
+        return changed_text(comments, sorted([*laws, *constants.items()], key=lambda edit: "." in edit[0]))
 
     def covariance_table(self) -> str:
         """Return the covariance as CSV: a row and a column for each constant, SI, units in comments."""
@@ -273,8 +266,8 @@ class Fit(Result):
         InputError
             The hammer has another law for the part, or takes as different what the fit took as known.
         """
-        found = self.for_file
-        sections = {key.rpartition(".")[0] for key in found} & set(LAWS)
+        constants = self.for_file
+        sections = {key.rpartition(".")[0] for key in constants} & set(LAWS)
         for section in sorted(sections):
             part = hammer.parts.get(section)
             if part is None or part.law != LAWS[section]:
@@ -282,9 +275,9 @@ class Fit(Result):
                 raise InputError(f"{hammer.path}: the {section} {law}, expected the law {LAWS[section]!r}")
         for key, text in self.given.items():
             _agrees(hammer, key, text)
-        gone = [f"{key.rpartition('.')[0]}.{name}" for key in found for name in _REPLACED.get(key, ())]
+        gone = [other for key in constants for other in REPLACED.get(key, ())]
         taken = {key: None for key in gone if key in hammer.constants}
-        return hammer.replace({**taken, **found})
+        return hammer.replace({**taken, **constants})
 
     @property
     def report(self) -> list[str]:
@@ -313,9 +306,9 @@ class Fit(Result):
     def outlier_lines(self, most: int = 20) -> str:
         """Say which rows were left out; of several files, also to which series each belongs."""
         rows = [int(row) for row in np.flatnonzero(self.outliers)]
-        told = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
+        count = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
         if not len(self.lines):
-            return told
+            return count
         listed = [str(self.lines[row]) for row in rows[:most]]
         if len(self.source) > 1:
             listed = [
@@ -323,7 +316,7 @@ class Fit(Result):
                 for line, row in zip(listed, rows, strict=False)
             ]
         more = ", …" if len(rows) > most else ""
-        return f"{told}: line{'s' if len(rows) > 1 else ''} {', '.join(listed)}{more}"
+        return f"{count}: line{'s' if len(rows) > 1 else ''} {', '.join(listed)}{more}"
 
 
 def student(degrees_of_freedom: float) -> float:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import describe, to_si
 
@@ -31,7 +31,7 @@ _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Readings:
     """Columns of a file in the order of its rows.
 
     Attributes
@@ -64,8 +64,8 @@ def read_table(
     *,
     optional: Mapping[str, str] = _NONE,
     text: Mapping[str, tuple[str, ...]] = _NO_WORDS,
-) -> Table:
-    """Read a table.
+) -> Readings:
+    """Read a table, numbers in SI; a column that was left out is not in it.
 
     Parameters
     ----------
@@ -77,11 +77,6 @@ def read_table(
         Columns of numbers that may be left out.
     text : mapping of str to tuple of str, optional
         Columns of words, which may be left out: name to the words allowed, in lower case. They have no unit.
-
-    Returns
-    -------
-    Table
-        Numbers in SI; a column that was left out is not in it.
 
     Raises
     ------
@@ -95,7 +90,9 @@ def read_table(
         raise InputError(f"{source}: there is no such file, expected a table of measurements")
     sheet = read_sheet(source, "the table")
     lines = sheet.rows
-    wanted = _wanted(columns, optional, text)
+    must = ",".join(f"{name} [{si}]" for name, si in columns.items())
+    may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
+    wanted = f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")
     if not lines:
         raise InputError(f"{source}: the file has no heading, expected {wanted}")
     names, units = _heading(source, lines[0], {**columns, **optional}, text, wanted)
@@ -118,7 +115,7 @@ def read_table(
             else:
                 values[name][row] = _number(cell, *units[name], where)
     rows = np.array([number for number, _cells in lines[1:]], dtype=np.int64)
-    return Table(source, values, words, rows, sheet.comments)
+    return Readings(source, values, words, rows, sheet.comments)
 
 
 def _heading(
@@ -149,10 +146,8 @@ def _heading(
             raise InputError(
                 f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}"
             )
-        try:
+        with located(f"{where}: heading {cell.strip()!r}"):
             to_si(1.0, unit, numbers[name])
-        except InputError as error:
-            raise InputError(f"{where}: heading {cell.strip()!r}: {error}") from None
         units[name] = unit, numbers[name]
     return names, units
 
@@ -166,10 +161,8 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
         raise InputError(
             f"{where}: {cell.strip()!r} is expected to be a finite number, {describe(si)} in {unit}"
         )
-    try:
+    with located(where):
         return to_si(number, unit, si)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def _word(cell: str, allowed: Sequence[str], where: str) -> str:
@@ -177,12 +170,3 @@ def _word(cell: str, allowed: Sequence[str], where: str) -> str:
     if word not in allowed:
         raise InputError(f"{where}: {cell.strip()!r}, expected {' or '.join(allowed)}")
     return word
-
-
-def _wanted(
-    columns: Mapping[str, str], optional: Mapping[str, str], text: Mapping[str, tuple[str, ...]]
-) -> str:
-    """Return the phrase that says which columns are expected."""
-    must = ",".join(f"{name} [{si}]" for name, si in columns.items())
-    may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
-    return f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")

@@ -16,9 +16,22 @@ backstop  ``RIGID``, ``backstop_rebound(c, v_in)``, or with w = sqrt(b - x) ``ba
           ``backstop_viscous(c, w, v)``, ``backstop_energy(c, w)``, ``backstop_switch(c, w, v)``
 ========  ===================================================================================================
 
-Minus the slope of an energy is the force, of the magnet at zero current. What a module leaves out comes from
-`printhammer.parts.absent`, the part that is not there. A ``..._switch`` function changes sign where a law has
-a kink inside a contact (an option that forbids a surface to pull), so that an integrator can locate it.
+============  ===============================================================================================
+argument      what it is
+============  ===============================================================================================
+``c``         packed constants, a float64 array, in the order that the module states
+``x``, ``v``  displacement, m, and velocity, m/s
+``current``   current of the coil, A
+``peak``      displacement of the latest local maximum inside this contact of the pack, m
+``q``         what ``pack_memory`` returned of it
+``w``         sqrt(b - x), root of the compression of the backstop, m^0.5
+``v_in``      velocity before an impact, m/s, negative
+============  ===============================================================================================
+
+Forces are in N, positive toward the paper. Minus the slope of an energy, J, is the force, of the magnet at
+zero current. What a module leaves out comes from `printhammer.parts.absent`, the part that is not there. A
+``..._switch`` function changes sign where a law has a kink inside a contact (an option that forbids a surface
+to pull), so that an integrator can locate it.
 """
 
 from importlib import import_module

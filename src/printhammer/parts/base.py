@@ -24,12 +24,7 @@ ROLES: tuple[str, ...] = ("magnet", "spring", "pack", "backstop")
 class Part(BaseModel):
     """A replaceable part of a hammer: constants in SI, and the module that holds its law.
 
-    Attributes
-    ----------
-    role : str
-        "magnet", "spring", "pack" or "backstop".
-    law : str
-        Name of the law in hammer files.
+    Its `role` is "magnet", "spring", "pack" or "backstop", `law` the name of the law in hammer files.
 
     Raises
     ------
@@ -54,17 +49,9 @@ class Part(BaseModel):
         __init__.__pydantic_base_init__ = True
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the numbers that the law functions of this part read from `c`.
+        """Return the numbers, SI, that the law functions read from `c`, in the order that the module states.
 
-        Parameters
-        ----------
-        origin : float
-            Position of the backstop, b of equation (4), or 0 without a backstop; m.
-
-        Returns
-        -------
-        tuple of float
-            In SI, in the order that the part's module states.
+        The origin is the position of the backstop, b of equation (4), or 0 without a backstop; m.
         """
         raise NotImplementedError
 
@@ -123,17 +110,7 @@ _P = TypeVar("_P", bound=type[Part])
 
 
 def register(part: _P) -> _P:
-    """Enter a part class in the registry, as a class decorator.
-
-    Parameters
-    ----------
-    part : type of Part
-        Class with `role` and `law`; its module holds the law functions.
-
-    Returns
-    -------
-    type of Part
-        The class itself.
+    """Enter a part class, with role and law, in the registry, as a class decorator.
 
     Raises
     ------

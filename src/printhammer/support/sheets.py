@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from printhammer.errors import InputError
+from printhammer.support.texts import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,24 +42,7 @@ def read_sheet(path: Path, what: str, *, gaps: bool = False) -> Sheet:
     InputError
         The file cannot be read, is not UTF-8, or holds no comma-separated values.
     """
-    return sheet_of(read_text(path, what, "utf-8-sig"), str(path), gaps=gaps)
-
-
-def read_text(path: Path, what: str, encoding: str = "utf-8") -> str:
-    """Read a text file; `what` names it in messages.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or is not UTF-8.
-    """
-    try:
-        return path.read_text(encoding)
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: {what} is expected to be UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: {what} cannot be read ({reason})") from None
+    return sheet_of(read_text(path, what, encoding="utf-8-sig"), str(path), gaps=gaps)
 
 
 def sheet_of(text: str, where: str, *, gaps: bool = False) -> Sheet:

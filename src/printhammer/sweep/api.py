@@ -85,18 +85,18 @@ def sweep(
             )
             done += len(plan.blocks.members(index))
 
-        def told(under_way: float) -> None:
+        def tell(under_way: float) -> None:
             if progress is not None:
                 progress(done + under_way, before, plan.members)
 
-        told(0.0)
+        tell(0.0)
         if client is None:
-            run_local(plan, todo, write, told, threads)
+            run_local(plan, todo, write, tell, threads)
         else:
             from printhammer.sweep.cluster import run_dask
 
-            run_dask(plan, todo, write, told, client)
-        told(0.0)
+            run_dask(plan, todo, write, tell, client)
+        tell(0.0)
         store.finish(_now())
     return open_store(out)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from types import MappingProxyType
@@ -88,17 +89,17 @@ def read_axis(
         The key names nothing, a value is none or out of bounds, a range is empty.
     """
     target, field, note = _resolved(table.key, where, hammer, own_waveform, named)
-    told = f"{where} ({table.key})"
+    here = f"{where} ({table.key})"
     geometric = table.spacing == "geometric"
-    values = _values(table, told, note.si, grid, geometric)
+    values = _values(table, here, note.si, grid, geometric)
     for value in values:
         if not _inside(value, note):
-            raise InputError(f"{told}: {value!r} {note.si} is out of bounds, expected {expected(note)}")
+            raise InputError(f"{here}: {value!r} {note.si} is out of bounds, expected {expected(note)}")
     if target == "drive" and field in COUNTS:
         if not grid:
-            raise InputError(f"{told}: a count cannot be drawn, expected an axis of a grid")
+            raise InputError(f"{here}: a count cannot be drawn, expected an axis of a grid")
         if not all(value.is_integer() for value in values):
-            raise InputError(f"{told}: expected whole numbers")
+            raise InputError(f"{here}: expected whole numbers")
     name = table.key.removeprefix("drive.").replace(".", "_").replace(" ", "_")
     return Axis(table.key, name, target, field, note, np.array(values), geometric)
 
@@ -120,14 +121,14 @@ def _resolved(
         if name.startswith("at.") and number.isascii() and number.isdigit():
             return "at", number, _FIRING
     if section == "waveforms":
-        one, _, constant = name.rpartition(".")
-        if (note := _constant_of(named.get(one), constant)) is not None:
+        own, _, constant = name.rpartition(".")
+        if (note := _constant_of(named.get(own), constant)) is not None:
             return "waveform", name, note
     elif section == "waveform" and own_waveform is not None:
         if (note := _constant_of(own_waveform, name)) is not None:
             return "waveform", name, note
-    elif (found := quantity_of(hammer, key)) is not None:
-        return "hammer", key, found
+    elif (note := quantity_of(hammer, key)) is not None:
+        return "hammer", key, note
     known = [*(f"drive.{name}" for name in DRIVE), "drive.at.0", *(f"state.{name}" for name in _STATE)]
     known += [f"waveforms.{name}.amplitude" for name in named]
     fired = own_waveform is None and not named
@@ -145,53 +146,49 @@ def _constant_of(waveform: object, name: str) -> Quantity | None:
     if not isinstance(waveform, Mapping) or not isinstance(shape, str) or shape not in kinds_of("waveform"):
         return None
     note = quantities(model_of("waveform", shape)).get(name)
-    return None if note is None else in_unit_of_drive(note, _own_unit(waveform.get(name), note))
-
-
-def _own_unit(given: object, note: Quantity) -> str:
-    """Return the unit of a constant of the drive's own waveform: what its first value is written in."""
+    if note is None:
+        return None
     for unit in note.also:
-        try:
-            read_quantity(given, unit, "")
-        except InputError:
-            continue
-        return unit
-    return note.si
+        # What its value in the table is written in.
+        with suppress(InputError):
+            read_quantity(waveform.get(name), unit, "")
+            return in_unit_of_drive(note, unit)
+    return in_unit_of_drive(note, note.si)
 
 
-def _values(table: AxisTable, told: str, si: str, grid: bool, geometric: bool) -> list[float]:
+def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -> list[float]:
     ends = (table.low, table.high)
     if table.values is not None:
         if not grid:
-            raise InputError(f"{told}: values are given, a Latin hypercube is expected to have low and high")
+            raise InputError(f"{here}: values are given, a Latin hypercube is expected to have low and high")
         if any(value is not None for value in (*ends, table.count)) or geometric:
-            raise InputError(f"{told}: values are given, expected no range beside them")
-        values = read_quantities(table.values, si, f"{told}.values")
+            raise InputError(f"{here}: values are given, expected no range beside them")
+        values = read_quantities(table.values, si, f"{here}.values")
         if len(set(values)) < len(values):
-            raise InputError(f"{told}.values: expected different values")
+            raise InputError(f"{here}.values: expected different values")
         return values
     for name, value in (("low", table.low), ("high", table.high), ("count", table.count if grid else 1)):
         if value is None:
-            raise InputError(f"{told}.{name} is missing, expected values, or low, high and count")
+            raise InputError(f"{here}.{name} is missing, expected values, or low, high and count")
     if not grid and table.count is not None:
-        raise InputError(f"{told}.count is given, a Latin hypercube is expected to have members instead")
+        raise InputError(f"{here}.count is given, a Latin hypercube is expected to have members instead")
     low, high = (
-        read_quantity(end, si, f"{told}.{name}") for end, name in zip(ends, ("low", "high"), strict=True)
+        read_quantity(end, si, f"{here}.{name}") for end, name in zip(ends, ("low", "high"), strict=True)
     )
     if low == high or not math.isfinite(high - low):
-        raise InputError(f"{told}: the range from {low!r} to {high!r} {si} is empty, expected two ends")
+        raise InputError(f"{here}: the range from {low!r} to {high!r} {si} is empty, expected two ends")
     if geometric and not (low > 0.0 and high > 0.0):
-        raise InputError(f"{told}: a geometric range is expected to lie above 0 {si}")
+        raise InputError(f"{here}: a geometric range is expected to lie above 0 {si}")
     if not grid:
         return [low, high]
     count = table.count or 1
     if count < 2:
-        raise InputError(f"{told}.count = {count}: expected at least 2 values of a range")
+        raise InputError(f"{here}.count = {count}: expected at least 2 values of a range")
     divide = np.geomspace if geometric else np.linspace
-    found = [float(value) for value in divide(low, high, count)]
-    if len(set(found)) < count:
-        raise InputError(f"{told}: the range is too narrow for {count} different values")
-    return found
+    grid_values = [float(value) for value in divide(low, high, count)]
+    if len(set(grid_values)) < count:
+        raise InputError(f"{here}: the range is too narrow for {count} different values")
+    return grid_values
 
 
 def _inside(value: float, note: Quantity) -> bool:

@@ -49,21 +49,15 @@ def run_dask(
     plan: Plan,
     todo: Sequence[Index],
     write: Callable[[Index, Results], None],
-    told: Callable[[float], None],
+    tell: Callable[[float], None],
     client: Any,
 ) -> None:
     """Do blocks of work on a cluster, and write each, here, when it is done.
 
     A task whose worker is killed is done again elsewhere by the scheduler. A task that the scheduler gives up
     because it has cost several workers is put aside until all others are done, then done alone on the
-    cluster, in ever smaller parts; a member that still kills its worker is recorded as lost.
-
-    Parameters
-    ----------
-    plan, todo, write, told
-        As for `run_local`.
-    client : distributed.Client
-        A client of the scheduler.
+    cluster, in ever smaller parts; a member that still kills its worker is recorded as lost. The arguments
+    are those of `run_local`, and a `distributed.Client` of the scheduler.
 
     Raises
     ------
@@ -73,9 +67,9 @@ def run_dask(
     """
     tasks = _Tasks(client, plan)
     try:
-        for index in tasks.side_by_side(todo, write, told):
+        for index in tasks.side_by_side(todo, write, tell):
             write(index, tasks.alone(plan.rows(plan.blocks.members(index))))
-            told(0.0)
+            tell(0.0)
     except _GoneError:
         raise InputError("the dask scheduler is gone, what is done is kept") from None
     finally:
@@ -94,7 +88,7 @@ class _Tasks:
         self._counted, self._count = -math.inf, 0
 
     def side_by_side(
-        self, todo: Sequence[Index], write: Callable[[Index, Results], None], told: Callable[[float], None]
+        self, todo: Sequence[Index], write: Callable[[Index, Results], None], tell: Callable[[float], None]
     ) -> list[Index]:
         """Do blocks side by side; return those that cost several workers."""
         left = deque(todo)
@@ -103,13 +97,13 @@ class _Tasks:
             while left and len(self._futures) < max(2, _TASKS_A_THREAD * self._threads()):
                 index = left.popleft()
                 self._submit(self._plan.rows(self._plan.blocks.members(index)), index)
-            if (found := self._next()) is not None:
-                index, results = found
+            if (finished := self._next()) is not None:
+                index, results = finished
                 if results is None:
                     suspects.append(index)
                 else:
                     write(index, results)
-            told(0.0)
+            tell(0.0)
         return suspects
 
     def alone(self, rows: FloatArray) -> Results:
@@ -117,10 +111,10 @@ class _Tasks:
         import numpy as np
 
         self._submit(rows, ())
-        while (found := self._next()) is None:
+        while (finished := self._next()) is None:
             pass
-        if found[1] is not None:
-            return found[1]
+        if finished[1] is not None:
+            return finished[1]
         if len(rows) == 1:
             lost = self._plan.spec.outputs.empty(1)
             lost["status"][:] = WORKER_LOST
@@ -165,7 +159,7 @@ class _Tasks:
             error = future.exception()
         else:
             try:
-                found: Results | str = future.result()
+                answer: Results | str = future.result()
             except (FutureCancelled, TaskCancelled, OSError):
                 # What goes wrong in the work itself comes as text.
                 raise _GoneError from None
@@ -173,9 +167,9 @@ class _Tasks:
                 # The worker was killed before it handed its results over, and what came after it as well.
                 error = late
             else:
-                if isinstance(found, str):
-                    raise InputError(found)
-                return found
+                if isinstance(answer, str):
+                    raise InputError(answer)
+                return answer
         if isinstance(error, import_module("distributed").KilledWorker):
             return None
         raise InputError(_unable(error)) from error
@@ -254,16 +248,16 @@ def client_of(dask: Any) -> Iterator[Any]:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep the loggers of dask still: what is wrong is told in one sentence of our own."""
-    found = [
+    loggers = [
         logging.getLogger(name) for name in logging.root.manager.loggerDict if name.startswith("distributed")
     ]
-    levels = [logger.level for logger in found]
-    for logger in found:
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
         logger.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        for logger, level in zip(found, levels, strict=True):
+        for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
 
 

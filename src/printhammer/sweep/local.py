@@ -27,21 +27,13 @@ def run_local(
     plan: Plan,
     todo: Iterable[Index],
     write: Callable[[Index, Results], None],
-    told: Callable[[float], None],
+    tell: Callable[[float], None],
     threads: int | None = None,
 ) -> None:
-    """Do blocks of work in threads, and write each when it is done.
+    """Do blocks of work in threads, by default as many as there are cores, and write each when it is done.
 
-    Parameters
-    ----------
-    todo : iterable of index
-        The blocks to do.
-    write : callable
-        Takes the place of a block in the chunk grid and its results; called in this thread.
-    told : callable
-        Called now and then with the number of members of blocks under way that are done, possibly not whole.
-    threads : int, optional
-        Number of threads; by default as many as there are cores.
+    `write` takes the place of a block in the chunk grid and its results, in this thread; `tell` is called now
+    and then with the number of members of blocks under way that are done, possibly not whole.
 
     Raises
     ------
@@ -85,7 +77,7 @@ def run_local(
                     index = under_way.pop(future)
                     write(index, future.result())
                     shares.pop(index, None)
-                told(sum(list(shares.values())))
+                tell(sum(list(shares.values())))
         finally:
             stop.set()
             for future in under_way:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.drive.file import read_drive
 from printhammer.drive.text import FORMAT, document
-from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.run.simulate import CYCLE
 from printhammer.sweep.axes import COUNTS, Axis
@@ -133,15 +132,3 @@ class Maker:
         standard = self.base.waveform if self.base.waveform is not None else hammer.waveform
         self._drives[key] = read_drive(document(head, tables), standard, folder=self.base.folder)
         return self._drives[key]
-
-
-def check_tables(base: Base) -> None:
-    """Make sure that the tables a hammer names can still be read and are those that they were.
-
-    Raises
-    ------
-    InputError
-        They are not.
-    """
-    if base.hammer.replace({}).fingerprint != base.hammer.fingerprint:
-        raise InputError(f"{base.hammer.path}: a table that it names has changed since the sweep began")

@@ -56,13 +56,13 @@ class Output:
     @property
     def attrs(self) -> dict[str, Any]:
         """Unit and meaning as attributes of the array."""
-        found: dict[str, Any] = {"long_name": self.meaning}
+        attrs: dict[str, Any] = {"long_name": self.meaning}
         if self.unit:
-            found["units"] = self.unit
+            attrs["units"] = self.unit
         if self.name == "status":
-            found["flag_values"] = list(range(NOT_YET, len(STATUSES)))
-            found["flag_meanings"] = " ".join(name.replace(" ", "_") for name in ("not yet", *STATUSES))
-        return found
+            attrs["flag_values"] = list(range(NOT_YET, len(STATUSES)))
+            attrs["flag_meanings"] = " ".join(name.replace(" ", "_") for name in ("not yet", *STATUSES))
+        return attrs
 
 
 _CODES: Final = ("status", "strobe_branch")

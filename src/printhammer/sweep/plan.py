@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.results.provenance import provenance
 from printhammer.results.store import Layout, Variable
 from printhammer.sweep.design import Blocks, between, latin_hypercube
 from printhammer.sweep.members import Maker
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
     from printhammer.sweep.outputs import Output
     from printhammer.sweep.spec import Spec
+
+FORMAT: Final = "1"
+"""Version of the layout of stores."""
 
 MEMBER: Final = "member"
 
@@ -48,12 +53,6 @@ class Plan:
         """Number of members."""
         return math.prod(self.shape)
 
-    @property
-    def bytes_of_member(self) -> int:
-        """Room that the results of a member take before they are compressed."""
-        outputs = self.spec.outputs
-        return sum(np.dtype(out.dtype).itemsize * math.prod(outputs.length(out)) for out in outputs.arrays)
-
     @cached_property
     def _drawn(self) -> FloatArray:
         """Values of the axes, shape (members, axes), of a Latin hypercube."""
@@ -76,8 +75,6 @@ class Plan:
 
     def layout(self) -> Layout:
         """Return the layout of the store."""
-        from printhammer.sweep.provenance import attributes, identity
-
         outputs = self.spec.outputs
         trailing = {"": (), FIRING: (FIRING,), TIME: (TIME,)}
         results = [
@@ -91,31 +88,38 @@ class Plan:
             )
             for output in outputs.arrays
         ]
-        attrs = attributes(self.spec)
+        # What a reader of a store may want to know.
+        attrs: dict[str, Any] = {
+            "title": self.spec.title,
+            "hammer_file": self.spec.base.hammer.to_toml(),
+            "spec": self.spec.text,
+            "design": self.spec.design,
+        }
         if not self.spec.grid:
+            attrs["seed"] = self.spec.seed
             # Read by xarray: these arrays are coordinates.
             attrs["coordinates"] = " ".join(axis.name for axis in self.spec.axes)
         return Layout(self.blocks.chunks, (*results, *self._coordinates()), attrs, identity(self.spec))
 
     def _coordinates(self) -> list[Variable]:
-        found = []
+        coordinates = []
         for i, axis in enumerate(self.spec.axes):
             attrs = {"long_name": axis.note.meaning, "units": axis.note.si, "key": axis.key}
             dims = (axis.name,) if self.spec.grid else self.dims
             values = axis.values if self.spec.grid else self._drawn[:, i]
             dtype = "int64" if axis.counts else "float64"
-            found.append(_coordinate(axis.name, dims, values.astype(dtype), attrs))
+            coordinates.append(_coordinate(axis.name, dims, values.astype(dtype), attrs))
         if not self.spec.grid:
             attrs = {"long_name": "number of the member"}
-            found.append(_coordinate(MEMBER, (MEMBER,), np.arange(self.members), attrs))
+            coordinates.append(_coordinate(MEMBER, (MEMBER,), np.arange(self.members), attrs))
         outputs = self.spec.outputs
         if any(output.dim == FIRING for output in outputs.arrays):
             attrs = {"long_name": "number of the firing"}
-            found.append(_coordinate(FIRING, (FIRING,), np.arange(outputs.firings), attrs))
+            coordinates.append(_coordinate(FIRING, (FIRING,), np.arange(outputs.firings), attrs))
         if outputs.times.size:
             attrs = {"long_name": "time", "units": "s"}
-            found.append(_coordinate(TIME, (TIME,), outputs.times, attrs))
-        return found
+            coordinates.append(_coordinate(TIME, (TIME,), outputs.times, attrs))
+        return coordinates
 
     def table(self) -> list[tuple[Output, tuple[int, ...], int]]:
         """List the arrays with their shapes and sizes in bytes, before they are compressed."""
@@ -125,6 +129,17 @@ class Plan:
             (output, shape, math.prod(shape) * np.dtype(output.dtype).itemsize)
             for output, shape in zip(outputs.arrays, shapes, strict=True)
         ]
+
+
+def identity(spec: Spec) -> dict[str, str]:
+    """Return what must be the same for results to lie in one store; the readable first."""
+    return {
+        "store_format": FORMAT,
+        **provenance(hammer=spec.base.hammer, tolerance=spec.base.tolerance),
+        "zarr": version("zarr"),
+        "axes": ", ".join(axis.key for axis in spec.axes),
+        "spec_fingerprint": spec.fingerprint,
+    }
 
 
 def _coordinate(name: str, dims: tuple[str, ...], values: Any, attrs: dict[str, Any]) -> Variable:
@@ -149,7 +164,8 @@ def make_plan(spec: Spec) -> Plan:
     whole = Plan(spec, shape, dims, Blocks.of(shape, members))
     most = spec.chunk
     if most is None:
-        room = max(1, _MOST_BYTES // whole.bytes_of_member)
+        bytes_of_member = sum(size for _output, _shape, size in whole.table()) // members
+        room = max(1, _MOST_BYTES // bytes_of_member)
         most = min(max(members // _BLOCKS, _FEWEST_IN_BLOCK), _MOST_IN_BLOCK, room)
     plan = Plan(spec, shape, dims, Blocks.of(shape, most))
     _try(plan)

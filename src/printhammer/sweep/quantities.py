@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import WithJsonSchema
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.support.constants import shown
 from printhammer.units import describe, parse, to_si
 
@@ -48,7 +48,7 @@ ManyQuantities = Annotated[Any, WithJsonSchema(_MANY)]
 """Type of a field that holds several."""
 
 
-def read_quantity(given: Any, si: str, where: str) -> float:
+def read_quantity(written: Any, si: str, where: str) -> float:
     """Read one quantity into SI: "1.2 kHz" or { value = 1.2, unit = "kHz" }; a bare number if it is pure.
 
     Raises
@@ -56,22 +56,20 @@ def read_quantity(given: Any, si: str, where: str) -> float:
     InputError
         It is none of these, or of another dimension than the unit `si`.
     """
-    try:
-        if isinstance(given, str):
-            return parse(given, si)
-        if isinstance(given, Mapping):
-            value, unit = _columns(given, ("value", "unit"))
+    with located(where):
+        if isinstance(written, str):
+            return parse(written, si)
+        if isinstance(written, Mapping):
+            value, unit = _columns(written, ("value", "unit"))
             return to_si(value, unit, si)
         if si == "1":
-            return to_si(given, "1", "1")
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+            return to_si(written, "1", "1")
     raise InputError(
-        f"{where} = {shown(given)} has no unit, expected {describe(si)} as text such as '1 {si}'"
+        f"{where} = {shown(written)} has no unit, expected {describe(si)} as text such as '1 {si}'"
     )
 
 
-def read_quantities(given: Any, si: str, where: str) -> list[float]:
+def read_quantities(written: Any, si: str, where: str) -> list[float]:
     """Read several quantities into SI: a list of what `read_quantity` takes, or values with one unit.
 
     Raises
@@ -79,17 +77,15 @@ def read_quantities(given: Any, si: str, where: str) -> list[float]:
     InputError
         As `read_quantity`; or there is none.
     """
-    values: Iterable[Any] = given if isinstance(given, list) else ()
-    if isinstance(given, Mapping):
-        try:
-            column, unit = _columns(given, ("values", "unit"))
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
+    values: Iterable[Any] = written if isinstance(written, list) else ()
+    if isinstance(written, Mapping):
+        with located(where):
+            column, unit = _columns(written, ("values", "unit"))
         values = [{"value": value, "unit": unit} for value in column] if isinstance(column, list) else ()
-    found = [read_quantity(value, si, f"{where}[{i}]") for i, value in enumerate(values)]
-    if not found:
-        raise InputError(f"{where} = {shown(given)}: expected a list of quantities, at least one")
-    return found
+    numbers = [read_quantity(value, si, f"{where}[{i}]") for i, value in enumerate(values)]
+    if not numbers:
+        raise InputError(f"{where} = {shown(written)}: expected a list of quantities, at least one")
+    return numbers
 
 
 def _columns(table: Mapping[str, Any], names: tuple[str, str]) -> tuple[Any, str]:

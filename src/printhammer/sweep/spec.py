@@ -24,6 +24,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import load, shipped
 from printhammer.hammer.names import quantity_of
 from printhammer.support.constants import shown
+from printhammer.support.texts import read_text
 from printhammer.sweep.axes import COUNTS, Axis, read_axis
 from printhammer.sweep.members import KINDS, Base
 from printhammer.sweep.outputs import Outputs, read_outputs
@@ -31,7 +32,6 @@ from printhammer.sweep.quantities import read_quantity
 from printhammer.sweep.tables import read_tables
 
 if TYPE_CHECKING:
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
 
 
@@ -67,7 +67,7 @@ class Spec:
     def fingerprint(self) -> str:
         """Hexadecimal digest of what is computed and how it is divided; layout and comments do not enter."""
         base = self.base
-        found = {
+        content = {
             "hammer": base.hammer.fingerprint,
             "drive": _plain(base.drive),
             "waveform": None if base.waveform is None else base.waveform.segments().tobytes().hex(),
@@ -80,7 +80,7 @@ class Spec:
             "outputs": [output.name for output in self.outputs.arrays],
             "times": self.outputs.times.tobytes().hex(),
         }
-        return sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
+        return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
@@ -98,13 +98,7 @@ def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
     else:
         path = Path(source)
         where, folder = str(path), path.parent
-        try:
-            text = path.read_text(encoding="utf-8")
-        except UnicodeDecodeError:
-            raise InputError(f"{path}: expected a TOML file in UTF-8") from None
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise InputError(f"{path}: the spec cannot be read ({reason})") from None
+        text = read_text(path, "the spec", wanted="expected a TOML file in UTF-8")
     try:
         return _spec(tomllib.loads(text), text, where, folder)
     except InputError as error:
@@ -113,8 +107,8 @@ def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
         raise InputError(f"{where}: expected TOML ({' '.join(str(error).split())})") from None
 
 
-def _spec(found: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
-    table = read_tables(found)
+def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
+    table = read_tables(content)
     grid = table.design == "grid"
     for name, value in (("members", table.members), ("seed", table.seed)):
         if grid != (value is None):
@@ -138,6 +132,9 @@ def _spec(found: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
         if axis.key in table.constants:
             raise InputError(f"constants: {axis.key!r} is replaced by an axis, expected one or the other")
     x, v = table.state.x, table.state.v
+    duration = None if table.duration is None else read_quantity(table.duration, "s", "duration")
+    if duration is not None and not duration > 0.0:
+        raise InputError(f"duration = {duration!r} s: expected more than 0 s")
     base = Base(
         hammer=hammer,
         drive=drive,
@@ -147,7 +144,7 @@ def _spec(found: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
             None if x is None else read_quantity(x, "m", "state.x"),
             None if v is None else read_quantity(v, "m/s", "state.v"),
         ),
-        duration=None if table.duration is None else _positive(table.duration, "duration"),
+        duration=duration,
         tolerance=table.tolerance,
         axes=axes,
     )
@@ -168,11 +165,11 @@ def _replaced(hammer: Hammer, constants: Mapping[str, Any]) -> Hammer:
     return hammer.replace(changes, source="constants of a sweep") if changes else hammer
 
 
-def _drive_tables(given: dict[str, Any] | str, folder: Path) -> tuple[dict[str, Any], Path]:
+def _drive_tables(source: dict[str, Any] | str, folder: Path) -> tuple[dict[str, Any], Path]:
     """Return the tables of a drive, and where what they name lies."""
-    if not isinstance(given, str):
-        return dict(given), folder
-    path = folder / given
+    if not isinstance(source, str):
+        return dict(source), folder
+    path = folder / source
     try:
         return tomllib.loads(path.read_text(encoding="utf-8")), path.parent
     except OSError as error:
@@ -207,13 +204,9 @@ def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
     if own is None or any(axis.target == "waveform" for axis in base.axes):
         return base
     rest = {name: table for name, table in base.drive.items() if name != "waveform"}
-    return replace(base, drive=rest, waveform=_waveform(own, base.folder))
-
-
-def _waveform(own: Mapping[str, Any], folder: Path) -> Waveform:
     pulse = {"rate": "1 Hz", "pulses": 1}
     text = document({"format": DRIVE_FORMAT}, {"train": pulse, "waveform": own})
-    return read_drive(text, folder=folder).waveform
+    return replace(base, drive=rest, waveform=read_drive(text, folder=base.folder).waveform)
 
 
 def _firings(base: Base) -> int:
@@ -228,13 +221,6 @@ def _firings(base: Base) -> int:
         count = int(values[0]) if values else timing.get(name, 1)
         product *= count if isinstance(count, int) else 1
     return max(product, 1)
-
-
-def _positive(given: Any, where: str) -> float:
-    value = read_quantity(given, "s", where)
-    if not value > 0.0:
-        raise InputError(f"{where} = {value!r} s: expected more than 0 s")
-    return value
 
 
 def _plain(value: Any) -> Any:

@@ -99,8 +99,12 @@ def read_tables(document: dict[str, Any]) -> SpecTable:
 
 def schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of specs."""
-    found = SpecTable.model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found, "title": "printhammer sweep"}
+    content = SpecTable.model_json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **content,
+        "title": "printhammer sweep",
+    }
 
 
 def _sentence(error: ValidationError) -> str:
@@ -108,7 +112,8 @@ def _sentence(error: ValidationError) -> str:
     fault = error.errors(include_url=False)[0]
     key, table = _place(fault["loc"])
     if fault["type"] == "missing":
-        return f"{key} is missing, expected {_meaning(table, fault['loc'][-1])}"
+        field = table.model_fields.get(str(fault["loc"][-1]))
+        return f"{key} is missing, expected {(field.description if field else None) or 'a value'}"
     if fault["type"] == "extra_forbidden":
         known = ", ".join(table.model_fields)
         return f"the key {shown(key, quotes=False)} is not known, expected one of {known}"
@@ -126,23 +131,18 @@ def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:
         "outputs": OutputsTable,
         "displacement": TimesTable,
     }
-    found: type[BaseModel] = table
+    owner: type[BaseModel] = table
     for place, step in enumerate(steps):
         if isinstance(step, int):
             key += f"[{step}]"
-        elif place and step not in found.model_fields and step in _CHOICES:
+        elif place and step not in owner.model_fields and step in _CHOICES:
             # Which of several types a value was tried for is no part of the key.
             break
         else:
             key += f".{step}" if key else step
             if place < len(steps) - 1:
-                found = inner.get(step, found)
-    return key, found
+                owner = inner.get(step, owner)
+    return key, owner
 
 
 _CHOICES: Final = ("str", "dict[str,any]", "list[str]", "literal['all']", "int", "float")
-
-
-def _meaning(table: type[BaseModel], name: int | str) -> str:
-    field = table.model_fields.get(str(name))
-    return field.description or "a value" if field is not None else "a value"

@@ -11,7 +11,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.run.ensemble import Ensemble
 from printhammer.support.threads import in_threads
-from printhammer.sweep.members import Maker, check_tables
+from printhammer.sweep.members import Maker
 from printhammer.sweep.outputs import (
     DISPLACEMENT,
     DOTS,
@@ -57,7 +57,8 @@ def run_chunk(
     InputError
         The tables that the hammer names have changed.
     """
-    check_tables(base)
+    if base.hammer.replace({}).fingerprint != base.hammer.fingerprint:
+        raise InputError(f"{base.hammer.path}: a table that it names has changed since the sweep began")
     results = outputs.empty(len(rows))
     results["status"][:] = NO_HAMMER
     results["reached"][:] = np.nan
@@ -84,15 +85,15 @@ def run_chunk(
     motions = outputs.wants(*OF_MOTION)
     share = 0.2 if motions else 1.0
 
-    def told(done: int, total: int) -> None:
+    def tell(done: int, total: int) -> None:
         if progress is not None:
             progress(share * done / total)
 
     rows_of = np.array(which)
-    _from_ensemble(ensemble, members, outputs, rows_of, results, threads, told)
+    _from_ensemble(ensemble, members, outputs, rows_of, results, threads, tell)
     if motions:
 
-        def told_motion(done: int, total: int) -> None:
+        def tell_motion(done: int, total: int) -> None:
             if progress is not None:
                 progress(share + (1.0 - share) * done / total)
 
@@ -100,7 +101,7 @@ def run_chunk(
             for i in range(first, last):
                 _from_motion(ensemble.motion(i), which[i], results)
 
-        in_threads([piece], [len(members)], threads, told_motion)
+        in_threads([piece], [len(members)], threads, tell_motion)
     return results
 
 
@@ -111,40 +112,40 @@ def _from_ensemble(
     which: Any,
     results: Results,
     threads: int,
-    told: Callable[[int, int], None],
+    tell: Callable[[int, int], None],
 ) -> None:
     moments, places, ends = _moments(members, outputs)
-    found = ensemble.run(
+    runs = ensemble.run(
         dots=outputs.wants(*DOTS, *OF_DOTS),
         strobes=moments,
         times=outputs.times if outputs.wants(DISPLACEMENT) else None,
         threads=threads,
-        progress=told,
+        progress=tell,
     )
-    results["status"][which] = [STATUSES.index(name) for name in found.status_names]
-    results["reached"][which] = found.reached
-    results["steps"][which] = found.steps
-    if found.x is not None:
-        results[DISPLACEMENT.name][which] = found.x
-    if found.dots is not None:
+    results["status"][which] = [STATUSES.index(name) for name in runs.status_names]
+    results["reached"][which] = runs.reached
+    results["steps"][which] = runs.steps
+    if runs.x is not None:
+        results[DISPLACEMENT.name][which] = runs.x
+    if runs.dots is not None:
         for output in DOTS:
             if output.name in results:
-                table = getattr(found.dots, output.name)
+                table = getattr(runs.dots, output.name)
                 results[output.name][which, : table.shape[1]] = table
         if outputs.wants(*OF_DOTS):
             for i, row in enumerate(which):
-                for name, value in _scalars(found.dots, i).items():
+                for name, value in _scalars(runs.dots, i).items():
                     if name in results:
                         results[name][row] = value
-    if found.strobes is not None:
+    if runs.strobes is not None:
         for i, row in enumerate(which):
             for output in STROBES:
                 if output.name in results:
-                    values = getattr(found.strobes, output.name.removeprefix("strobe_"))[i, places[i]]
+                    values = getattr(runs.strobes, output.name.removeprefix("strobe_"))[i, places[i]]
                     results[output.name][row, : len(values)] = values
             for output in FINAL:
                 if output.name in results:
-                    values = getattr(found.strobes, output.name.removeprefix("final_"))
+                    values = getattr(runs.strobes, output.name.removeprefix("final_"))
                     results[output.name][row] = values[i, ends[i]]
 
 
@@ -169,22 +170,22 @@ def _moments(
 def _scalars(dots: DotTable, i: int) -> dict[str, float]:
     """Return the scalars that follow from the dots of a member."""
     struck = dots.struck[i]
-    found: dict[str, float] = {
+    scalars: dict[str, float] = {
         "struck_dots": int(struck.sum()),
         "lost_dots": int((dots.fired[i] & ~struck).sum()),
     }
     for name in ("flight_time", "peak_force"):
         values = getattr(dots, name)[i][struck]
         # math.fsum rounds once, so that a mean does not depend on how many empty places follow.
-        found[f"{name}_mean"] = math.fsum(values) / len(values) if len(values) else math.nan
-        found[f"{name}_spread"] = float(values.max() - values.min()) if len(values) else math.nan
-    return found
+        scalars[f"{name}_mean"] = math.fsum(values) / len(values) if len(values) else math.nan
+        scalars[f"{name}_spread"] = float(values.max() - values.min()) if len(values) else math.nan
+    return scalars
 
 
 def _from_motion(motion: Motion, row: int, results: Results) -> None:
     energy = motion.energy
     _, x = motion.maxima
-    found = {
+    scalars = {
         "peak_displacement": x.max() if len(x) else math.nan,
         "backstop_touches": sum(
             contact.surface == "backstop" and not contact.initial for contact in motion.contacts
@@ -195,6 +196,6 @@ def _from_motion(motion: Motion, row: int, results: Results) -> None:
         "backstop_loss": energy.backstop_loss,
         "energy_residual": energy.residual,
     }
-    for name, value in found.items():
+    for name, value in scalars.items():
         if name in results:
             results[name][row] = value

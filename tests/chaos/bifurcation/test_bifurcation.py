@@ -19,7 +19,7 @@ from printhammer.chaos.bifurcation.columns import Columns, blank_columns, cycles
 from printhammer.chaos.bifurcation.diagram import hysteresis
 from printhammer.chaos.bifurcation.windows import cells, doublings
 from printhammer.chaos.strobe.verdict import period_of, repeats
-from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.parts.spring.linear import PreloadSpring
 from printhammer.run.regime import Regime
 
 ARRAYS = ("values", "x", "v", "branch", "status", "cycles", "distances", "levels")

@@ -9,7 +9,7 @@ import xarray as xr
 import printhammer as ph
 from printhammer.chaos import Strobe, strobes
 from printhammer.claims import claims
-from printhammer.parts.spring.preload import PreloadSpring
+from printhammer.parts.spring.linear import PreloadSpring
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.window import PAPER_WINDOW, window_of
 

@@ -23,7 +23,7 @@ from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
 from printhammer.support.outputs import write_file
-from printhammer.support.sheets import read_text
+from printhammer.support.texts import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

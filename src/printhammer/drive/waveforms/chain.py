@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 import numpy as np
 from pydantic import model_validator
 
+from printhammer.drive.input import read_number
 from printhammer.drive.segments import evaluate, largest, table
 from printhammer.drive.waveforms.base import Waveform
 from printhammer.errors import InputError
@@ -72,8 +73,8 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
         pairs = []
     if not pairs or any(len(pair) != 2 for pair in pairs):
         raise InputError(f"parts = {parts!r} is expected to be pairs of an offset and a waveform")
-    found: list[tuple[float, Waveform]] = []
-    for number, (given, waveform) in enumerate(pairs):
+    checked: list[tuple[float, Waveform]] = []
+    for number, (begin, waveform) in enumerate(pairs):
         if not isinstance(waveform, Waveform):
             raise InputError(f"parts[{number}]: {waveform!r} is expected to be a waveform")
         if waveform.quantity != pairs[0][1].quantity:
@@ -82,12 +83,12 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
             )
         if not math.isfinite(waveform.support):
             raise InputError(f"parts[{number}] is a {waveform.shape}, expected a waveform that ends")
-        offset = _offset(given, number)
-        if not (_over(*found[-1], offset) if found else offset >= 0.0):
-            sooner = f"parts[{number - 1}] is over" if found else "the firing"
+        offset = _offset(begin, number)
+        if not (_over(*checked[-1], offset) if checked else offset >= 0.0):
+            sooner = f"parts[{number - 1}] is over" if checked else "the firing"
             raise InputError(f"parts[{number}] begins at {offset:.9g} s, expected a time not before {sooner}")
-        found.append((offset, waveform))
-    return tuple(found)
+        checked.append((offset, waveform))
+    return tuple(checked)
 
 
 def _over(begun: float, waveform: Waveform, time: float) -> bool:
@@ -104,15 +105,10 @@ def _over(begun: float, waveform: Waveform, time: float) -> bool:
     return bool(np.abs(evaluate(segments, times)).max() <= TAIL * largest(segments))
 
 
-def _offset(given: object, number: int) -> float:
+def _offset(written: object, number: int) -> float:
     """Read the offset of a part: a number in s, or a string with a unit."""
-    if isinstance(given, str):
-        from printhammer.units import parse
-
-        try:
-            return parse(given, "s")
-        except InputError as error:
-            raise InputError(f"parts[{number}]: {error}") from None
-    if isinstance(given, bool) or not isinstance(given, float | int) or not math.isfinite(given):
-        raise InputError(f"parts[{number}]: offset {given!r} is expected to be a finite number in s")
-    return float(given)
+    if isinstance(written, str):
+        return read_number(written, "s", f"parts[{number}]")
+    if isinstance(written, bool) or not isinstance(written, float | int) or not math.isfinite(written):
+        raise InputError(f"parts[{number}]: offset {written!r} is expected to be a finite number in s")
+    return float(written)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.support.sheets import finite, read_sheet, split_heading
 
 if TYPE_CHECKING:
@@ -119,8 +119,6 @@ def _converted(column: list[float], unit: str, si: str, what: str) -> list[float
     """Convert a column to SI."""
     from printhammer.units import to_si
 
-    try:
+    with located(what):
         to_si(1.0, unit, si)
         return [to_si(number, unit, si) for number in column]
-    except InputError as error:
-        raise InputError(f"{what}: {error}") from None

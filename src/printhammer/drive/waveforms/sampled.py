@@ -68,8 +68,8 @@ class Sampled(Waveform):
     ) -> Self:
         """Make a sampled waveform from arrays, SI; `file` is only remembered."""
         record = checked(times, values, quantity, "sampled waveform")
-        given = {"file": file, "interpolation": interpolation}
-        return cls.model_validate(given, context={"record": record})
+        fields = {"file": file, "interpolation": interpolation}
+        return cls.model_validate(fields, context={"record": record})
 
     @property
     def times(self) -> FloatArray:

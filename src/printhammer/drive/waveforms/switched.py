@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
 from pydantic import model_validator
 
+from printhammer.drive.input import read_number
 from printhammer.drive.segments import EXPONENTIAL, table
 from printhammer.drive.waveforms.base import DECAY_TIMES, QUANTITY_UNITS, Waveform
 from printhammer.errors import InputError
@@ -103,9 +104,9 @@ def switched_table(
         current = level + (current - level) * math.exp(-(start - now) / edge)
         rows.append((start, EXPONENTIAL, following, current - following, 1.0 / edge, 0.0))
         now, level = start, following
-    found = table(rows, now + DECAY_TIMES * edge)
-    found.setflags(write=False)
-    return found
+    segments = table(rows, now + DECAY_TIMES * edge)
+    segments.setflags(write=False)
+    return segments
 
 
 def _has_text(entries: object) -> bool:
@@ -114,14 +115,7 @@ def _has_text(entries: object) -> bool:
 
 def _number(entry: object, unit: str, name: str) -> Any:
     """Read one entry of a column; one that is no text is left to pydantic."""
-    from printhammer.units import parse
-
-    if not isinstance(entry, str):
-        return entry
-    try:
-        return parse(entry, unit)
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+    return read_number(entry, unit, name) if isinstance(entry, str) else entry
 
 
 def _levels(entries: Any) -> tuple[tuple[Any, ...], str]:

@@ -15,16 +15,14 @@ motion
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from importlib import import_module
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.hammer.static_force import StaticForce
+from printhammer.hammer.static_force import StaticForce, law_of
 from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform, time_constant
-from printhammer.parts import absent
 from printhammer.parts.backstop._hertz import damping_from_restitution
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.run.simulate import CYCLE, simulate
@@ -83,7 +81,7 @@ class Bench:
     """Columns by name, SI, before noise and resolution, shape (rows,)."""
     suspect: str
     """Column in which wrong readings occur."""
-    words: dict[str, tuple[str, ...]]
+    words: dict[str, tuple[str, ...]] = field(default_factory=dict)
     """Columns of words."""
     exact: tuple[str, ...] = ()
     """Columns that have no error, such as the time."""
@@ -114,7 +112,6 @@ def magnet(
         "static force of magnet and spring, armature held, pack absent; positive toward the paper",
         {"displacement": x, "current": current, "force": total},
         "force",
-        {},
     )
 
 
@@ -133,7 +130,6 @@ def spring(
         "static force of the spring alone, magnet taken out; positive toward the paper",
         {"displacement": x, "force": np.array([force.spring(place) for place in x.tolist()])},
         "force",
-        {},
     )
 
 
@@ -155,16 +151,18 @@ def pack(
         raise InputError(
             f"a peak of {deepest.max():.6g} m is expected to be less than the thickness, {room:.6g} m"
         )
-    loading, memory, unloading = (_law(hammer, name) for name in ("loading", "memory", "unloading"))
+    (loading, c), (memory, _), (unloading, _) = (
+        law_of(hammer, hammer.pack, f"pack_{name}") for name in ("loading", "memory", "unloading")
+    )
     share = np.arange(1, points + 1) / points
     indentation, force = [], []
     branch: list[str] = []
     for peak in deepest.tolist():
         up, down = peak * share, peak * share[-2::-1]
-        q = memory(hammer.pack.front + peak)
+        q = memory(c, hammer.pack.front + peak)
         indentation += [*up.tolist(), *down.tolist()]
-        force += [-loading(hammer.pack.front + r, 0.0) for r in up.tolist()]
-        force += [-unloading(hammer.pack.front + r, 0.0, q) for r in down.tolist()]
+        force += [-loading(c, hammer.pack.front + r, 0.0) for r in up.tolist()]
+        force += [-unloading(c, hammer.pack.front + r, 0.0, q) for r in down.tolist()]
         branch += ["loading"] * len(up) + ["unloading"] * len(down)
     return Bench(
         "force of slow load cycles against the indentation from the front of the pack, each on fresh paper",
@@ -188,7 +186,6 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
         "speeds of the armature alone just before and just after it meets the backstop",
         {"impact speed": impacts, "rebound speed": rebound},
         "rebound speed",
-        {},
     )
 
 
@@ -220,16 +217,16 @@ def motion(
     if not shot.ok:
         raise InputError(f"{hammer.path}: the shot did not reach its end: {shot.message}")
     tau = time_constant(sensor.bandwidth)
-    seen = lowpass_motion(shot.t, shot.x[:, np.newaxis], shot.v[:, np.newaxis], tau)[::each, 0]
+    shown = lowpass_motion(shot.t, shot.x[:, np.newaxis], shot.v[:, np.newaxis], tau)[::each, 0]
     after = t >= 0.0
-    x = np.full(len(t), seen[0])
-    x[after] = seen
+    x = np.full(len(t), shown[0])
+    x[after] = shown
     true = {"time": t, "displacement": x}
     if hammer.waveform.unit == "A":
         current = hammer.waveform.value(t)
         true["current"] = lowpass_waveform(hammer.waveform.segments(), t, tau) if tau else current
     what = "displacement of the armature in one shot from rest, fired at time 0"
-    return Bench(what, true, "displacement", {}, ("time",))
+    return Bench(what, true, "displacement", exact=("time",))
 
 
 BENCHES: Final[dict[str, Callable[..., Bench]]] = {
@@ -243,12 +240,12 @@ BENCHES: Final[dict[str, Callable[..., Bench]]] = {
 
 def _array(values: npt.ArrayLike, name: str) -> FloatArray:
     try:
-        found = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        numbers = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError):
-        found = np.empty(0)
-    if found.ndim != 1 or not found.size or not np.isfinite(found).all():
+        numbers = np.empty(0)
+    if numbers.ndim != 1 or not numbers.size or not np.isfinite(numbers).all():
         raise InputError(f"{name} are expected to be a list of finite numbers in SI")
-    return found
+    return numbers
 
 
 def _places(hammer: Hammer, displacements: npt.ArrayLike | None) -> FloatArray:
@@ -277,40 +274,21 @@ def _peaks(hammer: Hammer) -> FloatArray:
     return float(thickness) * np.array(PEAKS)
 
 
-def _law(hammer: Hammer, name: str) -> Callable[..., float]:
-    """Return a law function of the pack with its constants filled in."""
-    part = hammer.pack
-    if part is None:
-        raise InputError(f"{hammer.path}: the hammer has no [pack]")
-    law: Callable[..., float] = getattr(
-        import_module(part.module), f"pack_{name}", getattr(absent, f"pack_{name}")
-    )
-    constants = part.packed(hammer.origin)
-    return lambda *arguments: law(constants, *arguments)
-
-
 def _rebound(bare: Hammer, speed: float) -> float:
     """Return the speed, m/s, with which an armature without other forces leaves its backstop."""
     part = bare.backstop
     if isinstance(part, HertzBackstop):
+        from scipy.optimize import brentq
+
         k, damping, _pull = part.packed(bare.origin)
-        return speed * _restitution(k, damping, speed)
-    return _simulated_rebound(bare, speed)
+        if damping == 0.0:
+            return speed
 
+        # The exact law of a free rebound, equations (6) and (7), falls with the restitution.
+        def excess(e: float) -> float:
+            return damping_from_restitution(k, e, speed) / damping - 1.0
 
-def _restitution(k: float, damping: float, speed: float) -> float:
-    """Return the restitution of a free rebound after equations (6) and (7).
-
-    Solves the exact law of `damping_from_restitution`, which falls with e, for e.
-    """
-    from scipy.optimize import brentq
-
-    if damping == 0.0:
-        return 1.0
-    return brentq(lambda e: damping_from_restitution(k, e, speed) / damping - 1.0, _LEAST, 1.0, xtol=1e-15)
-
-
-def _simulated_rebound(bare: Hammer, speed: float) -> float:
+        return speed * brentq(excess, _LEAST, 1.0, xtol=1e-15)
     from printhammer.drive.trains import PulseTrain
     from printhammer.drive.waveforms.shapes import Rectangle
 

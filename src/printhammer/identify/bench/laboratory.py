@@ -193,7 +193,7 @@ def _comments(
 ) -> dict[str, str]:
     from printhammer import __version__
 
-    found = {
+    comments = {
         "measurement": f"{kind}, synthetic (printhammer {__version__})",
         "measured": what,
         "hammer": f"{hammer.name}, fingerprint {hammer.fingerprint[:16]}",
@@ -202,11 +202,11 @@ def _comments(
         if name in exact:
             continue
         channel = sensor.channels.get(name, Channel())
-        found[name] = channel.told(*UNITS[name], full_scale(values))
+        comments[name] = channel.described(*UNITS[name], full_scale(values))
     if kind == "motion":
-        found["sampling rate"] = _frequency(sensor.sampling_rate)
-        found["bandwidth"] = _frequency(sensor.bandwidth)
-    return found
+        comments["sampling rate"] = _frequency(sensor.sampling_rate)
+        comments["bandwidth"] = _frequency(sensor.bandwidth)
+    return comments
 
 
 def _frequency(value: float | None) -> str:

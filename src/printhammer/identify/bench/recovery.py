@@ -73,11 +73,6 @@ def recover(
     folder : path, optional
         Where the tables are left; by default they are not kept.
 
-    Returns
-    -------
-    Recovery
-        What was found.
-
     Raises
     ------
     InputError
@@ -97,7 +92,8 @@ def recover(
         "pack": fit_pack(paths["pack"], thickness=true_value(hammer, "pack.thickness")),
         "backstop": fit_backstop(paths["backstop"], stiffness=measured_stiffness(hammer, rng)),
     }
-    built = _unknown(hammer, rng)
+    # The mass is a guess, so that the fit of the motion does not begin at the truth.
+    built = hammer.replace("mass", hammer.mass * (1.0 + _START * float(rng.uniform(-1.0, 1.0))))
     for fit in fits.values():
         built = fit.into(built)
     fits["motion"] = fit_motion([paths["motion"]], built, earlier=tuple(fits.values()))
@@ -138,8 +134,3 @@ def true_value(hammer: Hammer, key: str) -> float:
     if section == "backstop" and name in ("stiffness", "damping"):
         return float(part.packed(hammer.origin)[0 if name == "stiffness" else 1])
     return float(getattr(part, name))
-
-
-def _unknown(hammer: Hammer, rng: np.random.Generator) -> Hammer:
-    """Return a hammer whose mass is a guess, so that the fit of the motion does not begin at the truth."""
-    return hammer.replace("mass", hammer.mass * (1.0 + _START * float(rng.uniform(-1.0, 1.0))))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,19 +49,13 @@ class Amount:
         InputError
             It is none, of another dimension, or negative.
         """
-        from printhammer.drive.input import read_number
-        from printhammer.units import parse
-
         of = ""
         if isinstance(text, str) and "%" in text:
             share, _percent, tail = text.partition("%")
             of = tail.strip() or FULL_SCALE
             if of not in (FULL_SCALE, READING):
                 raise InputError(f"{name}: {text!r}, expected nothing, {FULL_SCALE!r} or {READING!r} after %")
-            try:
-                size = parse(f"{share.strip()} %", "1")
-            except InputError as error:
-                raise InputError(f"{name}: {error}") from None
+            size = read_number(f"{share.strip()} %", "1", name)
         else:
             size = read_number(text, si, name)
         if size < 0.0 and not signed:
@@ -113,7 +108,7 @@ class Channel:
         digit = max(digit for digit in (1, 2, 5) if digit <= max(size / 10.0**power, 1.0))
         return float(f"{digit}e{power}")
 
-    def told(self, si: str, unit: str, full: float) -> str:
+    def described(self, si: str, unit: str, full: float) -> str:
         """Return noise, resolution and offset as text in a unit, for a full scale, SI."""
         from printhammer.units import from_si
 

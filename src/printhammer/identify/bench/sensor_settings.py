@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
+from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.identify.bench.sensor import Amount, Sensor
 
@@ -43,11 +45,11 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
         sensor = sensor.exact()
     channels = dict(sensor.channels)
     for part in PARTS:
-        for name, given in _quantities(part, settings.get(part)).items():
+        for name, written in _quantities(part, settings.get(part)).items():
             if name not in channels:
                 known = ", ".join(channels)
                 raise InputError(f"{part}: the quantity {name!r} is not measured, expected one of {known}")
-            amount = Amount.read(given, units[name], f"{part} of {name}", signed=part == "offset")
+            amount = Amount.read(written, units[name], f"{part} of {name}", signed=part == "offset")
             channels[name] = replace(channels[name], **{part: amount})
     changes: dict[str, Any] = {"channels": channels}
     for name, read in _READ.items():
@@ -60,14 +62,14 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings that are about what a sensor has: its quantities, and records if it makes them."""
-    found = dict(settings)
+    kept = dict(settings)
     for part in PARTS:
-        if part in found:
-            given = _quantities(part, found[part])
-            found[part] = {name: value for name, value in given.items() if name in sensor.channels}
+        if part in kept:
+            amounts = _quantities(part, kept[part])
+            kept[part] = {name: value for name, value in amounts.items() if name in sensor.channels}
     if sensor.sampling_rate is None:
-        found = {name: value for name, value in found.items() if name not in ("sampling_rate", "bandwidth")}
-    return found
+        kept = {name: value for name, value in kept.items() if name not in ("sampling_rate", "bandwidth")}
+    return kept
 
 
 def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> dict[str, str]:
@@ -80,21 +82,21 @@ def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> d
     InputError
         A quantity is not known, given twice, or none has the dimension.
     """
-    found: dict[str, str] = {}
+    amounts: dict[str, str] = {}
     for text in texts:
         name, equals, amount = text.partition("=")
         name = " ".join(name.lower().split())
         names = [name] if equals else _of_dimension(text, part, quantities)
-        for one in names:
-            if one not in quantities:
+        for quantity in names:
+            if quantity not in quantities:
                 known = ", ".join(quantities)
                 raise InputError(
-                    f"{part} {text!r}: the quantity {one!r} is not known, expected one of {known}"
+                    f"{part} {text!r}: the quantity {quantity!r} is not known, expected one of {known}"
                 )
-            if one in found:
-                raise InputError(f"{part} {text!r}: {one} is given twice, expected it once")
-            found[one] = amount.strip() if equals else text.strip()
-    return found
+            if quantity in amounts:
+                raise InputError(f"{part} {text!r}: {quantity} is given twice, expected it once")
+            amounts[quantity] = amount.strip() if equals else text.strip()
+    return amounts
 
 
 def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[str]:
@@ -102,11 +104,9 @@ def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[s
 
     names = []
     for name, si in quantities.items():
-        try:
+        with suppress(InputError):
             parse(text, si)
-        except InputError:
-            continue
-        names.append(name)
+            names.append(name)
     if not names:
         such = next(iter(quantities))
         raise InputError(
@@ -116,31 +116,21 @@ def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[s
     return names
 
 
-def _quantities(part: str, given: Any) -> Mapping[str, Any]:
-    if given is None:
+def _quantities(part: str, amounts: Any) -> Mapping[str, Any]:
+    if amounts is None:
         return {}
-    if not isinstance(given, Mapping):
-        raise InputError(f"{part} = {given!r}, expected amounts by quantity, such as {{'force': '0.5 %'}}")
-    return given
+    if not isinstance(amounts, Mapping):
+        raise InputError(f"{part} = {amounts!r}, expected amounts by quantity, such as {{'force': '0.5 %'}}")
+    return amounts
 
 
 def _frequency(value: Any, name: str) -> float | None:
-    from printhammer.drive.input import read_positive
-
     if isinstance(value, str) and value.strip().lower() == NONE:
         return None
     return read_positive(value, "Hz", name)
 
 
-def _rate(value: Any, name: str) -> float:
-    from printhammer.drive.input import read_positive
-
-    return read_positive(value, "Hz", name)
-
-
 def _share(value: Any, name: str) -> float:
-    from printhammer.drive.input import read_number
-
     share = read_number(value, "1", name)
     if not (0.0 <= share <= 0.5 and math.isfinite(share)):
         raise InputError(f"{name} = {value!r}, expected a share from 0 to 50 %")
@@ -148,7 +138,7 @@ def _share(value: Any, name: str) -> float:
 
 
 _READ: Final[dict[str, Callable[[Any, str], float | None]]] = {
-    "sampling_rate": _rate,
+    "sampling_rate": lambda value, name: read_positive(value, "Hz", name),
     "bandwidth": _frequency,
     "outliers": _share,
 }

@@ -63,12 +63,12 @@ class Priors:
 
     def rows(self, columns: int) -> list[FloatArray]:
         """Return the rows of each prior in a linear problem, the parameters in its first columns."""
-        found = []
+        blocks = []
         for prior, white in self._white:
             row = np.zeros((len(prior.which), columns))
             row[:, prior.which] = white
-            found.append(row)
-        return found
+            blocks.append(row)
+        return blocks
 
 
 def largest_gap(chains: Sequence[Chain], units: FloatArray) -> float:
@@ -134,11 +134,11 @@ class Approach:
         ]
 
     def _scales(self, chains: Sequence[Chain]) -> FloatArray:
-        found = [
+        spreads = [
             float(np.sqrt(left @ left / keep.sum()))
             for left, keep in zip(self._left(chains), self.keep, strict=True)
         ]
-        return np.maximum(found, 1e-16)
+        return np.maximum(spreads, 1e-16)
 
     def _cost(self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float) -> float:
         total = sum(float(off @ off) for off in self.priors.residuals(values))

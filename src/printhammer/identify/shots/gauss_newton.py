@@ -177,38 +177,29 @@ class GaussNewton:
         noise: Solution | None = None,
     ) -> _Weighted:
         """Return residuals and Jacobian of data and priors over their standard errors."""
-        rows, residuals, weights, outliers, scales, memories = [], [], [], [], [], []
+        rows, residuals, outliers, scales, memories = [], [], [], [], []
         for shot, (x, (shown, jacobian, *_rest)) in enumerate(zip(self.data, parts, strict=True)):
             left = x - shown
             out = outliers_of(left, self.floor) if self.robust and near else np.zeros(len(left), bool)
             if noise is not None:
                 out, scale, memory = noise.outliers[shot], noise.scales[shot], noise.memories[shot]
-                weight = np.where(out, 0.0, 1.0)
-            elif near or not self.robust:
-                scale = max(float(np.sqrt(np.mean(left[~out] ** 2))), _LEAST)
-                weight = np.where(out, 0.0, 1.0)
-                memory = memory_factor(np.where(out, 0.0, left)) if near else 1.0
             else:
-                # A stretch that is not met yet is no outlier, only what stands out of the record itself.
-                out, memory = self.spikes[shot], 1.0
+                if self.robust and not near:
+                    # A stretch that is not met yet is no outlier, only what stands out of the record itself.
+                    out = self.spikes[shot]
                 scale = max(float(np.sqrt(np.mean(left[~out] ** 2))), _LEAST)
-                weight = np.where(out, 0.0, 1.0)
+                memory = memory_factor(np.where(out, 0.0, left)) if near else 1.0
+            keep = np.where(out, 0.0, 1.0)
             size = scale * np.sqrt(memory)
-            rows.append(jacobian * (np.sqrt(weight) / size)[:, np.newaxis])
-            residuals.append(left * np.sqrt(weight) / size)
-            weights.append(weight)
+            rows.append(jacobian * (keep / size)[:, np.newaxis])
+            residuals.append(left * keep / size)
             outliers.append(out)
             scales.append(scale)
             memories.append(memory)
         rows += self.priors.rows(len(values))
         residuals += self.priors.residuals(values)
         return _Weighted(
-            np.concatenate(rows),
-            np.concatenate(residuals),
-            outliers,
-            np.array(scales),
-            np.array(memories),
-            near,
+            np.concatenate(rows), np.concatenate(residuals), outliers, np.array(scales), np.array(memories)
         )
 
     def _cost(self, values: FloatArray, chains: Sequence[Chain], here: _Weighted) -> float:
@@ -258,7 +249,7 @@ class GaussNewton:
         best = solution.values[which]
         held = np.zeros(len(solution.values), bool)
         held[which] = True
-        found = {best: 0.0}
+        increases = {best: 0.0}
         for side in (-1.0, 1.0):
             values, states = solution.values, solution.states
             for number in range(1, _POINTS // 2 + 1):
@@ -271,10 +262,10 @@ class GaussNewton:
                     other = self.solve(start, states, held=held, noise=solution)
                 except InputError:
                     break
-                found[place] = max(other.cost - solution.cost, 0.0)
+                increases[place] = max(other.cost - solution.cost, 0.0)
                 values, states = other.values, other.states
-        places = np.array(sorted(found))
-        increase = np.array([found[place] for place in places])
+        places = np.array(sorted(increases))
+        increase = np.array([increases[place] for place in places])
         return Profile(places, increase, _interval(places, increase, best, student(degrees_of_freedom)))
 
 
@@ -287,7 +278,6 @@ class _Weighted:
     outliers: list[npt.NDArray[np.bool_]]
     scales: FloatArray
     memories: FloatArray
-    near: bool
 
 
 def _solved(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -69,18 +69,18 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
 def tied_constants(names: Sequence[str], values: FloatArray, covariance: FloatArray) -> list[str]:
     """Return one sentence for each pair that is hardly told apart, and for each that is weak."""
     errors = np.sqrt(np.diag(covariance))
-    told = []
+    sentences = []
     for i, name in enumerate(names):
         for j in range(i):
             correlation = covariance[i, j] / (errors[i] * errors[j])
             if abs(correlation) > _TIED:
-                told.append(
+                sentences.append(
                     f"{names[j]} and {name} are hardly told apart: their correlation is {correlation:.4f}"
                 )
     for name, value, error in zip(names, values, errors, strict=True):
         if error > _WEAK * abs(value):
-            told.append(f"{name} is known to {100.0 * error / abs(value):.2g} % only")
-    return told
+            sentences.append(f"{name} is known to {100.0 * error / abs(value):.2g} % only")
+    return sentences
 
 
 def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
@@ -99,13 +99,13 @@ def would_be_found(
     relative change that would fit best, of each.
     """
     basis, _r = np.linalg.qr(design)
-    found = []
+    further = []
     for name, column in zip(names, columns.T, strict=True):
         own = column - basis @ (basis.T @ column)
         size = float(own @ own)
         if size > 1e-12 * float(column @ column):
-            found.append((name, size**-0.5, float(own @ residuals) / size))
-    return found
+            further.append((name, size**-0.5, float(own @ residuals) / size))
+    return further
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.identify.lowpass import time_constant
-from printhammer.identify.result import Fit, FittedConstant
+from printhammer.identify.result import REPLACED, Fit, FittedConstant
 from printhammer.identify.shots.approach import Prior
 from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
 from printhammer.identify.shots.identifiable import condition_number, refuse_degenerate, tied_constants, weak
@@ -88,8 +88,7 @@ def fit_motion(
     touched = any(shot.touching("backstop") for shot in shots)
     keys = _free_keys(hammer, free, shots, touched=touched)
     hammer = _plain(hammer, keys)
-    known = _known(hammer, earlier)
-    keys = (*keys, *(key for key in known if key not in keys))
+    keys = tuple(dict.fromkeys([*keys, *(key for fit in earlier for key in _usable(hammer, fit))]))
     pulses, notes = _pulses(hammer, shots)
     start, parameters, priors, own = _assembled(hammer, keys, pulses, earlier)
     shooting = Shooting(hammer, shots, own, parameters)
@@ -98,10 +97,8 @@ def fit_motion(
     names = (*keys, *(f"the current of {shots[owner].name}" for owner in parameters.owners))
     states = [shot.states for shot in shots]
     refuse_degenerate(where, fit.design(start, states), names)
-    try:
+    with located(where):
         solution = fit.solve(start, states)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
     if not touched and hammer.backstop is not None:
         notes.append("no record touches the backstop after the shot: its damping cannot be found from them")
     return _result(hammer, shots, fit, solution, keys, notes)
@@ -145,17 +142,10 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
     """Return the hammer with stiffness and damping of its backstop given as such where they are fitted."""
     backstop = hammer.backstop
     changes: dict[str, float | None] = {}
-    for key, value, others in (
-        (
-            "backstop.stiffness",
-            getattr(backstop, "k", None),
-            ("radius1", "radius2", "youngs_modulus1", "youngs_modulus2", "poisson_ratio1", "poisson_ratio2"),
-        ),
-        (_DAMPING, getattr(backstop, "l", None), ("restitution", "restitution_speed")),
-    ):
+    for key, name in (("backstop.stiffness", "k"), (_DAMPING, "l")):
         if key in keys and key not in hammer.constants:
-            changes |= {f"backstop.{name}": None for name in others if f"backstop.{name}" in hammer.constants}
-            changes[key] = value
+            changes |= {other: None for other in REPLACED[key] if other in hammer.constants}
+            changes[key] = getattr(backstop, name, None)
     if _DAMPING in keys and getattr(backstop, "l", None) == 0.0:
         changes[_DAMPING] = _FIRST_GUESS * float(getattr(backstop, "k", 0.0))
     hammer = hammer.replace(changes) if changes else hammer
@@ -165,17 +155,8 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
     return hammer
 
 
-def _known(hammer: Hammer, earlier: Sequence[Fit]) -> list[str]:
-    """Return the constants of earlier fits that the hammer has."""
-    found: list[str] = []
-    for fit in earlier:
-        for key in _usable(hammer, fit):
-            if key not in found:
-                found.append(key)
-    return found
-
-
 def _usable(hammer: Hammer, fit: Fit) -> list[str]:
+    """Return the constants of an earlier fit that the hammer has."""
     return [key for key in fit.keys if key in hammer.constants and fit.constants[key].in_file]
 
 

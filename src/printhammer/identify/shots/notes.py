@@ -68,7 +68,7 @@ def _resolution(x: FloatArray) -> float:
 
 def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
     """Say where a record does not rest where the hammer does."""
-    told = []
+    sentences = []
     for shot, shown, scale in zip(shots, solution.shown, solution.scales, strict=True):
         before = shot.t < 0.0
         count = int(before.sum())
@@ -76,11 +76,11 @@ def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
             continue
         off = float(np.median(shot.x[before]) - shown[0])
         if abs(off) > max(_OFF * 1.25 * float(scale) / np.sqrt(count), 0.1 * float(scale)):
-            told.append(
+            sentences.append(
                 f"{shot.name} rests {off:+.2g} m from where the hammer does: an offset of the sensor, or a"
                 " backstop of another stiffness or position"
             )
-    return told
+    return sentences
 
 
 def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
@@ -95,7 +95,7 @@ def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
 
 def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str) -> list[str]:
     """Say which constants that were held the records would tell too, and which they ask to be others."""
-    told = [
+    sentences = [
         "a motion shows forces only over the mass: the mass is as good as the forces that were taken as known"
     ]
     shooting = fit.shooting
@@ -110,7 +110,7 @@ def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str)
         and not (recorded and key.startswith("waveform."))
     )
     if not others:
-        return told
+        return sentences
     values = np.array([hammer.constants[key].si for key in others])
     wide = Parameters(others, (), np.abs(values))
     pulses = [
@@ -121,7 +121,7 @@ def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str)
     other = Shooting(base, shooting.shots, pulses, wide)
     chains = other.chains(values, solution.states, derivatives=True)
     if chains is None:
-        return told
+        return sentences
     rows, residuals = [], []
     for shot, chain in enumerate(chains):
         _shown, jacobian, *_rest = other.condensed(shot, chain)
@@ -132,15 +132,15 @@ def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str)
     below = len(solution.design) - sum(len(row) for row in rows)
     columns = np.concatenate([*rows, np.zeros((below, len(others)))])
     left = np.concatenate([*residuals, np.zeros(below)])
-    found = would_be_found(solution.design, columns, others, left)
-    sharp = [f"{name} to {100.0 * error:.2g} %" for name, error, _change in found if error < _TOLD]
+    candidates = would_be_found(solution.design, columns, others, left)
+    sharp = [f"{name} to {100.0 * error:.2g} %" for name, error, _change in candidates if error < _TOLD]
     if sharp:
-        told.append(f"were one more constant free, the records would tell {', '.join(sharp)}")
-    if rejected and found:
-        name, error, change = max(found, key=lambda one: abs(one[2]) / one[1])
+        sentences.append(f"were one more constant free, the records would tell {', '.join(sharp)}")
+    if rejected and candidates:
+        name, error, change = max(candidates, key=lambda entry: abs(entry[2]) / entry[1])
         if abs(change) > _OFF * error:
-            told.append(
+            sentences.append(
                 f"the records ask most for another {name}, by {100.0 * change:+.2g} %: free it, or give its"
                 " fit"
             )
-    return told
+    return sentences

@@ -15,7 +15,7 @@ from printhammer.identify.residuals import noise_of_record, outliers_of, robust_
 from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from printhammer.support.arrays import FloatArray
 
@@ -60,16 +60,9 @@ class Pulse:
 def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform | None, tau: float) -> Pulse:
     """Fit the constants of a waveform to a recorded current, or take the record as the waveform.
 
-    Parameters
-    ----------
-    where : str
-        Name of the file, for messages.
-    t, current : array, shape (n,)
-        Times, ascending, s, of which the firing is 0, and currents, A.
-    waveform : Waveform or None
-        Its shape, with constants near which to look.
-    tau : float
-        Time constant of the sensor, s.
+    The record has times, s, ascending, of which the firing is 0, and currents, A, both of shape (n,); the
+    waveform has constants near which to look, and `tau` is the time constant of the sensor, s. Messages begin
+    with `where`.
 
     Raises
     ------
@@ -119,11 +112,11 @@ def _fitted(
     def residuals(logs: FloatArray) -> FloatArray:
         return np.where(used, shown(logs) - current, 0.0) / top
 
-    best = min(
-        (_least(least_squares, residuals, start, soft=True) for start in starts), key=lambda found: found.cost
-    )
+    # As the noise is not known before, the soft loss begins where residuals are a hundredth of the pulse.
+    rough = (least_squares(residuals, start, loss="soft_l1", f_scale=0.01) for start in starts)
+    best: Any = min(rough, key=lambda solution: solution.cost)
     used = ~outliers_of(shown(best.x) - current, _FLOOR * top)
-    best = _least(least_squares, residuals, best.x, soft=False)
+    best = least_squares(residuals, best.x, xtol=1e-15, ftol=1e-15, gtol=1e-15)
     left = (shown(best.x) - current)[used]
     freedom = max(int(used.sum()) - len(names), 1)
     rms = float(np.sqrt(left @ left / freedom))
@@ -133,19 +126,13 @@ def _fitted(
     return Pulse(made(best.x), names, values, scaled * np.outer(values, values)), rms
 
 
-def _least(solve: Callable[..., Any], residuals: Callable[..., Any], start: FloatArray, *, soft: bool) -> Any:
-    # As the noise is not known before, the soft loss begins where residuals are a hundredth of the pulse.
-    options = {"loss": "soft_l1", "f_scale": 0.01} if soft else {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-    return solve(residuals, start, **options)
-
-
 def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: float) -> list[FloatArray]:
     """Return where to begin: at the constants given, and with height and width as they look in the record."""
     high = t[np.abs(current) > 0.5 * top]
-    seen = dict(values)
-    seen["amplitude"] = top
-    seen["width"] = max(float(high[-1] - high[0]), 1e-9) if len(high) else values["width"]
-    return [np.log(np.array(list(one.values()))) for one in (values, seen)]
+    recorded = dict(values)
+    recorded["amplitude"] = top
+    recorded["width"] = max(float(high[-1] - high[0]), 1e-9) if len(high) else values["width"]
+    return [np.log(np.array(list(constants.values()))) for constants in (values, recorded)]
 
 
 def _recorded(t: FloatArray, current: FloatArray, noise: float, note: str) -> Pulse:

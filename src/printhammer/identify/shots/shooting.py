@@ -99,14 +99,8 @@ class _Run:
 class Shooting:
     """Chains of stretches for several shots, integrated together.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        Its constants that are not fitted stay as they are.
-    pulses : sequence of Pulse
-        The current of each; None where the hammer's own waveform is fired.
-    parameters : Parameters
-        What is fitted.
+    Constants of the hammer that are not fitted stay as they are; where a pulse is None, its own waveform is
+    fired.
     """
 
     def __init__(
@@ -139,14 +133,14 @@ class Shooting:
         """Return hammer, rest state and drives at the values, and with each parameter changed a little."""
         parameters = self.parameters
         count = len(parameters.keys)
-        found = []
+        variants = []
         base, drives = self.hammer_at(values), []
         for shot, pulse in enumerate(self.pulses):
             own = values[parameters.of_shot(shot)]
             drives.append(_drive(base, pulse, own))
-        found.append((base, rest_state(base), drives))
+        variants.append((base, rest_state(base), drives))
         if not derivatives:
-            return found
+            return variants
         for number in range(parameters.count):
             moved = values.copy()
             moved[number] += _STEP * parameters.scales[number]
@@ -156,13 +150,13 @@ class Shooting:
                     _drive(other, None, moved) if pulse is None else drive
                     for pulse, drive in zip(self.pulses, drives, strict=True)
                 ]
-                found.append((other, rest_state(other), fired))
+                variants.append((other, rest_state(other), fired))
             else:
                 shot = parameters.owners[number - count]
                 fired = list(drives)
                 fired[shot] = _drive(base, self.pulses[shot], moved[parameters.of_shot(shot)])
-                found.append((base, found[0][1], fired))
-        return found
+                variants.append((base, variants[0][1], fired))
+        return variants
 
     def chains(
         self, values: FloatArray, states: Sequence[FloatArray], *, derivatives: bool
@@ -265,12 +259,8 @@ class Shooting:
     def opened(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray]:
         """Return what the sensor shows of a shot whose stretches are independent, and how that changes.
 
-        Returns
-        -------
-        shown : array, shape (n,)
-            At the samples.
-        derivatives : array, shape (n, p + 2 j)
-            With respect to the parameters, in their scales, and to the states at the joints, in `units`.
+        At the samples, shape (n,), and its derivatives with respect to the parameters, in their scales, and
+        to the states at the joints, in `units`, shape (n, p + 2 j).
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]
@@ -289,16 +279,10 @@ class Shooting:
     def condensed(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Eliminate the states at the joints: the linear model of a shot in which no gap is left.
 
-        Returns
-        -------
-        shown : array, shape (n,)
-            What the sensor would show if the gaps were closed and the parameters as they are.
-        by_parameter : array, shape (n, p)
-            How that changes with the parameters, counted in their scales.
-        closing : array, shape (j, 2)
-            Change of the states at the joints that closes the gaps.
-        states_by_parameter : array, shape (j, 2, p)
-            How they change with the parameters.
+        Returned are what the sensor would show if the gaps were closed and the parameters as they are, shape
+        (n,); how that changes with the parameters, counted in their scales, shape (n, p); the change of the
+        states at the joints that closes the gaps, shape (j, 2), and how it changes with the parameters, shape
+        (j, 2, p).
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.identify.residuals import noise_of_record, running_median
 from printhammer.identify.tables import read_table
-from printhammer.units import from_si, parse
+from printhammer.units import from_si
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.tables import Table
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 Surface = Literal["pack", "backstop"]
@@ -149,29 +150,29 @@ def find_touches(
         levels.append(("backstop", hammer.position - smooth))
     if hammer.front is not None:
         levels.append(("pack", smooth - hammer.front))
-    found = [touch for surface, depth in levels for touch in _visits(surface, depth, clear)]
-    return sorted(found, key=lambda touch: touch.first), smooth, clear
+    touches = [touch for surface, depth in levels for touch in _visits(surface, depth, clear)]
+    return sorted(touches, key=lambda touch: touch.first), smooth, clear
 
 
 def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
     """Return the runs of samples behind a surface; crossings within the noise do not end them."""
-    found: list[Touch] = []
+    touches: list[Touch] = []
     inside, outside = np.flatnonzero(depth > clear), np.flatnonzero(depth < -clear)
     row = 0
     while True:
         after = inside[np.searchsorted(inside, row) :]
         if len(after) == 0:
-            return found
+            return touches
         first = int(after[0])
         while first > 0 and depth[first - 1] > 0.0:
             first -= 1
         away = outside[np.searchsorted(outside, after[0]) :]
         if len(away) == 0:
-            return [*found, Touch(surface, first, len(depth) - 1)]
+            return [*touches, Touch(surface, first, len(depth) - 1)]
         row = last = int(away[0])
         while depth[last] <= 0.0:
             last -= 1
-        found.append(Touch(surface, first, last))
+        touches.append(Touch(surface, first, last))
 
 
 def _check(
@@ -213,23 +214,21 @@ def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> 
     weights = np.ones(len(s))
     for _ in range(4):
         inverse = np.linalg.pinv(powers.T @ (powers * weights[:, np.newaxis]))
-        found = inverse @ (powers.T @ (weights * x[rows]))
-        left = np.abs(x[rows] - powers @ found)
+        parabola = inverse @ (powers.T @ (weights * x[rows]))
+        left = np.abs(x[rows] - powers @ parabola)
         weights = 1.0 / np.maximum(1.0, left / max(3.0 * float(np.median(left)), noise, 1e-15))
-    return float(found[0]), float(found[1] / scale)
+    return float(parabola[0]), float(parabola[1] / scale)
 
 
-def _bandwidth(table: Table) -> float | None:
+def _bandwidth(table: Readings) -> float | None:
     """Return the bandwidth that a comment of the file tells, Hz."""
     text = table.comments.get("bandwidth", "")
     if text in ("", "none", "unlimited"):
         return None
-    try:
-        value = parse(text, "Hz")
-    except InputError as error:
-        raise InputError(f"{table.path}: the comment 'bandwidth': {error}") from None
+    where = f"{table.path}: the comment 'bandwidth'"
+    value = read_number(text, "Hz", where)
     if not (np.isfinite(value) and value > 0.0):
-        raise InputError(f"{table.path}: the comment 'bandwidth': {text}, expected a positive number")
+        raise InputError(f"{where}: {text}, expected a positive number")
     return value
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.result import Fit, FittedConstant, Profile, student
-from printhammer.identify.static.checks import together
+from printhammer.identify.static.checks import inseparable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -54,6 +54,7 @@ def assemble(
     parameters: Sequence[tuple[str, str, bool]],
     *,
     given: Mapping[str, str],
+    remedies: Mapping[str, str],
     indistinct: Sequence[str] = (),
     rejected: str = "",
     p_value: float = math.nan,
@@ -62,7 +63,13 @@ def assemble(
     """Make the result of a fit, with intervals, and profiles of weak constants by the law.
 
     Of each parameter key, SI unit, and whether a hammer file has it; an empty key stands for one that is of
-    no interest. `given`, `indistinct`, `rejected`, `p_value` and `notes` are as in `Fit`.
+    no interest. `remedies` say by key what to measure to find a constant that has to be positive. `given`,
+    `indistinct`, `rejected`, `p_value` and `notes` are as in `Fit`.
+
+    Raises
+    ------
+    InputError
+        The 95 % interval of a constant that has to be positive reaches zero; says what is missing.
     """
     kept = [k for k, (key, _unit, _in_file) in enumerate(parameters) if key]
     errors = solution.standard_errors
@@ -74,10 +81,17 @@ def assemble(
         constants[key] = FittedConstant.of(key, value, error, freedom, unit, in_file=in_file)
         if in_file and error > _WEAK * abs(value) and not solution.exact:
             profiles[key] = profile(law, data.values, solution, k)
+    for key, remedy in remedies.items():
+        if key in constants and constants[key].interval[0] <= 0.0:
+            low, high = constants[key].interval
+            raise InputError(
+                f"{data.files[0]}: {key} is not told from zero (95 % interval {low:.3g} to {high:.3g}"
+                f" {constants[key].unit}), expected {remedy}"
+            )
     weak = [
-        f"{key} is weakly determined: its profile puts it between {found.interval[0]:.4g} and"
-        f" {found.interval[1]:.4g} {constants[key].unit}"
-        for key, found in profiles.items()
+        f"{key} is weakly determined: its profile puts it between {shape.interval[0]:.4g} and"
+        f" {shape.interval[1]:.4g} {constants[key].unit}"
+        for key, shape in profiles.items()
     ]
     names = [key for key, _unit, _in_file in parameters]
     return Fit(
@@ -100,7 +114,7 @@ def assemble(
         series_names=data.series_names,
         lines=data.lines,
         given=given,
-        indistinct=(*indistinct, *together(solution, names)),
+        indistinct=(*indistinct, *inseparable(solution, names)),
         profiles=profiles,
         rejected=rejected,
         p_value=p_value,
@@ -170,29 +184,8 @@ def enough(data: Data, needed: int, what: str) -> None:
     InputError
         Names the file, the number of rows and the number expected.
     """
+    where = " and ".join(str(path) for path in data.files)
     if len(data.values) < needed:
-        where = " and ".join(str(path) for path in data.files)
         raise InputError(f"{where}: {len(data.values)} rows, too few for {what}, expected {needed} or more")
     if not np.any(data.values):
-        where = " and ".join(str(path) for path in data.files)
         raise InputError(f"{where}: every {data.axes[1][0]} is 0, expected measured values")
-
-
-def positive(fit: Fit, path: Path, remedies: Mapping[str, str]) -> None:
-    """Refuse a fit with a constant that the data do not tell from zero.
-
-    `remedies` say by key what to measure to find the constant.
-
-    Raises
-    ------
-    InputError
-        The 95 % interval of a constant that has to be positive reaches zero; says what is missing.
-    """
-    for key, remedy in remedies.items():
-        constant = fit.constants.get(key)
-        if constant is not None and constant.interval[0] <= 0.0:
-            low, high = constant.interval
-            raise InputError(
-                f"{path}: {key} is not told from zero (95 % interval {low:.3g} to {high:.3g}"
-                f" {constant.unit}), expected {remedy}"
-            )

@@ -17,18 +17,16 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.least_squares import solve
-from printhammer.identify.result import Fit, FittedConstant, student
-from printhammer.identify.static.assemble import Data, assemble, enough, positive
+from printhammer.identify.result import Fit, FittedConstant
+from printhammer.identify.static.assemble import Data, assemble, enough
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.restitution import RestitutionLaw
 from printhammer.identify.tables import read_table
-from printhammer.parts.backstop._hertz import stiffness_from_bodies
+from printhammer.parts.backstop._hertz import damping_from_restitution, stiffness_from_bodies
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
-
-    import numpy.typing as npt
 
     from printhammer.identify.least_squares import Solution
     from printhammer.support.arrays import FloatArray
@@ -61,7 +59,7 @@ class Stiffness:
         moduli: Sequence[tuple[float, float]],
         ratios: Sequence[tuple[float, float]],
     ) -> Stiffness:
-        """Return the stiffness of two bodies after Hertz.
+        """Return the stiffness of two bodies after Hertz, with the error of first order that follows.
 
         Parameters
         ----------
@@ -71,11 +69,6 @@ class Stiffness:
             Young's moduli of both and their standard errors, Pa.
         ratios : sequence of tuple
             Poisson ratios of both and their standard errors.
-
-        Returns
-        -------
-        Stiffness
-            With the error that follows from those given, to first order.
 
         Raises
         ------
@@ -154,7 +147,7 @@ def fit_backstop(
             f"{table.path}: rebounds are {middle:.3g} times as fast as impacts, expected them slower"
         )
     law = RestitutionLaw(speed)
-    start = np.array([_ratio(middle, float(np.median(speed)))])
+    start = np.array([damping_from_restitution(1.0, middle, float(np.median(speed)))])
     solution = solve(law, back, start, robust=robust)
     p_value, why = judge(solution, {"slow": speed, "fast": speed**3}, speed, zeros)
     fit = assemble(
@@ -163,19 +156,12 @@ def fit_backstop(
         solution,
         [(RATIO, "s/m", False)],
         given={},
+        remedies={RATIO: "more rebounds at higher impact speeds"},
         indistinct=[] if k else [f"speeds give {RATIO} alone, neither of both: the stiffness is missing"],
         rejected=_why(solution, speed, back) if why else "",
         p_value=p_value,
     )
-    positive(fit, table.path, {RATIO: "more rebounds at higher impact speeds"})
     return fit if k is None else _with_stiffness(fit, k)
-
-
-def _ratio(restitution: float, speed: float) -> float:
-    """Return l/k for a restitution at a speed."""
-    from printhammer.parts.backstop._hertz import damping_from_restitution
-
-    return damping_from_restitution(1.0, restitution, speed)
 
 
 def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
@@ -186,16 +172,13 @@ def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
     law_misses, flat_misses = (
         float(np.median(np.abs(misses))) for misses in ((solution.residuals / speed)[used], share - constant)
     )
-    slow, fast = (float(np.median(share[part])) for part in _halves(speed[used]))
-    told = f"the restitution is {slow:.3g} at the slower impacts and {fast:.3g} at the faster ones"
+    order = np.argsort(speed[used], kind="stable")
+    middle = len(order) // 2
+    slow, fast = (float(np.median(share[half])) for half in (order[:middle], order[middle:]))
+    trend = f"the restitution is {slow:.3g} at the slower impacts and {fast:.3g} at the faster ones"
     if flat_misses < law_misses:
-        return f"{told}, and a constant restitution of {constant:.3g} describes the rebounds better"
-    return f"{told}, which no value of l/k gives; slow rebounds would have to lose nearly nothing"
-
-
-def _halves(speed: FloatArray) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    order = np.argsort(speed, kind="stable").astype(np.int64)
-    return order[: len(order) // 2], order[len(order) // 2 :]
+        return f"{trend}, and a constant restitution of {constant:.3g} describes the rebounds better"
+    return f"{trend}, which no value of l/k gives; slow rebounds would have to lose nearly nothing"
 
 
 def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
@@ -217,26 +200,18 @@ def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
     )
     # What is known of k and of l/k has nothing in common; l follows from both.
     slopes = {constant.key: (0.0, 1.0), damping.key: (k.value, ratio.value)}
-    found = {RATIO: ratio, constant.key: constant, damping.key: damping}
+    constants = {RATIO: ratio, constant.key: constant, damping.key: damping}
     given = dict(fit.given)
     if not k.how:
-        del slopes[constant.key], found[constant.key]
+        del slopes[constant.key], constants[constant.key]
         given[constant.key] = f"{k.value!r} N/m^1.5"
     rows = np.array(list(slopes.values())) * (ratio.standard_error, k.standard_error)
-    return replace(fit, constants=found, keys=tuple(slopes), covariance=rows @ rows.T, given=given)
+    return replace(fit, constants=constants, keys=tuple(slopes), covariance=rows @ rows.T, given=given)
 
 
 def _constant(k: Stiffness) -> FittedConstant:
     # Errors of bodies are given, not estimated from few data: the normal distribution.
-    half = student(math.inf) * k.standard_error
-    return FittedConstant(
-        "backstop.stiffness",
-        k.value,
-        k.standard_error,
-        (k.value - half, k.value + half),
-        "N/m^1.5",
-        how=k.how,
-    )
+    return FittedConstant.of("backstop.stiffness", k.value, k.standard_error, math.inf, "N/m^1.5", how=k.how)
 
 
 def _of_bodies(k: Stiffness) -> Fit:

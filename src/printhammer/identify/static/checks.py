@@ -37,30 +37,17 @@ def judge(
     and degrees of freedom as those of the fit. The runs test looks at residuals in the order of the abscissa,
     series by series. The least probability counts once for each test (Bonferroni).
 
-    Parameters
-    ----------
-    solution : Solution
-        Fit of the law.
-    terms : mapping of str to array, shape (m,)
-        What the law lacks, in the unit of the data, by what its need would mean.
-    abscissa : array, shape (m,)
-        Where each datum was measured.
-    series : array of int, shape (m,)
-        To which series each datum belongs.
-
-    Returns
-    -------
-    p_value : float
-        Probability of so much against the law if it holds; NaN where the data are exact or too few.
-    why : str
-        What speaks most against the law; empty unless it is rejected.
+    Terms are what the law lacks, in the unit of the data, by what their need would mean; they, abscissa and
+    series have the shape (m,) of the data. Returned are the probability of so much against the law if it
+    holds, NaN where the data are exact or too few, and what speaks most against it, empty unless it is
+    rejected.
     """
     if solution.exact or solution.degrees_of_freedom < 3:
         return math.nan, ""
-    found = {why: _need(solution, term) for why, term in terms.items()}
+    p_values = {why: _need(solution, term) for why, term in terms.items()}
     order = np.lexsort((abscissa, series))
-    found[_RUNS] = runs_p_value(solution.residuals[order][solution.used[order]])
-    known = {why: p for why, p in found.items() if not math.isnan(p)}
+    p_values[_RUNS] = runs_p_value(solution.residuals[order][solution.used[order]])
+    known = {why: p for why, p in p_values.items() if not math.isnan(p)}
     if not known:
         return math.nan, ""
     why = min(known, key=lambda name: known[name])
@@ -102,7 +89,7 @@ def runs_p_value(values: FloatArray) -> float:
     return float(2.0 * norm.sf(abs(runs - mean) / math.sqrt(variance)))
 
 
-def together(solution: Solution, names: Sequence[str]) -> list[str]:
+def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
     """Say which parameters the data hardly tell apart; nothing where the condition number is small.
 
     A sentence has the parameters whose common change the data resist least; one with an empty name is of no
@@ -116,5 +103,5 @@ def together(solution: Solution, names: Sequence[str]) -> list[str]:
     if len(parts) < 2:
         return []
     listed = f"{', '.join(parts[:-1])} and {parts[-1]}"
-    together = f"{listed} go together (condition number {solution.condition_number:.3g})"
-    return [f"{together}: the data fix a combination of them better than each alone"]
+    tied = f"{listed} go together (condition number {solution.condition_number:.3g})"
+    return [f"{tied}: the data fix a combination of them better than each alone"]

@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.least_squares import solve
-from printhammer.identify.static.assemble import Data, assemble, enough, positive
+from printhammer.identify.static.assemble import Data, assemble, enough
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.magnet_law import TotalLaw, start_of
 from printhammer.identify.static.spring import start_of as spring_start
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.identify.result import Fit
-    from printhammer.identify.tables import Table
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 _SPARE: Final = 4
@@ -68,7 +68,9 @@ def fit_magnet(
     if alone is not None and position is None:
         raise InputError(f"{alone.path}: the position of the backstop is missing, expected it with a spring")
     data = _data(table, alone)
-    x, current = data.abscissa, _current(table, alone)
+    x = data.abscissa
+    # NaN where there is no magnet.
+    current = np.concatenate([table.values["current"], np.full(0 if alone is None else len(alone), math.nan)])
     law = TotalLaw(x, current, position if alone is not None else None, zero)
     enough(data, law.parameters + _SPARE, "the constants of the magnet and their errors")
     levels = _check(table, alone, zero or 0.0, position)
@@ -83,23 +85,22 @@ def fit_magnet(
     solution = solve(law, data.values, start, robust=robust)
     _releases(table, law, solution.p, zero, position)
     p_value, why = judge(solution, law.richer(solution.p, by_current=levels != 2), x, data.series)
-    fit = assemble(
+    wide, strong = "more rows over a wider span of displacement", "more currents over a wider span"
+    remedies = {"magnet.Am": wide, "magnet.Bm": strong, "magnet.F0": wide, "spring.Bs": wide}
+    return assemble(
         data,
         law,
         solution,
         _names(alone is not None, zero is None),
         given=_given(position, zero, alone is not None),
+        remedies={**remedies, "spring.As": wide},
         indistinct=_indistinct(alone is not None, levels),
         rejected=why,
         p_value=p_value,
     )
-    wide, strong = "more rows over a wider span of displacement", "more currents over a wider span"
-    remedies = {"magnet.Am": wide, "magnet.Bm": strong, "magnet.F0": wide, "spring.Bs": wide}
-    positive(fit, table.path, {**remedies, "spring.As": wide})
-    return fit
 
 
-def _data(table: Table, alone: Table | None) -> Data:
+def _data(table: Readings, alone: Readings | None) -> Data:
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     series = np.zeros(len(x), dtype=np.int64)
     names: tuple[str, ...] = ("magnet and spring",)
@@ -122,13 +123,7 @@ def _data(table: Table, alone: Table | None) -> Data:
     return Data(files, "magnet", x, force, axes, series, names, lines)
 
 
-def _current(table: Table, alone: Table | None) -> FloatArray:
-    """Return the current of each row; NaN where there is no magnet."""
-    rest = np.full(0 if alone is None else len(alone), math.nan)
-    return np.concatenate([table.values["current"], rest])
-
-
-def _check(table: Table, alone: Table | None, zero: float, position: float | None) -> int:
+def _check(table: Readings, alone: Readings | None, zero: float, position: float | None) -> int:
     """Refuse a table that allows no fit; return the number of different currents, 0 for very many."""
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     low = int(np.argmin(x))
@@ -153,7 +148,7 @@ def _check(table: Table, alone: Table | None, zero: float, position: float | Non
     return levels
 
 
-def _never(table: Table, place: float, force: float) -> str:
+def _never(table: Readings, place: float, force: float) -> str:
     largest = table.values["current"].max()
     return (
         f"{table.path}: the force never releases the armature, at {place:.4g} m it is {force:.3g} N at best,"
@@ -161,7 +156,9 @@ def _never(table: Table, place: float, force: float) -> str:
     )
 
 
-def _releases(table: Table, law: TotalLaw, p: FloatArray, zero: float | None, position: float | None) -> None:
+def _releases(
+    table: Readings, law: TotalLaw, p: FloatArray, zero: float | None, position: float | None
+) -> None:
     """Refuse constants with which the force never becomes positive where the armature rests."""
     offset = float(p[-1]) if zero is None else zero
     place = float(table.values["displacement"].min()) - offset if position is None else position
@@ -186,26 +183,26 @@ def _given(position: float | None, zero: float | None, with_spring: bool) -> dic
 
 
 def _indistinct(with_spring: bool, levels: int) -> list[str]:
-    told = []
+    sentences = []
     if not with_spring:
-        told.append(
+        sentences.append(
             "F0, Bs and As cannot be told apart by forces of magnet and spring together: only"
             f" {_COMBINED} and {_SLOPE} are found; a table of the spring alone would tell them apart"
         )
     if levels == 2:
-        told.append(
+        sentences.append(
             "two currents do not tell a current that weakens the pull from one beyond Am / Bm, where the pull"
             " grows again; it is taken as weakening"
         )
-    return told
+    return sentences
 
 
 def clusters(values: FloatArray) -> int:
     """Count the groups into which values fall, with gaps of a twentieth of their span; 0 for a continuum."""
     if float(np.ptp(values)) <= 1e-3 * float(np.abs(values).max()):
         return 1
-    found = 1 + int(group_of(values).max())
-    return found if found > 1 else 0
+    groups = 1 + int(group_of(values).max())
+    return groups if groups > 1 else 0
 
 
 def group_of(values: FloatArray) -> npt.NDArray[np.int64]:

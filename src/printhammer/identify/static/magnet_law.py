@@ -10,26 +10,16 @@ import numpy as np
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.identify.tables import Table
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 
 class TotalLaw:
-    """Force of magnet and spring at measured displacements and currents.
+    """Force of magnet and spring at measured displacements, m, and currents, A, shape (m,).
 
-    With the position of the backstop p = [F0, Am, Bm, Bs, As]; without it p = [C, Am, Bm, K] and the force is
-    C - K x - (Am - Bm I)^2 / sqrt(x). Where the zero of the displacement is fitted too, it is the last of p.
-
-    Parameters
-    ----------
-    x : array, shape (m,)
-        Displacement as measured, m.
-    current : array, shape (m,)
-        Current, A; NaN where there is no magnet.
-    position : float or None
-        Position b of the backstop, m.
-    zero : float or None
-        What the sensor shows at x = 0, m; None where it is fitted.
+    With the position b of the backstop, m, p = [F0, Am, Bm, Bs, As]; without it p = [C, Am, Bm, K] and the
+    force is C - K x - (Am - Bm I)^2 / sqrt(x). A current that is NaN says that there is no magnet. `zero` is
+    what the sensor shows at x = 0, m; None where it is fitted too, and then it is the last of p.
     """
 
     def __init__(
@@ -53,23 +43,23 @@ class TotalLaw:
 
     def jacobian(self, p: FloatArray) -> FloatArray:
         """Return the derivatives by the parameters."""
-        x, one = self._place(p), self.magnet.astype(np.float64)
+        x, magnet = self._place(p), self.magnet.astype(np.float64)
         left = p[1] - p[2] * self.current
-        pull = [-2.0 * left / np.sqrt(x) * one, 2.0 * left * self.current / np.sqrt(x) * one]
+        pull = [-2.0 * left / np.sqrt(x) * magnet, 2.0 * left * self.current / np.sqrt(x) * magnet]
         if self.position is None:
-            columns = [one, *pull, -x]
+            columns = [magnet, *pull, -x]
         else:
             travel = x - self.position
-            columns = [one, *pull, 1.0 - travel / p[4], p[3] * travel / (p[4] * p[4])]
+            columns = [magnet, *pull, 1.0 - travel / p[4], p[3] * travel / (p[4] * p[4])]
         if self.zero is None:
             columns.append(-self._slope(p))
         return np.column_stack(columns)
 
     def spread(self, p: FloatArray) -> FloatArray:
         """Return the components of the variance: force with and without magnet, displacement, current."""
-        one = self.magnet.astype(np.float64)
-        by_current = 2.0 * p[2] * (p[1] - p[2] * self.current) / np.sqrt(self._place(p)) * one
-        return np.column_stack([one, 1.0 - one, (self._slope(p) * one) ** 2, by_current**2])
+        magnet = self.magnet.astype(np.float64)
+        by_current = 2.0 * p[2] * (p[1] - p[2] * self.current) / np.sqrt(self._place(p)) * magnet
+        return np.column_stack([magnet, 1.0 - magnet, (self._slope(p) * magnet) ** 2, by_current**2])
 
     def at(self, p: FloatArray, x: FloatArray, current: FloatArray) -> FloatArray:
         """Return the force at displacements in m, from x = 0, and currents."""
@@ -77,10 +67,10 @@ class TotalLaw:
 
     def richer(self, p: FloatArray, *, by_current: bool) -> dict[str, FloatArray]:
         """Return terms that equation (3) lacks, by what they would mean."""
-        x, one, current = self._place(p), self.magnet.astype(np.float64), self.current
+        x, magnet, current = self._place(p), self.magnet.astype(np.float64), self.current
         place = "the pull does not follow the inverse root of the displacement"
         square = "the pull does not follow the square of Am - Bm I"
-        terms = {place: one / x}
+        terms = {place: magnet / x}
         if by_current:
             terms |= {square: current**2 / np.sqrt(x), f"{place} at larger currents": current**2 / x}
         return terms
@@ -94,11 +84,11 @@ class TotalLaw:
     def _slope(self, p: FloatArray) -> FloatArray:
         x = self._place(p)
         pull = np.where(self.magnet, 0.5 * (p[1] - p[2] * self.current) ** 2 / x**1.5, 0.0)
-        found: FloatArray = pull - (p[3] if self.position is None else p[3] / p[4])
-        return found
+        slope: FloatArray = pull - (p[3] if self.position is None else p[3] / p[4])
+        return slope
 
 
-def start_of(table: Table, levels: int, zero: float) -> FloatArray:
+def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
     """Return C, Am, Bm and K to begin with, from a fit that is linear in Am^2, Am Bm and Bm^2.
 
     `levels` is the number of different currents, 0 for very many, `zero` what the sensor shows at x = 0, m.
@@ -136,10 +126,10 @@ def _least_absolute(columns: FloatArray, data: FloatArray) -> FloatArray:
     """Return the coefficients with the least sum of absolute residuals, which outliers hardly move."""
     length = np.linalg.norm(columns, axis=0)
     rows = columns / length
-    found = np.linalg.lstsq(rows, data, rcond=None)[0]
+    scaled = np.linalg.lstsq(rows, data, rcond=None)[0]
     small = 1e-9 * float(np.abs(data).max())
     for _ in range(30):
-        weight = 1.0 / np.sqrt(np.maximum(np.abs(data - rows @ found), small))
-        found = np.linalg.lstsq(rows * weight[:, None], data * weight, rcond=None)[0]
-    coefficients: FloatArray = found / length
+        weight = 1.0 / np.sqrt(np.maximum(np.abs(data - rows @ scaled), small))
+        scaled = np.linalg.lstsq(rows * weight[:, None], data * weight, rcond=None)[0]
+    coefficients: FloatArray = scaled / length
     return coefficients

@@ -17,7 +17,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.least_squares import solve
-from printhammer.identify.static.assemble import Data, assemble, enough, positive
+from printhammer.identify.static.assemble import Data, assemble, enough
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.pack_cycles import Cycles, check_loading, cycles_of
 from printhammer.identify.tables import read_table
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from printhammer.identify.least_squares import Solution
     from printhammer.identify.result import Fit
-    from printhammer.identify.tables import Table
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 LOADING, UNLOADING = 2.7, 11.0
@@ -40,20 +40,10 @@ _MEETS: Final = 0.02
 
 
 class PackLaw:
-    """Equation (5) at measured indentations.
+    """Equation (5) at measured indentations over the thickness of the pack, r, shape (m,).
 
-    p = [S, ln rho of each cycle with unloading rows], and the two exponents at its end if they are fitted.
-
-    Parameters
-    ----------
-    r : array, shape (m,)
-        Indentation over thickness.
-    cycles : Cycles
-        Branch and cycle of each row.
-    exponents : bool
-        Whether the exponents are fitted.
-    thickness : float
-        Of the pack, m; an error of the indentation has its slope over it.
+    p = [S, ln rho of each cycle with unloading rows], and the two exponents at its end if they are fitted. An
+    error of the indentation has its slope over the thickness, m.
     """
 
     def __init__(self, r: FloatArray, cycles: Cycles, exponents: bool, thickness: float) -> None:
@@ -140,21 +130,20 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
     p_value, why = (float("nan"), "") if exponents else _judge(law, data, solution)
     free = [("exponent of loading", "1", False), ("exponent of unloading", "1", False)] if exponents else []
     turns = [("", "", False)] * len(law.turns)
-    fit = assemble(
+    return assemble(
         data,
         law,
         solution,
         [("pack.stiffness", "N", True), *turns, *free],
         given={"pack.thickness": f"{thickness!r} m"},
+        remedies={"pack.stiffness": "more rows at larger indentations"},
         rejected=why,
         p_value=p_value,
         notes=_notes(law, table, solution),
     )
-    positive(fit, table.path, {"pack.stiffness": "more rows at larger indentations"})
-    return fit
 
 
-def _start(law: PackLaw, table: Table) -> FloatArray:
+def _start(law: PackLaw, table: Readings) -> FloatArray:
     """Return the parameters to begin with; refuse too few or negative forces of loading in the pack."""
     force, cycles = table.values["force"], law.cycles
     rows = np.flatnonzero(law.inside & ~cycles.unloading)
@@ -181,29 +170,29 @@ def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
     p_value, why = judge(solution, terms, data.abscissa, data.series)
     if why not in terms:
         return p_value, why
-    told = "its force does not grow with the power 2.7 of the indentation"
+    flaw = "its force does not grow with the power 2.7 of the indentation"
     if out:
         r = data.abscissa / law.thickness
         free = PackLaw(r, law.cycles, True, law.thickness)
         start = np.array([*solution.p, LOADING, UNLOADING])
         low, high = free.exponents(solve(free, data.values, start).p)
-        told = f"exponents of {low:.3g} and {high:.3g} describe it better than {LOADING:g} and {UNLOADING:g}"
-    return p_value, told
+        flaw = f"exponents of {low:.3g} and {high:.3g} describe it better than {LOADING:g} and {UNLOADING:g}"
+    return p_value, flaw
 
 
-def _notes(law: PackLaw, table: Table, solution: Solution) -> list[str]:
+def _notes(law: PackLaw, table: Readings, solution: Solution) -> list[str]:
     """Say what is missing, and where the branches meet elsewhere than at the largest indentation."""
     if not len(law.turns):
         return ["without rows of unloading the hysteresis of the pack is taken from equation (5), not tested"]
-    told = []
+    sentences = []
     depth = table.values["indentation"]
     for k, turn in enumerate(law.turns):
         largest = float(depth[law.cycles.cycle == turn].max())
         meeting = float(np.exp(solution.p[1 + k])) * law.thickness
         error = solution.standard_errors[1 + k] * meeting
         if abs(meeting - largest) > max(_MEETS * largest, 5.0 * error):
-            told.append(
+            sentences.append(
                 f"cycle {turn + 1}: loading and unloading meet at an indentation of {meeting:.4g} m, while"
                 f" the largest measured is {largest:.4g} m"
             )
-    return told
+    return sentences

@@ -14,7 +14,7 @@ from printhammer.units import from_si
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.identify.tables import Table
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 _TURN: Final = 0.05
@@ -36,7 +36,7 @@ class Cycles:
     """Cycles with rows of unloading inside the pack, ascending."""
 
 
-def cycles_of(table: Table) -> Cycles:
+def cycles_of(table: Readings) -> Cycles:
     """Divide a table into load cycles; each run of loading rows begins a new one.
 
     Without the column ``branch`` the sense of the indentation decides.
@@ -72,7 +72,7 @@ def _by_sense(depth: FloatArray) -> npt.NDArray[np.bool_]:
     return unloading
 
 
-def check_loading(table: Table, cycles: Cycles) -> None:
+def check_loading(table: Readings, cycles: Cycles) -> None:
     """Refuse a loading branch that is none.
 
     Raises

@@ -13,7 +13,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.least_squares import solve
-from printhammer.identify.static.assemble import Data, assemble, enough, positive
+from printhammer.identify.static.assemble import Data, assemble, enough
 from printhammer.identify.static.checks import judge
 from printhammer.identify.tables import read_table
 
@@ -79,18 +79,16 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit
     u = (x - middle) / half
     bent = "the force is no straight line over the displacement"
     p_value, why = judge(solution, {bent: u * u, f"{bent}, it swings about one": u**3}, x, data.series)
-    fit = assemble(
+    return assemble(
         data,
         law,
         solution,
         [("spring.Bs", "N", True), ("spring.As", "m", True)],
         given={"backstop.position": f"{position!r} m"},
+        remedies=dict.fromkeys(("spring.Bs", "spring.As"), "more rows over a wider span of displacement"),
         rejected=why,
         p_value=p_value,
     )
-    wider = "more rows over a wider span of displacement"
-    positive(fit, table.path, {"spring.Bs": wider, "spring.As": wider})
-    return fit
 
 
 def start_of(path: Path, travel: FloatArray, force: FloatArray) -> FloatArray:

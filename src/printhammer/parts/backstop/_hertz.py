@@ -11,24 +11,10 @@ def stiffness_from_bodies(
     youngs_moduli: tuple[float, float],
     poisson_ratios: tuple[float, float],
 ) -> float:
-    """Return the stiffness of a Hertz contact of two spheres, or of a sphere on a flat.
+    """Return the stiffness k, N/m^1.5, of a Hertz contact of two spheres, or of a sphere on a flat.
 
     Equation: k = (4/3) E* sqrt(R), 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, 1/R = 1/R1 + 1/R2; K. L. Johnson,
-    Contact Mechanics (1985), section 4.2.
-
-    Parameters
-    ----------
-    radius1, radius2 : float
-        Radii, m; `radius2` None for a flat.
-    youngs_moduli : tuple of float
-        E1, E2, Pa.
-    poisson_ratios : tuple of float
-        nu1, nu2.
-
-    Returns
-    -------
-    float
-        k, N/m^1.5.
+    Contact Mechanics (1985), section 4.2. Radii are in m, the second None for a flat, Young's moduli in Pa.
     """
     compliance = sum((1.0 - nu * nu) / e for e, nu in zip(youngs_moduli, poisson_ratios, strict=True))
     curvature = 1.0 / radius1 + (0.0 if radius2 is None else 1.0 / radius2)
@@ -36,25 +22,12 @@ def stiffness_from_bodies(
 
 
 def damping_from_restitution(k: float, restitution: float, speed: float) -> float:
-    """Return the damping of equation (7) that gives a free rebound a certain restitution.
+    """Return the damping l of equation (7), N s/m^2.5, that gives a free rebound a certain restitution.
 
     With z = (l/k) v_in and y = (l/k) v_out a free contact obeys z - ln(1 + z) = -(y + ln(1 - y)), at any mass
     and stiffness: divide m v dv = -(k - l v) delta^1.5 d(x) by (k - l v) and integrate both ways. Solved for
-    z with y = e z by bisection; both sides are divided by z^2, which removes the cancellation at small z.
-
-    Parameters
-    ----------
-    k : float
-        Hertz stiffness, N/m^1.5.
-    restitution : float
-        e = v_out / v_in, in (0, 1].
-    speed : float
-        v_in, m/s, positive.
-
-    Returns
-    -------
-    float
-        l, N s/m^2.5.
+    z with y = e z by bisection; both sides are divided by z^2, which removes the cancellation at small z. The
+    Hertz stiffness k is in N/m^1.5, the restitution e = v_out / v_in in (0, 1], the speed v_in positive, m/s.
     """
     e = restitution
     if e == 1.0:

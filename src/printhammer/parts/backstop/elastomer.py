@@ -22,38 +22,12 @@ from printhammer.support.constants import quantity
 
 
 def backstop_elastic(c: Any, w: float) -> float:
-    """Return the elastic force k w^3.
-
-    Parameters
-    ----------
-    c : float64 array
-        [k, 1.5 k A, pull].
-    w : float
-        sqrt(b - x), m^0.5.
-
-    Returns
-    -------
-    float
-        Force, N, not negative.
-    """
+    """Return the elastic force k w^3, N, not negative."""
     return float(c[0] * w * w * w)
 
 
 def backstop_viscous(c: Any, w: float, v: float) -> float:
-    """Return the viscous force -1.5 k A w v, cut off where the total would pull.
-
-    Parameters
-    ----------
-    c : float64 array
-        [k, 1.5 k A, pull].
-    w, v : float
-        sqrt(b - x), m^0.5, and velocity, m/s.
-
-    Returns
-    -------
-    float
-        Force, N.
-    """
+    """Return the viscous force -1.5 k A w v, N, cut off where the total would pull."""
     force = -c[1] * w * v
     if c[2] == 0.0:
         least = -c[0] * w * w * w
@@ -63,39 +37,13 @@ def backstop_viscous(c: Any, w: float, v: float) -> float:
 
 
 def backstop_energy(c: Any, w: float) -> float:
-    """Return the elastic energy (2/5) k w^5.
-
-    Parameters
-    ----------
-    c : float64 array
-        [k, 1.5 k A, pull].
-    w : float
-        sqrt(b - x), m^0.5.
-
-    Returns
-    -------
-    float
-        Energy, J.
-    """
+    """Return the elastic energy (2/5) k w^5, J."""
     w2 = w * w
     return float(0.4 * c[0] * w2 * w2 * w)
 
 
 def backstop_switch(c: Any, w: float, v: float) -> float:
-    """Return a function that changes sign where the force is cut off.
-
-    Parameters
-    ----------
-    c : float64 array
-        [k, 1.5 k A, pull].
-    w, v : float
-        sqrt(b - x), m^0.5, and velocity, m/s.
-
-    Returns
-    -------
-    float
-        k w^2 - 1.5 k A v, N/m^0.5; 1 where the backstop may pull.
-    """
+    """Return k w^2 - 1.5 k A v, N/m^0.5, whose sign changes where the force is cut off; 1 if it may pull."""
     if c[2] != 0.0:
         return 1.0
     return float(c[0] * w * w - c[1] * v)

@@ -23,37 +23,14 @@ from printhammer.support.constants import quantity
 
 
 def backstop_elastic(c: Any, w: float) -> float:
-    """Return the Hertz force of equation (6), k w^3.
-
-    Parameters
-    ----------
-    c : float64 array
-        [k, l, pull].
-    w : float
-        sqrt(b - x), m^0.5.
-
-    Returns
-    -------
-    float
-        Force, N, not negative.
-    """
+    """Return the Hertz force of equation (6), k w^3, N, not negative."""
     return float(c[0] * (w * w * w))
 
 
 def backstop_viscous(c: Any, w: float, v: float) -> float:
-    """Return the viscoelastic force of equation (7), -l v w^3.
+    """Return the viscoelastic force of equation (7), -l v w^3, N.
 
-    Parameters
-    ----------
-    c : float64 array
-        [k, l, pull].
-    w, v : float
-        sqrt(b - x), m^0.5, and velocity, m/s.
-
-    Returns
-    -------
-    float
-        Force, N; cut off at -k w^3 where the backstop may not pull.
+    Cut off at -k w^3 where the backstop may not pull.
     """
     rate = c[1] * v
     if rate > c[0] and c[2] == 0.0:
@@ -62,39 +39,13 @@ def backstop_viscous(c: Any, w: float, v: float) -> float:
 
 
 def backstop_energy(c: Any, w: float) -> float:
-    """Return the elastic energy of equation (6), (2/5) k w^5.
-
-    Parameters
-    ----------
-    c : float64 array
-        [k, l, pull].
-    w : float
-        sqrt(b - x), m^0.5.
-
-    Returns
-    -------
-    float
-        Energy, J.
-    """
+    """Return the elastic energy of equation (6), (2/5) k w^5, J."""
     w2 = w * w
     return float(0.4 * c[0] * w2 * w2 * w)
 
 
 def backstop_switch(c: Any, w: float, v: float) -> float:
-    """Return a function that changes sign where the force is cut off.
-
-    Parameters
-    ----------
-    c : float64 array
-        [k, l, pull].
-    w, v : float
-        sqrt(b - x), m^0.5, and velocity, m/s.
-
-    Returns
-    -------
-    float
-        k - l v, N/m^1.5; 1 where the backstop may pull.
-    """
+    """Return k - l v, N/m^1.5, whose sign changes where the force is cut off; 1 if it may pull."""
     if c[2] != 0.0:
         return 1.0
     return float(c[0] - c[1] * v)

@@ -20,20 +20,7 @@ RIGID = True
 
 
 def backstop_rebound(c: Any, v_in: float) -> float:
-    """Return the velocity after a bounce.
-
-    Parameters
-    ----------
-    c : float64 array
-        [e].
-    v_in : float
-        Velocity before, m/s, negative.
-
-    Returns
-    -------
-    float
-        Velocity after, m/s, not negative.
-    """
+    """Return the velocity after a bounce, m/s, not negative."""
     return float(-c[0] * v_in)
 
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.support.sheets import finite, read_sheet, split_heading
 
 if TYPE_CHECKING:
@@ -32,19 +32,9 @@ class ForceTable:
 
 
 def gather(rows: Iterable[tuple[float, float, float]], what: str) -> ForceTable:
-    """Make a table of rows (x, current, force) in any order.
+    """Make a table of points in any order: displacement, m, current, A, and force, N.
 
-    Parameters
-    ----------
-    rows : iterable of (float, float, float)
-        Displacement, m, current, A, and force, N.
-    what : str
-        What to name in a message.
-
-    Returns
-    -------
-    ForceTable
-        The complete grid.
+    Messages begin with `what`.
 
     Raises
     ------
@@ -86,16 +76,6 @@ def read_csv(path: Path) -> ForceTable:
     The heading names the columns with their units, ``displacement [mm],current [A],force [N]``, in any
     order; the points may come in any order. Blank lines and lines that begin with # are passed over.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    ForceTable
-        In SI.
-
     Raises
     ------
     InputError
@@ -114,10 +94,8 @@ def read_csv(path: Path) -> ForceTable:
         if len(cells) != len(order):
             raise InputError(f"{what}: line {number} has {len(cells)} cells, expected {len(order)}")
         row = dict(zip(order, (finite(cell, f"{what}: line {number}") for cell in cells), strict=True))
-        try:
+        with located(f"{what}: line {number}"):
             x, current, force = (to_si(row[name], units[name], si) for name, si in COLUMNS.items())
-        except InputError as error:
-            raise InputError(f"{what}: line {number}: {error}") from None
         rows.append((x, current, force))
     return gather(rows, what)
 
@@ -136,34 +114,22 @@ def _heading(cells: Sequence[str], what: str) -> tuple[list[str], dict[str, str]
             raise InputError(
                 f"{what}: column {cell.strip()!r} has no unit, expected the heading {_HEADING!r}"
             )
-        try:
+        with located(f"{what}: column {cell.strip()!r}"):
             to_si(1.0, unit, COLUMNS[name])
-        except InputError as error:
-            raise InputError(f"{what}: column {cell.strip()!r}: {error}") from None
         units[name] = unit
     if len(units) != len(COLUMNS) or len(cells) != len(COLUMNS):
-        given = ",".join(cell.strip() for cell in cells)
-        raise InputError(f"{what}: the heading is {given!r}, expected {_HEADING!r}")
+        listed = ",".join(cell.strip() for cell in cells)
+        raise InputError(f"{what}: the heading is {listed!r}, expected {_HEADING!r}")
     return list(units), units
 
 
 def packed_spline(table: ForceTable) -> tuple[float, ...]:
-    """Return the bicubic spline of a table, as `printhammer.parts.magnet.table` reads it.
+    """Return the bicubic spline of a table, packed as `printhammer.parts.magnet.table` states.
 
     Cubic splines with not-a-knot ends along x, then along the current (with two or three points in a
     direction: the line or the parabola through them), so that force, slopes and curvatures are continuous;
     C. de Boor, J. Math. Phys. 41 (1962) 212. The energy is the exact integral of the spline at zero
     current.
-
-    Parameters
-    ----------
-    table : ForceTable
-        Forces on a grid.
-
-    Returns
-    -------
-    tuple of float
-        [nx, ni, x, current, 16 coefficients a cell, 5 energy coefficients an x cell].
     """
     import numpy as np
     from scipy.interpolate import CubicSpline

@@ -24,22 +24,7 @@ from printhammer.support.constants import quantity
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the net magnetic force of equation (3).
-
-    Parameters
-    ----------
-    c : float64 array
-        [F0, Am, Bm].
-    x : float
-        Displacement, m; the law ends at x = 0.
-    current : float
-        Coil current, A.
-
-    Returns
-    -------
-    float
-        Force, N, positive toward the paper; NaN for x <= 0.
-    """
+    """Return the net magnetic force of equation (3), N; NaN for x <= 0, where the law ends."""
     if x <= 0.0:
         return math.nan
     pull = c[1] - c[2] * current
@@ -48,19 +33,9 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return the potential energy of the magnet at zero current, 2 Am^2 sqrt(x) - F0 x.
+    """Return the potential energy at zero current, 2 Am^2 sqrt(x) - F0 x, J; NaN for x < 0.
 
-    Parameters
-    ----------
-    c : float64 array
-        [F0, Am, Bm].
-    x : float
-        Displacement, m.
-
-    Returns
-    -------
-    float
-        Energy, J, zero at x = 0; minus its slope is the force at zero current; NaN for x < 0.
+    It is zero at x = 0.
     """
     if x < 0.0:
         return math.nan

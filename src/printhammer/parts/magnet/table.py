@@ -30,22 +30,7 @@ if TYPE_CHECKING:
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the force of the table.
-
-    Parameters
-    ----------
-    c : float64 array
-        As the module states.
-    x : float
-        Displacement, m.
-    current : float
-        Coil current, A.
-
-    Returns
-    -------
-    float
-        Force, N, positive toward the paper; NaN outside the table.
-    """
+    """Return the force of the table, N; NaN outside it."""
     nx = int(c[0])
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
@@ -77,20 +62,9 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return the potential energy of the magnet at zero current.
+    """Return the potential energy at zero current, J; NaN outside the table.
 
-    Parameters
-    ----------
-    c : float64 array
-        As the module states.
-    x : float
-        Displacement, m.
-
-    Returns
-    -------
-    float
-        Energy, J, zero at the smallest displacement of the table; minus its slope is the force at zero
-        current; NaN outside the table.
+    It is zero at the smallest displacement of the table.
     """
     nx = int(c[0])
     ni = int(c[1])

@@ -21,20 +21,7 @@ MEMORY = False
 
 
 def pack_loading(c: Any, x: float, v: float) -> float:
-    """Return the force of spring and dashpot.
-
-    Parameters
-    ----------
-    c : float64 array
-        [K, C, xp, pull].
-    x, v : float
-        Displacement, m, and velocity, m/s.
-
-    Returns
-    -------
-    float
-        Force, N, negative where it pushes the armature back; 0 for x < xp.
-    """
+    """Return the force of spring and dashpot, N; 0 for x < xp."""
     depth = x - c[2]
     if depth < 0.0:
         return 0.0
@@ -45,22 +32,7 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 
 
 def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
-    """Return the force of spring and dashpot; a pack without memory unloads as it loads.
-
-    Parameters
-    ----------
-    c : float64 array
-        [K, C, xp, pull].
-    x, v : float
-        Displacement, m, and velocity, m/s.
-    q : float
-        Not used.
-
-    Returns
-    -------
-    float
-        Force, N; 0 for x < xp.
-    """
+    """Return the force of spring and dashpot, N: a pack without memory unloads as it loads."""
     depth = x - c[2]
     if depth < 0.0:
         return 0.0
@@ -71,20 +43,7 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 
 
 def pack_switch(c: Any, x: float, v: float) -> float:
-    """Return a function that changes sign where the force is cut off.
-
-    Parameters
-    ----------
-    c : float64 array
-        [K, C, xp, pull].
-    x, v : float
-        Displacement, m, and velocity, m/s.
-
-    Returns
-    -------
-    float
-        Push of spring and dashpot, N; 1 where the pack may pull.
-    """
+    """Return the push, N, whose sign changes where the force is cut off; 1 if the pack may pull."""
     if c[3] != 0.0:
         return 1.0
     return float(c[0] * (x - c[2]) + c[1] * v)

@@ -26,20 +26,7 @@ MEMORY = True
 
 
 def pack_loading(c: Any, x: float, v: float) -> float:
-    """Return the force of the loading branch of equation (5).
-
-    Parameters
-    ----------
-    c : float64 array
-        [S, xp, 1/d].
-    x, v : float
-        Displacement, m, and velocity, m/s (not used).
-
-    Returns
-    -------
-    float
-        Force, N, not positive; 0 for x <= xp.
-    """
+    """Return the force of the loading branch of equation (5), N, not positive; 0 for x <= xp."""
     r = (x - c[1]) * c[2]
     if r <= 0.0:
         return 0.0
@@ -47,19 +34,9 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 
 
 def pack_memory(c: Any, peak: float) -> float:
-    """Return q = S rmax^-8.3 of a local maximum, which the unloading branch needs.
+    """Return q = S rmax^-8.3 of a local maximum, N, which the unloading branch needs.
 
-    Parameters
-    ----------
-    c : float64 array
-        [S, xp, 1/d].
-    peak : float
-        Displacement of the latest local maximum inside this contact, m.
-
-    Returns
-    -------
-    float
-        q, N; 0 where the indentation is below 1e-30 d, whose force would be below 1e-81 S.
+    It is 0 where the indentation is below 1e-30 d, whose force would be below 1e-81 S.
     """
     r = (peak - c[1]) * c[2]
     if r <= 1e-30:
@@ -68,22 +45,7 @@ def pack_memory(c: Any, peak: float) -> float:
 
 
 def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
-    """Return the force of the unloading branch of equation (5), -q r^11.
-
-    Parameters
-    ----------
-    c : float64 array
-        [S, xp, 1/d].
-    x, v : float
-        Displacement, m, and velocity, m/s (not used).
-    q : float
-        From `pack_memory`.
-
-    Returns
-    -------
-    float
-        Force, N, not positive; 0 for x <= xp.
-    """
+    """Return the force of the unloading branch of equation (5), -q r^11, N; 0 for x <= xp."""
     r = (x - c[1]) * c[2]
     if r <= 0.0:
         return 0.0

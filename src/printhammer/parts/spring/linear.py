@@ -1,13 +1,15 @@
-"""Spring after equation (4): the preloaded armature spring of the paper.
+"""Linear spring after equation (4), by the constants of the paper or by preload and stiffness.
 
-    Fs = Bs - (Bs / As)(x - b)
+    Fs = Bs - (Bs / As)(x - b)  =  preload - stiffness (x - b)
 
-Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (4); b is the position of the backstop (0
-without one).
-Validity: the linear range of the spring. Bs is its force at the backstop, As the travel over which it falls
-to zero. Weakness: neither mass nor damping of its own.
+Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (4), and Hooke's law; b is the position of the
+backstop (0 without one). Bs, the preload, is the force at the backstop, As the travel over which it falls to
+zero. Preload and stiffness may have any sign: a negative stiffness describes the pull of a magnet linearised
+about a point, or a buckled spring; a preload of zero with b = 0 is the spring of the textbook impact
+oscillator.
+Validity: the linear range of the spring. Weakness: neither mass nor damping of its own.
 
-Packed constants: c = [Bs, Bs / As, b].
+Packed constants: c = [preload, stiffness, b].
 """
 
 from __future__ import annotations
@@ -19,38 +21,12 @@ from printhammer.support.constants import quantity
 
 
 def spring_force(c: Any, x: float) -> float:
-    """Return the spring force of equation (4).
-
-    Parameters
-    ----------
-    c : float64 array
-        [Bs, Bs / As, b].
-    x : float
-        Displacement, m.
-
-    Returns
-    -------
-    float
-        Force, N, positive toward the paper.
-    """
+    """Return the force of the spring, N."""
     return float(c[0] - c[1] * (x - c[2]))
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the potential energy of the spring, zero at the backstop.
-
-    Parameters
-    ----------
-    c : float64 array
-        [Bs, Bs / As, b].
-    x : float
-        Displacement, m.
-
-    Returns
-    -------
-    float
-        Energy, J; minus its slope is the force.
-    """
+    """Return the potential energy of the spring, J, zero at the backstop."""
     travel = x - c[2]
     return float((0.5 * c[1] * travel - c[0]) * travel)
 
@@ -67,3 +43,17 @@ class LinearSpring(SpringPart):
     def packed(self, origin: float) -> tuple[float, ...]:
         """Return (Bs, Bs / As, b)."""
         return (self.Bs, self.Bs / self.As, origin)
+
+
+@register
+class PreloadSpring(SpringPart):
+    """Preload and stiffness of a spring."""
+
+    law: ClassVar[str] = "preload"
+
+    preload: float = quantity("N", "P", "spring force at the backstop")
+    stiffness: float = quantity("N/m", "K", "spring stiffness, negative for an unstable spring")
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return (preload, stiffness, b)."""
+        return (self.preload, self.stiffness, origin)

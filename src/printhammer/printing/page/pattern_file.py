@@ -32,7 +32,7 @@ from printhammer.errors import InputError
 from printhammer.printing.page import matrix_font
 from printhammer.support.constants import shown
 from printhammer.support.outputs import write_file
-from printhammer.support.sheets import read_text
+from printhammer.support.texts import read_text
 
 if TYPE_CHECKING:
     from printhammer.support.arrays import BoolArray

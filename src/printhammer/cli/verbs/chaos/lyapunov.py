@@ -135,7 +135,7 @@ def summary(result: Lyapunov) -> list[tuple[str, str | None]]:
 def tally(chart: LyapunovChart) -> str:
     """Count in one line how often both tests agree."""
     pairs = list(zip(chart.growth, chart.zero_one, strict=True))
-    agree = sum(one == other != "undecided" for one, other in pairs)
+    agree = sum(growth == zero_one != "undecided" for growth, zero_one in pairs)
     open_cases = sum("undecided" in pair for pair in pairs)
     chaotic = sum(pair == ("chaotic", "chaotic") for pair in pairs)
     return (

@@ -233,19 +233,13 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
     known = None if hammer is None else load(hammer)
     fit = fitted(known)
     files = {
-        "plot": Content(plot=partial(_drawn, fit)),
+        "plot": Content(plot=fit.plot),
         "out": Content.text(fit.fragment),
         "covariance": Content.text(fit.covariance_table),
     }
     if job.wanted["into"] and known is not None:
         files["into"] = Content(fit.into(known).save)
     return Answer(described(fit), files=files, failed=strict and bool(fit.rejected))
-
-
-def _drawn(fit: Fit) -> Any:
-    from printhammer.figures.fit import plot
-
-    return plot(fit)
 
 
 def _with_error(text: str, flag: str, si: str) -> tuple[float, float]:

@@ -105,14 +105,14 @@ def _places(
     else:
         if out.exists() and not out.is_dir():
             raise InputError(f"--out {out}: expected a folder, this is a file")
-        paths = {one: out / f"{one}.csv" for one in KINDS}
+        paths = {each: out / f"{each}.csv" for each in KINDS}
         if out.is_dir():
             check_outputs(paths.values(), inputs)
     check_new(paths.values(), force=force)
     return list(paths), paths
 
 
-def _settings(kinds: list[str], given: dict[str, Any]) -> dict[str, dict[str, Any]]:
+def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the settings of the sensors of each kind; a setting must belong to one of them."""
     from printhammer.identify.bench.laboratory import SENSORS, SI
     from printhammer.identify.bench.sensor_settings import PARTS, applicable, by_quantity
@@ -120,13 +120,15 @@ def _settings(kinds: list[str], given: dict[str, Any]) -> dict[str, dict[str, An
     known = {name: SI[name] for kind in kinds for name in SENSORS[kind].channels}
     recorded = [kind for kind in kinds if SENSORS[kind].sampling_rate is not None]
     for part in PARTS:
-        if part in given:
-            given[part] = by_quantity(given[part], part, known)
+        if part in settings:
+            settings[part] = by_quantity(settings[part], part, known)
     for name in ("sampling_rate", "bandwidth"):
-        if name in given and not recorded:
+        if name in settings and not recorded:
             flag = name.replace("_", "-")
-            raise InputError(f"--{flag} {given[name]} is given with {kinds[0]}, expected it with motion only")
-    return {kind: applicable(SENSORS[kind], given) for kind in kinds}
+            raise InputError(
+                f"--{flag} {settings[name]} is given with {kinds[0]}, expected it with motion only"
+            )
+    return {kind: applicable(SENSORS[kind], settings) for kind in kinds}
 
 
 def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any]]:

@@ -12,13 +12,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[Executor | None]:
-    """Lend processes; for one worker None, since this process does it.
-
-    Parameters
-    ----------
-    workers : int
-        Number of processes.
-    """
+    """Lend so many processes; for one worker None, since this process does it."""
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import active_children, get_context
 

@@ -16,15 +16,12 @@ if TYPE_CHECKING:
 
     from printhammer.cli.units import Units
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.limits import Limits
 
 _MORE: Final = "Instead of the report"
 _GRID: Final = "Limits and grid of rates"
 _report = partial(opt.text, panel="Report")
 _more = partial(opt.text, panel=_MORE)
 _grid = partial(opt.text, panel=_GRID)
-
-
 _instead = partial(opt.switch, panel=_MORE)
 
 
@@ -72,8 +69,13 @@ def quality(
     Ends with status 1 where a run stopped before its end.
     """
     from printhammer.cli.verbs.printing import quality_report
+    from printhammer.printing.dots.limits import limits_named
 
-    task = _task(**{"safe-rate": safe_rate, "yield": yield_ is not None, "damping": damping})
+    instead = {"safe-rate": safe_rate, "yield": yield_ is not None, "damping": damping}
+    tasks = [name for name, wanted in instead.items() if wanted] or ["report"]
+    if len(tasks) > 1:
+        raise InputError(f"--{tasks[0]} and --{tasks[1]}: expected one of them")
+    task = tasks[0]
     of_report = opt.given(rate=rate, pattern=pattern, pulses=pulses, pitch=pitch)
     of_drive = opt.given(table=table, feedback=feedback or None)
     of_grid = opt.given(first=first, last=last, step=step)
@@ -83,7 +85,8 @@ def quality(
         raise InputError("--rate: expected slots per second, such as --rate 900Hz, or --safe-rate")
     if pattern is not None and pulses is not None:
         raise InputError("--pattern and --pulses: expected one of them")
-    bounds = _limits(limits, force_limit, arrival_limit)
+    share = None if force_limit is None else opt.read_share(force_limit, "--force-limit")
+    bounds = replace(limits_named(limits), **opt.given(force=share, arrival=arrival_limit))
     strategy, loaded_table = chosen_strategy(job, hammer, table, feedback)
     common: dict[str, Any] = {"limits": bounds, **opt.given(tolerance=tolerance), **strategy}
     many: dict[str, Any] = {**common, **of_grid, "threads": threads}
@@ -137,14 +140,6 @@ _TAKES: Final = {
 }
 
 
-def _task(**asked: bool) -> str:
-    """Return what is asked for."""
-    chosen = [name for name, wanted in asked.items() if wanted]
-    if len(chosen) > 1:
-        raise InputError(f"--{chosen[0]} and --{chosen[1]}: expected one of them")
-    return chosen[0] if chosen else "report"
-
-
 def _only(task: str, options: set[str]) -> None:
     """Refuse options of another task."""
 
@@ -156,13 +151,6 @@ def _only(task: str, options: set[str]) -> None:
         where = " or ".join(named(name) for name, takes in _TAKES.items() if odd[0] in takes)
         flag = odd[0].replace("_", "-")
         raise InputError(f"--{flag} is given, which belongs to {where}, not to {named(task)}")
-
-
-def _limits(name: str, force: str | None, arrival: float | None) -> Limits:
-    from printhammer.printing.dots.limits import limits_named
-
-    share = None if force is None else opt.read_share(force, "--force-limit")
-    return replace(limits_named(name), **opt.given(force=share, arrival=arrival))
 
 
 def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -68,11 +67,8 @@ def described(report: Report) -> list[RenderableType]:
     ]
 
 
-def _cell(column: int, row: tuple[str, ...]) -> str:
-    return escape(row[column])
-
-
 def _table(title: str, heads: tuple[str, ...], rows: Rows) -> list[RenderableType]:
     text = {"solver", "engine", "ours as exact"}
-    columns = [Column(escape(head), partial(_cell, k), left=head in text) for k, head in enumerate(heads)]
+    cells = [lambda row, k=k: escape(row[k]) for k in range(len(heads))]
+    columns = [Column(escape(head), cell, left=head in text) for head, cell in zip(heads, cells, strict=True)]
     return [table(columns, rows, title=title), ""]

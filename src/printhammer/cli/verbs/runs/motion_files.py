@@ -32,21 +32,8 @@ UNITS: Final = {
 }
 
 
-def write_dots(motion: Motion, path: Path) -> None:
-    """Write the dots as CSV or Parquet, columns such as "flight_time [s]"; errors as for `write_file`."""
-    from printhammer.run.contacts import Dot
-
-    _write_rows(motion.dots, Dot, path)
-
-
-def write_contacts(motion: Motion, path: Path) -> None:
-    """Write the contacts as CSV or Parquet, with columns such as "t_in [s]"; errors as for `write_file`."""
-    from printhammer.run.contacts import Contact
-
-    _write_rows(motion.contacts, Contact, path)
-
-
-def _write_rows(rows: Sequence[Dot] | Sequence[Contact], kind: type[Dot | Contact], path: Path) -> None:
+def write_rows(rows: Sequence[Dot] | Sequence[Contact], kind: type[Dot | Contact], path: Path) -> None:
+    """Write dots or contacts as CSV or Parquet, columns such as "t_in [s]"; errors as for `write_file`."""
     import pandas as pd
 
     from printhammer.results.files import write_csv, write_parquet
@@ -56,18 +43,11 @@ def _write_rows(rows: Sequence[Dot] | Sequence[Contact], kind: type[Dot | Contac
     (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(frame, path)
 
 
-def write_json(motion: Motion, path: Path) -> None:
-    """Write what a motion tells, names with units; errors as for `write_file`."""
-    from printhammer.support.outputs import write_file
-
-    write_file(path, json.dumps(as_json(motion), indent=2, allow_nan=False) + "\n")
-
-
-def as_json(motion: Motion) -> dict[str, Any]:
-    """Return what a motion tells, SI, names with units."""
+def as_json(motion: Motion) -> str:
+    """Return what a motion tells as JSON, SI, names with units."""
     times, x = motion.maxima
     top = int(x.argmax()) if len(x) else None
-    return {
+    content = {
         "status": motion.status,
         "message": motion.message,
         "end_s": motion.end,
@@ -83,6 +63,7 @@ def as_json(motion: Motion) -> dict[str, Any]:
         "drive": motion.drive.to_toml(),
         "provenance": motion.provenance,
     }
+    return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
 def _named(row: Dot | Contact) -> dict[str, Any]:

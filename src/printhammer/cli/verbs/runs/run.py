@@ -67,7 +67,8 @@ def run(
 
     Ends with status 1 where the run stopped before its end, which the status line names.
     """
-    from printhammer.cli.verbs.runs import motion_files
+    from printhammer.cli.verbs.runs.motion_files import as_json, write_rows
+    from printhammer.run.contacts import Contact, Dot
     from printhammer.run.simulate import simulate
 
     train = {"rate": rate, "period": period, "at": at, "pulses": pulses, "overlap": overlap}
@@ -77,16 +78,16 @@ def run(
     motion = simulate(hammer, fired, **passed)
     shown: list[Table | str] = [facts(summary(motion, units))]
     if fired.quantity == "current" or hammer.pack is not None:
-        shown = [dots_table(motion, units), "", *shown]
+        shown = [table(_COLUMNS, motion.dots, units, most=MOST_ROWS), "", *shown]
     return Answer(
         shown,
         note=escape(repr(motion.drive)[1:-1]),
         files={
             "csv": Content(motion.to_csv),
             "parquet": Content(motion.to_parquet),
-            "dots": Content(partial(motion_files.write_dots, motion)),
-            "contacts": Content(partial(motion_files.write_contacts, motion)),
-            "json": Content(partial(motion_files.write_json, motion)),
+            "dots": Content(partial(write_rows, motion.dots, Dot)),
+            "contacts": Content(partial(write_rows, motion.contacts, Contact)),
+            "json": Content.text(partial(as_json, motion)),
             "plot": Content(plot=motion.plot),
         },
         complaints=[] if motion.ok else [motion.message],
@@ -134,11 +135,6 @@ _COLUMNS: Final[tuple[Column[Dot], ...]] = (
     Column("loss", lambda dot: dot.net_loss, "energy"),
     Column("", _remark, left=True),
 )
-
-
-def dots_table(motion: Motion, units: Units) -> Table:
-    """Return the table of dots."""
-    return table(_COLUMNS, motion.dots, units, most=MOST_ROWS)
 
 
 def summary(motion: Motion, units: Units) -> list[tuple[str, str | None]]:

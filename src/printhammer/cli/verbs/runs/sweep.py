@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,8 +42,14 @@ def sweep(
 
     Whatever ends it, the same command goes on where it ended. A member that fails is a row with a status.
     """
-    if example or schema:
-        typer.echo(_schema() if schema else _example(), nl=False)
+    if schema:
+        from printhammer.sweep import tables
+
+        typer.echo(json.dumps(tables.schema(), indent=2))
+        return Answer()
+    if example:
+        text = files("printhammer").joinpath("sweep", "example.toml").read_text(encoding="utf-8")
+        typer.echo(text, nl=False)
         return Answer()
     from printhammer.cli.verbs.runs.sweep_progress import Telling
     from printhammer.sweep.plan import make_plan
@@ -64,20 +72,6 @@ def sweep(
     job.show(ended(result, telling.new, time.monotonic() - began))
     job.wrote(out)
     return Answer()
-
-
-def _example() -> str:
-    from importlib.resources import files
-
-    return files("printhammer").joinpath("sweep", "example.toml").read_text(encoding="utf-8")
-
-
-def _schema() -> str:
-    import json
-
-    from printhammer.sweep.tables import schema
-
-    return json.dumps(schema(), indent=2) + "\n"
 
 
 def planned(plan: Plan) -> list[RenderableType]:
