@@ -263,20 +263,17 @@ def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change:
     share = SPACING * min(1.0, depth / sink if sink > 0.0 and depth > 0.0 else 1.0)
     share *= min(1.0, problem.scales[1] / abs(dv) if dv else 1.0)
 
-    def moved(e: float) -> float:
-        c = (problem.constants + e * moves)[PACK:BACKSTOP_PART]
-        return _push(problem, c, (x + e * dx, v + e * dv, mode, peak + e * dp))
-
-    near, far = moved(share) - moved(-share), moved(2.0 * share) - moved(-2.0 * share)
-    return (8.0 * near - far) / (12.0 * share)
-
-
-def _push(problem: Problem, c: FloatArray, state: tuple[float, float, float, float]) -> float:
-    x, v, mode, peak = state
     part: Any = import_module(problem.laws.pack)
-    if mode == M.LOADING or not getattr(part, "MEMORY", False):
-        return -float(part.pack_loading(c, x, v))
-    return -float(part.pack_unloading(c, x, v, part.pack_memory(c, peak)))
+    unloads = mode != M.LOADING and getattr(part, "MEMORY", False)
+
+    def push(e: float) -> float:
+        c = (problem.constants + e * moves)[PACK:BACKSTOP_PART]
+        if unloads:
+            return -float(part.pack_unloading(c, x + e * dx, v + e * dv, part.pack_memory(c, peak + e * dp)))
+        return -float(part.pack_loading(c, x + e * dx, v + e * dv))
+
+    near, far = push(share) - push(-share), push(2.0 * share) - push(-2.0 * share)
+    return (8.0 * near - far) / (12.0 * share)
 
 
 def _rates(problem: Problem, record: Record, times: FloatArray, states: FloatArray) -> FloatArray:

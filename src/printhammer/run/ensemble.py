@@ -8,6 +8,7 @@ in the ensemble, nor on the number of threads.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
@@ -186,7 +187,6 @@ class Ensemble:
         self.ends = np.broadcast_to(moments, (self.size,)).astype(np.float64)
         self.states = self._states(rows)
         self.states[:, 0] = self._checked_starts(begun)
-        self._groups: list[Group] | None = None
 
     def _states(self, rows: FloatArray | None) -> FloatArray:
         full = np.zeros((self.size, 5))
@@ -220,31 +220,29 @@ class Ensemble:
             raise InputError(f"starts = {start!r} s, expected a number from 0 to before the end at {end!r} s")
         return starts
 
-    @property
+    @cached_property
     def groups(self) -> list[Group]:
         """The members, sorted by the laws of their parts."""
-        if self._groups is None:
-            alike: dict[Hashable, list[int]] = {}
-            laws: dict[tuple[int, str], Laws] = {}
-            kinds: dict[bytes, LaneKinds | None] = {}
-            for i, (hammer, drive) in enumerate(zip(self.hammers, self.drives, strict=True)):
-                key = (id(hammer), drive.quantity)
-                if key not in laws:
-                    laws[key] = laws_of(hammer, drive)
-                kernel = laws[key], kernel_of(drive, kinds), bool(self.states[i, 3] >= 0.0)
-                alike.setdefault(kernel, []).append(i)
-            self._groups = [
-                Group(
-                    np.array(members),
-                    [self.hammers[i] for i in members],
-                    [self.drives[i] for i in members],
-                    self.states[members],
-                    self.ends[members],
-                    self.tolerance,
-                )
-                for members in alike.values()
-            ]
-        return self._groups
+        alike: dict[Hashable, list[int]] = {}
+        laws: dict[tuple[int, str], Laws] = {}
+        kinds: dict[bytes, LaneKinds | None] = {}
+        for i, (hammer, drive) in enumerate(zip(self.hammers, self.drives, strict=True)):
+            key = (id(hammer), drive.quantity)
+            if key not in laws:
+                laws[key] = laws_of(hammer, drive)
+            kernel = laws[key], kernel_of(drive, kinds), bool(self.states[i, 3] >= 0.0)
+            alike.setdefault(kernel, []).append(i)
+        return [
+            Group(
+                np.array(members),
+                [self.hammers[i] for i in members],
+                [self.drives[i] for i in members],
+                self.states[members],
+                self.ends[members],
+                self.tolerance,
+            )
+            for members in alike.values()
+        ]
 
     def motion(self, member: int) -> Motion:
         """Return everything about one member.

@@ -269,9 +269,10 @@ class Regime:
             There is no number of that name, or the value is not possible.
         """
         if name in (PERIOD, RATE):
-            return self._with_period(
-                period_of_rate(value) if name == RATE else read_positive(value, "s", name)
-            )
+            period = period_of_rate(value) if name == RATE else read_positive(value, "s", name)
+            if self.drive is not None:
+                return self._with_force(frequency=1.0 / period)
+            return replace(self, period=period)
         self.value(name)
         if name.startswith(DRIVE):
             return self._with_force(**{self._of_force(name): float(value)})
@@ -295,11 +296,6 @@ class Regime:
             names += [f"{DRIVE}{name}" for name in _FORCE if isinstance(self.drive, SineForce)]
         fixed = self.drive is not None and not isinstance(self.drive, SineForce)
         return [*([] if fixed else [PERIOD, RATE]), *names]
-
-    def _with_period(self, period: float) -> Self:
-        if self.drive is not None:
-            return self._with_force(frequency=1.0 / period)
-        return replace(self, period=period)
 
     def _with_force(self, **changed: float) -> Self:
         if not isinstance(self.drive, SineForce):
