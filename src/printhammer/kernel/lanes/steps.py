@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.lanes import layout as R
 from printhammer.kernel.lanes.layout import BLOCK
+from printhammer.kernel.model.layout import ForceLaw
 from printhammer.kernel.model.modes import FREE, LOADING, UNLOADING
 
 if TYPE_CHECKING:
@@ -126,9 +127,7 @@ def start_at(pool: Any, i: int) -> State:
 
 
 @inlined
-def timed_step(
-    pool: Any, i: int, start: State, h: float, mode: int, memory: float, hammer: Any
-) -> tuple[float, State, float, bool]:
+def timed_step(pool: Any, i: int, start: State, h: float, law: ForceLaw) -> tuple[float, State, float, bool]:
     """Take a step of `h` [s], at most to the next edge, off the backstop.
 
     Returns
@@ -140,8 +139,7 @@ def timed_step(
     left = pool[R.NEXT * BLOCK + i] - t
     edge = h >= left
     h = left if edge else h
-    drive = drive_at(pool, i)
-    x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, mode, memory, hammer, drive)
+    x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, law)
     t1 = pool[R.NEXT * BLOCK + i] if edge else t + h
     return h, (t1, x1, v1, a1), nystrom_ratio(pool, i, error_x, error_v), edge
 
@@ -157,7 +155,8 @@ def free_block(pool: Any, begin: int) -> None:
         h = pool[R.H * BLOCK + i]
         h = min(h, 1.02 * time_to_level(x - hammer[R.POSITION], -v, -a))
         h = min(h, 1.02 * time_to_level(hammer[R.FRONT] - x, v, a))
-        h, end, ratio, edge = timed_step(pool, i, start, h, FREE, 0.0, hammer)
+        law = ForceLaw(FREE, 0.0, hammer, drive_at(pool, i))
+        h, end, ratio, edge = timed_step(pool, i, start, h, law)
         _t1, x1, v1, a1 = end
         c1 = x + 0.2 * h * v
         c2 = c1 + 0.2 * h * (v + 0.25 * h * a)
@@ -178,8 +177,8 @@ def loading_block(pool: Any, begin: int) -> None:
     for i in range(BLOCK):
         start = start_at(pool, i)
         _t, x, v, a = start
-        hammer = hammer_at(pool, i)
-        h, end, ratio, edge = timed_step(pool, i, start, pool[R.H * BLOCK + i], LOADING, 0.0, hammer)
+        law = ForceLaw(LOADING, 0.0, hammer_at(pool, i), drive_at(pool, i))
+        h, end, ratio, edge = timed_step(pool, i, start, pool[R.H * BLOCK + i], law)
         _t1, x1, v1, a1 = end
         sure = min(v + h * a / 3.0, v1 - h * a1 / 3.0, v1) > 0.0
         outside = max(x1, x + h * v) >= pool[R.HIGHEST * BLOCK + i]
@@ -193,10 +192,10 @@ def unloading_block(pool: Any, begin: int) -> None:
     for i in range(BLOCK):
         start = start_at(pool, i)
         _t, _x, v, a = start
-        hammer, memory = hammer_at(pool, i), pool[R.MEMORY * BLOCK + i]
-        h, end, ratio, edge = timed_step(pool, i, start, pool[R.H * BLOCK + i], UNLOADING, memory, hammer)
+        law = ForceLaw(UNLOADING, pool[R.MEMORY * BLOCK + i], hammer_at(pool, i), drive_at(pool, i))
+        h, end, ratio, edge = timed_step(pool, i, start, pool[R.H * BLOCK + i], law)
         _t1, x1, v1, a1 = end
-        sure = max(v + h * a / 3.0, v1 - h * a1 / 3.0, v1) < 0.0 and x1 > hammer[R.FRONT]
+        sure = max(v + h * a / 3.0, v1 - h * a1 / 3.0, v1) < 0.0 and x1 > law.hammer[R.FRONT]
         # On the steep branch the estimate of order 6 is too small by about this factor.
         settle(pool, i, start, h, end, 5.0 * ratio, sure, edge, False)
 

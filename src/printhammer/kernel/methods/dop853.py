@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     Slopes = tuple[Three, ...]
 
     from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
+    from printhammer.kernel.model.layout import ForceLaw
     from printhammer.kernel.model.pulses import Drive
 
 
@@ -70,8 +71,9 @@ def along(y: Three, h: float, slope: Three) -> Three:
 
 
 @inlined
-def time_slope(t: float, y: Three, mode: int, memory: float, hammer: Hammer, drive: Drive) -> Three:
+def time_slope(t: float, y: Three, law: ForceLaw) -> Three:
     """Return the rates of time, position and velocity; `t` is exact where the time in `y` is a sum."""
+    mode, memory, hammer, drive = law
     return 1.0, y[2], acceleration(t, y[1], y[2], mode, memory, hammer, drive)
 
 
@@ -84,15 +86,7 @@ def contact_slope(y: Three, hammer: Hammer, drive: Drive) -> Three:
 
 @compiled
 def time_step(
-    t0: float,
-    x0: float,
-    v0: float,
-    a0: float,
-    h: float,
-    mode: int,
-    memory: float,
-    hammer: Hammer,
-    drive: Drive,
+    t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
     """Advance position and velocity by `h` [s]; for accelerations that depend on the velocity.
 
@@ -103,30 +97,30 @@ def time_step(
     """
     y, k1 = (t0, x0, v0), (1.0, v0, a0)
     y2 = along(y, h, sum1(T.A02, (k1,)))
-    k2 = time_slope(t0 + T.C02 * h, y2, mode, memory, hammer, drive)
+    k2 = time_slope(t0 + T.C02 * h, y2, law)
     y3 = along(y, h, sum2(T.A03, (k1, k2)))
-    k3 = time_slope(t0 + T.C03 * h, y3, mode, memory, hammer, drive)
+    k3 = time_slope(t0 + T.C03 * h, y3, law)
     y4 = along(y, h, sum2(T.A04, (k1, k3)))
-    k4 = time_slope(t0 + T.C04 * h, y4, mode, memory, hammer, drive)
+    k4 = time_slope(t0 + T.C04 * h, y4, law)
     y5 = along(y, h, sum3(T.A05, (k1, k3, k4)))
-    k5 = time_slope(t0 + T.C05 * h, y5, mode, memory, hammer, drive)
+    k5 = time_slope(t0 + T.C05 * h, y5, law)
     y6 = along(y, h, sum3(T.A06, (k1, k4, k5)))
-    k6 = time_slope(t0 + T.C06 * h, y6, mode, memory, hammer, drive)
+    k6 = time_slope(t0 + T.C06 * h, y6, law)
     y7 = along(y, h, sum4(T.A07, (k1, k4, k5, k6)))
-    k7 = time_slope(t0 + T.C07 * h, y7, mode, memory, hammer, drive)
+    k7 = time_slope(t0 + T.C07 * h, y7, law)
     y8 = along(y, h, sum5(T.A08, (k1, k4, k5, k6, k7)))
-    k8 = time_slope(t0 + T.C08 * h, y8, mode, memory, hammer, drive)
+    k8 = time_slope(t0 + T.C08 * h, y8, law)
     y9 = along(y, h, sum6(T.A09, (k1, k4, k5, k6, k7, k8)))
-    k9 = time_slope(t0 + T.C09 * h, y9, mode, memory, hammer, drive)
+    k9 = time_slope(t0 + T.C09 * h, y9, law)
     y10 = along(y, h, sum7(T.A10, (k1, k4, k5, k6, k7, k8, k9)))
-    k10 = time_slope(t0 + T.C10 * h, y10, mode, memory, hammer, drive)
+    k10 = time_slope(t0 + T.C10 * h, y10, law)
     y11 = along(y, h, sum8(T.A11, (k1, k4, k5, k6, k7, k8, k9, k10)))
-    k11 = time_slope(t0 + T.C11 * h, y11, mode, memory, hammer, drive)
+    k11 = time_slope(t0 + T.C11 * h, y11, law)
     y12 = along(y, h, sum9(T.A12, (k1, k4, k5, k6, k7, k8, k9, k10, k11)))
-    k12 = time_slope(t0 + h, y12, mode, memory, hammer, drive)
+    k12 = time_slope(t0 + h, y12, law)
     k = (k1, k6, k7, k8, k9, k10, k11, k12)
     _t, x, v = along(y, h, sum8(T.B, k))
-    a = acceleration(t0 + h, x, v, mode, memory, hammer, drive)
+    a = time_slope(t0 + h, (t0, x, v), law)[2]
     e5, e3 = sum8(T.E5, k), sum8(T.E3, k)
     error_x = combined_error(h * e5[1], h * e3[1])
     return x, v, a, error_x, combined_error(h * e5[2], h * e3[2])

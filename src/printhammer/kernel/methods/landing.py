@@ -42,10 +42,9 @@ def plain_step(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
     """Take one step of `h` [s] with the method that suits the mode."""
-    mode, memory, hammer, drive = law
-    if HAS_PACK and not MEMORY and mode == M.LOADING:
-        return time_step(t, x, v, a, h, mode, memory, hammer, drive)
-    return nystrom_step(t, x, v, a, h, mode, memory, hammer, drive)
+    if HAS_PACK and not MEMORY and law.mode == M.LOADING:
+        return time_step(t, x, v, a, h, law)
+    return nystrom_step(t, x, v, a, h, law)
 
 
 @compiled

@@ -342,7 +342,8 @@ def run(
             least, most = (-math.inf, 0.0) if mode == M.RESTING else (-still, still)
             if mode != M.RESTING:
                 relabel_node(nodes, used, M.HELD_LOADING if mode == M.LOADING else M.HELD_UNLOADING)
-            ended, pause = rest_ends(t, x, pause, mode, memory, least, most, hammer, drive)
+            law = ForceLaw(mode, memory, hammer, drive)
+            ended, pause = rest_ends(t, x, pause, least, most, law)
             wait = WAIT * time_scale if ended or mode == M.RESTING else min(2.0 * wait, time_scale)
             switch = M.EDGE if pause == t_next - t else M.NO_SWITCH
             t = t_next if switch == M.EDGE else t + pause
