@@ -280,8 +280,8 @@ def interpreted() -> Iterator[None]:
 @functools.cache
 def _plain(laws: Any) -> specialise.Kernel:
     # What all kernels share must be compiled as usual, for those that are.
-    for name in ("hermite", "landing"):
-        import_module(f"printhammer.kernel.methods.{name}")
+    for name in ("methods.hermite", "methods.landing", "lanes.batch"):
+        import_module(f"printhammer.kernel.{name}")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numba.config, "DISABLE_JIT", True)
         return specialise._specialised.__wrapped__(laws)

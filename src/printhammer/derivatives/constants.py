@@ -15,20 +15,11 @@ import numpy as np
 
 from printhammer.derivatives.flow import carry_columns, forcing_of
 from printhammer.derivatives.parameters import as_arrays, parameters, rest_changes
-from printhammer.errors import InputError
+from printhammer.derivatives.states import components, problem_between, state_of
+from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION
-from printhammer.kernel.model.modes import (
-    HELD_UNLOADING,
-    LOADING,
-    OK,
-    RELOADING,
-    RESTING,
-    STATUS_NAMES,
-    UNLOADING,
-)
 from printhammer.kernel.variational.layout import SPACING
-from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
-from printhammer.run.start import initial_state
+from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +30,7 @@ if TYPE_CHECKING:
     from printhammer.derivatives.parameters import Parameter
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.problem import Record
+    from printhammer.run.problem import Problem, Record
     from printhammer.support.arrays import FloatArray
 
 
@@ -84,7 +75,7 @@ class ConstantMap:
     @property
     def ok(self) -> bool:
         """Whether the run went as asked."""
-        return self.status == STATUS_NAMES[OK]
+        return self.status == M.STATUS_NAMES[M.OK]
 
     def moving(
         self, state_map: FloatArray, start_moves: npt.ArrayLike = 0.0, end_moves: npt.ArrayLike = 0.0
@@ -128,19 +119,11 @@ def constant_map(
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
-    drive : Drive
-        The drive.
-    start, end : float
-        Times, s, anywhere in a run from time 0. At the instant of a switch: the state after it.
+    hammer, drive, start, end, state, tolerance
+        As for `printhammer.derivatives.states.tangent_map`.
     constants : sequence of str
         Names such as "pack.stiffness", "waveform.width", "period", "rate" or "firing.1"; see
         `printhammer.derivatives.parameters`.
-    state : tuple of float, optional
-        Displacement, m, and velocity, m/s, at time 0; by default the rest state.
-    tolerance : float, optional
-        Error allowed in one step of the run.
 
     Returns
     -------
@@ -150,34 +133,29 @@ def constant_map(
     Raises
     ------
     InputError
-        Times that are not ascending, an impossible state or tolerance, a constant that is not known or at
-        whose value nothing is differentiable.
+        As for the tangent map; a constant that is not known or at whose value nothing is differentiable.
     """
-    if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
-        raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
-    check_tolerance(tolerance)
+    problem = problem_between(hammer, drive, start, end, state, tolerance)
     wanted = parameters(hammer, drive, constants)
-    problem = Problem(hammer, drive, initial_state(hammer, state), 0.0, tolerance)
     record = problem.run(end)
     marks = np.array([start, end])
-    found = flow(problem, record, wanted, marks, np.zeros((3, len(wanted))))
-    ok = record.status == OK
+    carried = flow(problem, record, wanted, marks, np.zeros((3, len(wanted))))
+    ok = record.status == M.OK
     scales = np.array([parameter.scale for parameter in wanted])
-    three = [code in (UNLOADING, RELOADING, HELD_UNLOADING) for code in found.states[:, 2]]
-    rows = 3 if three[1] else 2
-    changes = found.changes[1, :rows] / scales if ok else np.full((2, len(wanted)), np.nan)
-    rates = _rates(problem, record, marks, found.states) if ok else np.full((2, 3), np.nan)
+    before, rows = (components(code) for code in carried.states[:, 2])
+    changes = carried.changes[1, :rows] / scales if ok else np.full((2, len(wanted)), np.nan)
+    rates = _rates(problem, record, marks, carried.states) if ok else np.full((2, 3), np.nan)
     return ConstantMap(
         matrix=changes,
         constants=tuple(constants),
         values=np.array([parameter.value for parameter in wanted]),
         start=start,
         end=end,
-        state_at_start=_state(found.states[0]),
-        state_at_end=_state(found.states[1]),
-        rate_at_start=rates[0, : 3 if three[0] else 2],
+        state_at_start=state_of(carried.states[0]),
+        state_at_end=state_of(carried.states[1]),
+        rate_at_start=rates[0, :before],
         rate_at_end=rates[1, :rows],
-        smooth=found.smooth,
+        smooth=carried.smooth,
         status=record.status_name,
     )
 
@@ -219,8 +197,8 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
 
     A pulse fired at that time with a sharp edge begins to act later if its firing does.
     """
-    found = np.zeros((3, len(wanted)))
-    found[0] = rest_changes(problem.hammer, wanted)
+    columns = np.zeros((3, len(wanted)))
+    columns[0] = rest_changes(problem.hammer, wanted)
     begun = problem.firings == 0.0
     if begun.any():
         from printhammer.hammer.static_force import StaticForce
@@ -229,8 +207,8 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
         static, x = StaticForce(problem.hammer), problem.state[0]
         push = value if problem.drive.quantity == "force" else static.free(x, value) - static.free(x, 0.0)
         for k, parameter in enumerate(wanted):
-            found[1, k] = -push / problem.hammer.mass * float(parameter.firings[begun].sum())
-    return found
+            columns[1, k] = -push / problem.hammer.mass * float(parameter.firings[begun].sum())
+    return columns
 
 
 def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
@@ -264,7 +242,7 @@ def pack_push_changes(
 def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
     """Return the rate [N/s] of the push of the pack at a time of a run, s; NaN but on the loading branch."""
     row = problem.resample(record, np.array([t]))[0]
-    if int(row[8]) != LOADING:
+    if int(row[8]) != M.LOADING:
         return math.nan
     drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
     a = (float(row[3:8].sum()) + drive) / problem.hammer.mass
@@ -285,20 +263,17 @@ def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change:
     share = SPACING * min(1.0, depth / sink if sink > 0.0 and depth > 0.0 else 1.0)
     share *= min(1.0, problem.scales[1] / abs(dv) if dv else 1.0)
 
-    def moved(e: float) -> float:
-        c = (problem.constants + e * moves)[PACK:BACKSTOP_PART]
-        return _push(problem, c, (x + e * dx, v + e * dv, mode, peak + e * dp))
-
-    near, far = moved(share) - moved(-share), moved(2.0 * share) - moved(-2.0 * share)
-    return (8.0 * near - far) / (12.0 * share)
-
-
-def _push(problem: Problem, c: FloatArray, state: tuple[float, float, float, float]) -> float:
-    x, v, mode, peak = state
     part: Any = import_module(problem.laws.pack)
-    if mode == LOADING or not getattr(part, "MEMORY", False):
-        return -float(part.pack_loading(c, x, v))
-    return -float(part.pack_unloading(c, x, v, part.pack_memory(c, peak)))
+    unloads = mode != M.LOADING and getattr(part, "MEMORY", False)
+
+    def push(e: float) -> float:
+        c = (problem.constants + e * moves)[PACK:BACKSTOP_PART]
+        if unloads:
+            return -float(part.pack_unloading(c, x + e * dx, v + e * dv, part.pack_memory(c, peak + e * dp)))
+        return -float(part.pack_loading(c, x + e * dx, v + e * dv))
+
+    near, far = push(share) - push(-share), push(2.0 * share) - push(-2.0 * share)
+    return (8.0 * near - far) / (12.0 * share)
 
 
 def _rates(problem: Problem, record: Record, times: FloatArray, states: FloatArray) -> FloatArray:
@@ -306,12 +281,8 @@ def _rates(problem: Problem, record: Record, times: FloatArray, states: FloatArr
     table: Any = problem.resample(record, times)
     drive = table[:, 2] if problem.drive.quantity == "force" else 0.0
     acceleration = (table[:, 3:8].sum(axis=1) + drive) / problem.hammer.mass
-    found = np.zeros((len(times), 3))
-    moving = states[:, 2] != RESTING
-    found[:, 0] = np.where(moving, table[:, 1], 0.0)
-    found[:, 1] = np.where(moving, acceleration, 0.0)
-    return found
-
-
-def _state(row: FloatArray) -> tuple[float, float, float]:
-    return float(row[0]), float(row[1]), float(row[3])
+    rates = np.zeros((len(times), 3))
+    moving = states[:, 2] != M.RESTING
+    rates[:, 0] = np.where(moving, table[:, 1], 0.0)
+    rates[:, 1] = np.where(moving, acceleration, 0.0)
+    return rates

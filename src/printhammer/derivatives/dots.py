@@ -69,31 +69,31 @@ class Struck:
 
 def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck]:
     """Find contacts and instants of all dots that were struck."""
-    found: list[Struck] = []
+    struck: list[Struck] = []
     contacts = motion.contacts
     for row in _touches(contacts):
         contact = contacts[row]
         t_peak = _peak_time(problem, record, contact)
         t_force = _force_time(problem, record, contact, t_peak)
-        found.append(Struck(contact.firing or 0, row, _back(contacts, row), t_peak, t_force))
-    return found
+        struck.append(Struck(contact.firing or 0, row, _back(contacts, row), t_peak, t_force))
+    return struck
 
 
 def dot_values(motion: Motion) -> FloatArray:
     """Return the values of `DOT_QUANTITIES` for each firing, SI, shape (dots, q); NaN where not known."""
-    found = np.full((len(motion.dots), len(DOT_QUANTITIES)), np.nan)
+    values = np.full((len(motion.dots), len(DOT_QUANTITIES)), np.nan)
     names = list(DOT_QUANTITIES)
     for dot in motion.dots:
         for place, name in enumerate(names):
             value = getattr(dot, name, None)
-            found[dot.index, place] = math.nan if value is None else value
+            values[dot.index, place] = math.nan if value is None else value
     for row in _touches(motion.contacts):
         back, firing = _back(motion.contacts, row), motion.contacts[row].firing or 0
         if back is not None:
             contact = motion.contacts[back]
-            found[firing, names.index("return_time")] = contact.t_in - motion.dots[firing].fired_at
-            found[firing, names.index("return_speed")] = -contact.v_in
-    return found
+            values[firing, names.index("return_time")] = contact.t_in - motion.dots[firing].fired_at
+            values[firing, names.index("return_speed")] = -contact.v_in
+    return values
 
 
 def _touches(contacts: Sequence[Contact]) -> list[int]:
@@ -142,13 +142,13 @@ def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: floa
         return t_in
     low, high = float(times[best - 1]), float(times[min(best + 1, len(times) - 1)])
     scale = t_out - t_in
-    found = minimize_scalar(
+    best_force = minimize_scalar(
         lambda s: float(problem.resample(record, np.array([t_in + s * scale]))[0, 5]),
         bounds=((low - t_in) / scale, (high - t_in) / scale),
         method="bounded",
         options={"xatol": 1e-10},
     )
-    t = t_in + float(found.x) * scale
+    t = t_in + float(best_force.x) * scale
     # Without damping the force is largest where the indentation is, which is known better.
     return t_peak if abs(t - t_peak) < _NEAR * scale else _settled(problem, record, t, 1e-3 * (high - low))
 
@@ -215,15 +215,15 @@ def changes_of(
         if dot.back is not None:
             nodes.add(int(record.contacts[dot.back, 5]))
     chosen = sorted(nodes)
-    found = flow(problem, record, wanted, marks, initial, chosen)
-    look = _Look(problem, record, wanted, found, marks, {node: row for row, node in enumerate(chosen)})
+    carried = flow(problem, record, wanted, marks, initial, chosen)
+    look = _Look(problem, record, wanted, carried, marks, {node: row for row, node in enumerate(chosen)})
     result = np.full((len(motion.dots), len(DOT_QUANTITIES), len(wanted)), np.nan)
     for dot in struck:
-        told = look.dot(dot, motion.contacts)
+        changes = look.dot(dot, motion.contacts)
         for place, name in enumerate(DOT_QUANTITIES):
-            if name in told:
-                result[dot.index, place] = told[name]
-    return Changes(result, found.changes[-1, _ENERGY:], found.smooth)
+            if name in changes:
+                result[dot.index, place] = changes[name]
+    return Changes(result, carried.changes[-1, _ENERGY:], carried.smooth)
 
 
 @dataclass(frozen=True)
@@ -233,14 +233,14 @@ class _Look:
     problem: Problem
     record: Record
     wanted: Sequence[Parameter]
-    found: Flow
+    flow: Flow
     marks: FloatArray
     rows: dict[int, int]
 
     def columns(self, t: float) -> tuple[FloatArray, FloatArray]:
         """Return state and columns at a mark."""
         row = int(np.searchsorted(self.marks, t))
-        return self.found.states[row], self.found.changes[row]
+        return self.flow.states[row], self.flow.changes[row]
 
     def later(self, columns: FloatArray, surface: str, v: float) -> FloatArray:
         """Return by how much later a surface is passed, s."""
@@ -250,35 +250,35 @@ class _Look:
         """Return the changes of what is known of a dot, by name."""
         contact = contacts[dot.touch]
         fired = np.array([parameter.firings[dot.index] for parameter in self.wanted])
-        touch = self.found.passed[self.rows[int(self.record.contacts[dot.touch, 5])], 0]
+        touch = self.flow.passed[self.rows[int(self.record.contacts[dot.touch, 5])], 0]
         later = self.later(touch, "pack", contact.v_in)
         row = self.problem.resample(self.record, np.array([contact.t_in]))[0]
-        told: dict[str, Any] = {
+        changes: dict[str, Any] = {
             "flight_time": later - fired,
             "impact_speed": touch[1] + _acceleration(self.problem, row, 5) * later,
         }
         state, at_peak = self.columns(dot.t_peak)
-        told["indentation"] = at_peak[0] - surface_moves(self.wanted)["pack"]
-        told["loading_work"] = at_peak[_PACK_LOSS] - touch[_PACK_LOSS]
+        changes["indentation"] = at_peak[0] - surface_moves(self.wanted)["pack"]
+        changes["loading_work"] = at_peak[_PACK_LOSS] - touch[_PACK_LOSS]
         state, at_force = self.columns(dot.t_force)
         total = at_force[:3].copy()
         if dot.t_force == contact.t_in:
             # The largest force is that at touch, whenever that is.
             total[0] = surface_moves(self.wanted)["pack"]
-            total[1] = told["impact_speed"]
-        told["peak_force"] = pack_push_changes(self.problem, self.wanted, state, total)
+            total[1] = changes["impact_speed"]
+        changes["peak_force"] = pack_push_changes(self.problem, self.wanted, state, total)
         if contact.t_out is None:
             gone = self.columns(float(self.record.nodes[-1, 0]))[1]
         else:
             node = int(np.searchsorted(self.record.nodes[:, 0], contact.t_out, side="left"))
-            leave, gone = self.found.passed[self.rows[node]]
-            told["contact_time"] = self.later(leave, "pack", contact.v_out or math.nan) - later
-        told["net_loss"] = gone[_PACK_LOSS] - touch[_PACK_LOSS]
+            leave, gone = self.flow.passed[self.rows[node]]
+            changes["contact_time"] = self.later(leave, "pack", contact.v_out or math.nan) - later
+        changes["net_loss"] = gone[_PACK_LOSS] - touch[_PACK_LOSS]
         if dot.back is not None:
             back = contacts[dot.back]
-            touch = self.found.passed[self.rows[int(self.record.contacts[dot.back, 5])], 0]
+            touch = self.flow.passed[self.rows[int(self.record.contacts[dot.back, 5])], 0]
             later = self.later(touch, "backstop", back.v_in)
             row = self.problem.resample(self.record, np.array([back.t_in]))[0]
-            told["return_time"] = later - fired
-            told["return_speed"] = -(touch[1] + _acceleration(self.problem, row, 6, 7) * later)
-        return told
+            changes["return_time"] = later - fired
+            changes["return_speed"] = -(touch[1] + _acceleration(self.problem, row, 6, 7) * later)
+        return changes

@@ -13,21 +13,7 @@ import numpy as np
 from printhammer.kernel.compile.variational import variational
 from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, SPRING
 from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
-from printhammer.kernel.variational.layout import (
-    BACKSTOP_MOVES,
-    ENERGY,
-    FIELD_MOVES,
-    GROWN,
-    MIDDLE,
-    PACK_MOVES,
-    ROWS,
-    SMOOTH,
-    SPACING,
-    VARIED,
-    WORK_ROWS,
-    Forcing,
-    work_width,
-)
+from printhammer.kernel.variational import layout as V
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -102,16 +88,20 @@ def carry_columns(
         NaN where the run did not get.
     """
     forced, count = forcing is not None, initial.shape[1]
-    rows = ROWS if forced else ENERGY
+    rows = V.ROWS if forced else V.ENERGY
     kernel = variational(problem.kernel, forced=forced)
     drive = problem.drive_arrays()
-    states = np.full((len(marks), 4), np.nan)
-    changes = np.full((len(marks), rows, count), np.nan)
-    growth = np.full((len(marks), count), np.nan)
-    passed = np.full((len(nodes), 2, rows, count), np.nan)
-    columns, work = np.zeros((rows, count)), np.zeros((WORK_ROWS, work_width(count, forced)))
-    track = np.zeros(GROWN + count)
-    track[SMOOTH] = 1.0
+    track = np.zeros(V.GROWN + count)
+    track[V.SMOOTH] = 1.0
+    carried = V.Carried(
+        columns=np.zeros((rows, count)),
+        work=np.zeros((V.WORK_ROWS, V.work_width(count, forced))),
+        track=track,
+        states=np.full((len(marks), 4), np.nan),
+        changes=np.full((len(marks), rows, count), np.nan),
+        growth=np.full((len(marks), count), np.nan),
+        passed=np.full((len(nodes), 2, rows, count), np.nan),
+    )
     status = PAUSED
     for stretch in stretches:
         status = stretch.status
@@ -127,35 +117,30 @@ def carry_columns(
             renormalise,
             status != PAUSED,
             np.ascontiguousarray(initial, np.float64),
-            columns,
-            work,
-            track,
-            states,
-            changes,
-            growth,
-            passed,
+            carried,
         )
-    return Flow(states, changes, growth, passed, columns, bool(track[SMOOTH]), status)
+    columns, _work, _track, states, changes, growth, passed = carried
+    return Flow(states, changes, growth, passed, columns, bool(track[V.SMOOTH]), status)
 
 
 def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, ...]:
     """Return what the kernel needs of the changes of "hammer", "firings" and "pieces" with n constants."""
     moves = changes["hammer"]
     count = len(moves)
-    away = SPACING * (np.arange(VARIED) - MIDDLE)
+    away = V.SPACING * (np.arange(V.VARIED) - V.MIDDLE)
     field = moves[:, SPRING:PACK].any(axis=1) | moves[:, MAGNET:].any(axis=1)
     pack = moves[:, PACK:BACKSTOP_PART].any(axis=1) | (moves[:, FRONT] != 0.0)
     backstop = moves[:, BACKSTOP_PART:MAGNET].any(axis=1)
-    laws = FIELD_MOVES * field + PACK_MOVES * pack + BACKSTOP_MOVES * backstop
+    laws = V.FIELD_MOVES * field + V.PACK_MOVES * pack + V.BACKSTOP_MOVES * backstop
     return tuple(
-        Forcing(
+        V.Forcing(
             varied=problem.constants + away[:, np.newaxis] * moves[:, np.newaxis, :],
             moves=moves,
             of_hammer=np.asarray(laws, dtype=np.int64),
             fire_moves=changes["firings"],
             piece_moves=changes["pieces"],
             live_moves=np.zeros((count, 5 * problem.firings.size)),
-            memories=np.zeros((count, VARIED)),
+            memories=np.zeros((count, V.VARIED)),
             value_spacing=_VALUE_SPACING * (problem.drive.largest_pulse or 1.0),
         )
     )

@@ -116,11 +116,11 @@ def rest_changes(hammer: Hammer, wanted: Sequence[Parameter]) -> FloatArray:
     InputError
         The hammer has no rest state.
     """
-    found = np.zeros(len(wanted))
+    changes = np.zeros(len(wanted))
     for k, parameter in enumerate(wanted):
         if parameter.hammer.any():
-            found[k] = _rest_change(hammer, parameter)
-    return found
+            changes[k] = _rest_change(hammer, parameter)
+    return changes
 
 
 def _rest_change(hammer: Hammer, parameter: Parameter) -> float:
@@ -206,10 +206,10 @@ def _table_change(made: Callable[[float], Waveform], value: float, scale: float,
     kinds = made(value).segments()[:, 1]
 
     def table(moved: float) -> FloatArray:
-        found = made(moved).segments()
-        if len(found) != len(kinds) or (found[:, 1] != kinds).any():
+        segments = made(moved).segments()
+        if len(segments) != len(kinds) or (segments[:, 1] != kinds).any():
             raise InputError(f"constant = {name!r}: the waveform has other segments beside {value!r}")
-        return found
+        return segments
 
     return _difference(table, value, scale, name)
 
@@ -219,12 +219,12 @@ def _difference(function: Callable[[float], FloatArray], value: float, scale: fl
     for offsets, weights in _STENCILS:
         try:
             middle = function(value)
-            found = [function(value + offset * _SPACING * scale) for offset in offsets]
+            samples = [function(value + offset * _SPACING * scale) for offset in offsets]
         except InputError:
             continue
         # From the middle, so that what does not depend on the constant is exactly zero.
         with np.errstate(invalid="ignore"):
-            change = sum(weight * (array - middle) for weight, array in zip(weights, found, strict=True))
+            change = sum(weight * (array - middle) for weight, array in zip(weights, samples, strict=True))
         change = np.asarray(change) / (12.0 * _SPACING)
         return np.where(np.isfinite(change), change, 0.0)
     raise InputError(

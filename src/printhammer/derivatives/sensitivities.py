@@ -146,21 +146,21 @@ class Sensitivities(Result):
         InputError
             A name is not one of the constants, a constant is zero, or a spread is not a number from 0 on.
         """
-        given = np.zeros(len(self.constants))
+        shares = np.zeros(len(self.constants))
         for name, number in spreads.items():
             if name not in self.constants:
                 raise unknown(name, self.constants, "spreads")
             place = self.constants.index(name)
-            given[place] = read_number(number, "1", f"spreads: {name}")
-            if given[place] < 0.0:
+            shares[place] = read_number(number, "1", f"spreads: {name}")
+            if shares[place] < 0.0:
                 raise InputError(f"spreads: {name} = {number!r}, expected a relative spread, 0 or more")
             if self.values[place] == 0.0:
                 raise InputError(f"spreads: {name} is zero, expected a constant with a relative spread")
         return Spread(
             sensitivities=self,
-            spreads=given,
-            dots=np.abs(self.derivatives * self.values) * given,
-            run=np.abs(self.run_derivatives * self.values) * given,
+            spreads=shares,
+            dots=np.abs(self.derivatives * self.values) * shares,
+            run=np.abs(self.run_derivatives * self.values) * shares,
         )
 
     def notes(self) -> dict[str, Any]:
@@ -183,9 +183,9 @@ class Sensitivities(Result):
             | {
                 name: (
                     Column("", meaning, (dim,), "coordinate", name=name),
-                    [told[quantity][place] for quantity in quantities],
+                    [notes[quantity][place] for quantity in quantities],
                 )
-                for name, (dim, meaning, quantities, told, place) in known.items()
+                for name, (dim, meaning, quantities, notes, place) in known.items()
             }
         )
 
@@ -311,8 +311,8 @@ def sensitivities(
     run = np.array([getattr(motion.energy, name) for name in RUN_QUANTITIES])
     shape = (len(motion.dots), len(DOT_QUANTITIES))
     if motion.ok:
-        found = changes_of(motion, problem, record, wanted, initial)
-        dot_changes, run_changes, smooth = found.dots / scales, found.run / scales, found.smooth
+        changes = changes_of(motion, problem, record, wanted, initial)
+        dot_changes, run_changes, smooth = changes.dots / scales, changes.run / scales, changes.smooth
     else:
         dot_changes = np.full((*shape, len(wanted)), np.nan)
         run_changes = np.full((len(RUN_QUANTITIES), len(wanted)), np.nan)
@@ -356,5 +356,5 @@ def _constants(
 
 def _relative(derivatives: FloatArray, values: FloatArray, quantities: FloatArray) -> FloatArray:
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = derivatives * values / quantities[..., np.newaxis]
-    return np.where((values != 0.0) & np.isfinite(found), found, np.nan)
+        logarithmic = derivatives * values / quantities[..., np.newaxis]
+    return np.where((values != 0.0) & np.isfinite(logarithmic), logarithmic, np.nan)

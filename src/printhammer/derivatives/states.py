@@ -183,27 +183,46 @@ def tangent_map(
         Times that are not ascending, an impossible state or tolerance, a hammer without a rest state where
         no state is given.
     """
-    if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
-        raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
-    problem = _problem(hammer, drive, state, tolerance)
-    followed = follow(problem, np.array([start, end]), np.eye(3), renormalise=False)
-    found, status = followed.states, followed.status
-    branches = [int(code) if code >= 0.0 else -1 for code in found[:, 2]]
-    shape = [3 if branch in (UNLOADING, RELOADING, HELD_UNLOADING) else 2 for branch in branches]
-    matrix = (
-        followed.columns[: shape[1], : shape[0]].copy() if status == OK else np.full((2, shape[0]), np.nan)
-    )
+    problem = problem_between(hammer, drive, start, end, state, tolerance)
+    flow = follow(problem, np.array([start, end]), np.eye(3), renormalise=False)
+    branches = [int(code) if code >= 0.0 else -1 for code in flow.states[:, 2]]
+    columns, rows = (components(branch) for branch in branches)
+    ok = flow.status == OK
     return TangentMap(
-        matrix=matrix,
+        matrix=flow.columns[:rows, :columns].copy() if ok else np.full((2, columns), np.nan),
         start=start,
         end=end,
-        state_at_start=(float(found[0, 0]), float(found[0, 1]), float(found[0, 3])),
-        state_at_end=(float(found[1, 0]), float(found[1, 1]), float(found[1, 3])),
+        state_at_start=state_of(flow.states[0]),
+        state_at_end=state_of(flow.states[1]),
         branch_at_start=branches[0],
         branch_at_end=branches[1],
-        smooth=followed.smooth,
-        status=STATUS_NAMES[status],
+        smooth=flow.smooth,
+        status=flow.status_name,
     )
+
+
+def problem_between(
+    hammer: Hammer,
+    drive: Drive,
+    start: float,
+    end: float,
+    state: tuple[float, float] | None,
+    tolerance: float,
+) -> Problem:
+    """Return the run of a map from `start` to `end`, s, its arguments checked as `tangent_map` says."""
+    if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
+        raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
+    return _problem(hammer, drive, state, tolerance)
+
+
+def components(mode: float) -> int:
+    """Return how many components the state has in a mode; on the unloading branch it has a memory."""
+    return 3 if mode in (UNLOADING, RELOADING, HELD_UNLOADING) else 2
+
+
+def state_of(row: FloatArray) -> tuple[float, float, float]:
+    """Return displacement, m, velocity, m/s, and latest local maximum, m, of a row of `Flow.states`."""
+    return float(row[0]), float(row[1]), float(row[3])
 
 
 def strobe_exponent(
@@ -270,7 +289,7 @@ def strobe_exponent(
         period=spacing,
         factors=factors,
         smooth=followed.smooth,
-        status=STATUS_NAMES[followed.status],
+        status=followed.status_name,
         second_factors=growth[:, 1].copy(),
         states=followed.states[first - 1 - before :].copy(),
     )
@@ -320,16 +339,16 @@ def strobe_exponents(
     many = [hammers] * len(spacings) if isinstance(hammers, Hammer) else list(hammers)
     if len(many) != len(spacings):
         raise InputError(f"hammers: {len(many)} are given, expected 1 or {len(spacings)}")
-    found: dict[int, Exponent] = {}
+    exponents: dict[int, Exponent] = {}
 
     def work(begin: int, stop: int) -> None:
         for i in range(begin, stop):
-            found[i] = strobe_exponent(
+            exponents[i] = strobe_exponent(
                 many[i], waveform, float(spacings[i]), first=first, last=last, tolerance=tolerance
             )
 
     in_threads([work], [len(many)], thread_count(threads), progress)
-    return [found[i] for i in range(len(many))]
+    return [exponents[i] for i in range(len(many))]
 
 
 def standard_error(series: npt.ArrayLike) -> float:

@@ -152,7 +152,7 @@ def integrate(
         raise ValueError(f"reading {reading!r}, expected one of {', '.join(READINGS)}")
     if not (scale > 0.0 and t_end > 0.0 and math.isfinite(scale) and math.isfinite(t_end)):
         raise ValueError(f"scale {scale} and duration {t_end} s are expected to be positive")
-    program = _program(tuple(laws[name] for name in LAW_NAMES))
+    program = _program(tuple(laws[name] for name in LAW_NAMES), scheme == "trapezoid")
     firings, begins, segments, replace, is_force = drive
     contact = CONTACT_STEP * scale
     wanted = np.zeros(0) if moments is None else np.array(moments, dtype=np.float64)
@@ -162,7 +162,7 @@ def integrate(
         np.ascontiguousarray(constants[role], dtype=np.float64)
         for role in ("magnet", "spring", "pack", "backstop")
     )
-    options = (bool(replace), bool(is_force), scheme == "trapezoid", rigid, reload_along_unloading)
+    options = (bool(replace), bool(is_force), rigid, reload_along_unloading)
     places = np.array([mass, front, position, t_end, far, *state])
     table = (
         np.array(firings, dtype=np.float64),
@@ -170,16 +170,15 @@ def integrate(
         np.array(segments, dtype=np.float64),
         np.zeros(1, dtype=np.int64),
     )
-    size, status = program(
-        packed, table, options, places, steps, READINGS.index(reading), wanted, moments is not None, rows
-    )
+    model = (packed, table, options, places)
+    size, status = program(model, steps, READINGS.index(reading), wanted, moments is not None, rows)
     t, x, v, memory = rows[:size].T.copy()
     return SchemeRun(t, x, v, memory, _STATUS[status])
 
 
 @functools.lru_cache(maxsize=32)
-def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
-    """Compile the program of 1983 for a set of laws."""
+def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Callable[..., Any]:
+    """Compile the program of 1983 for a set of laws; `model` is packed constants, drive, options, places."""
     import numba
 
     options: dict[str, Any] = {"error_model": "numpy"}
@@ -220,10 +219,9 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
         return total
 
     @numba.njit(**options)  # type: ignore[untyped-decorator]
-    def acceleration(
-        time: float, x: float, v: float, peak: float, packed: Any, table: Any, options: Any, places: Any
-    ) -> float:
-        replace, is_force, _, rigid, along = options
+    def acceleration(time: float, x: float, v: float, peak: float, model: Any) -> float:
+        packed, table, options, places = model
+        replace, is_force, rigid, along = options
         drive = drive_value(time, table, replace)
         force = magnet_force(packed[0], x, 0.0 if is_force else drive) + spring_force(packed[1], x)
         if is_force:
@@ -240,24 +238,16 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
 
     @numba.njit(**options)  # type: ignore[untyped-decorator]
     def runge_kutta(
-        time: float,
-        x: float,
-        v: float,
-        h: float,
-        peak: float,
-        packed: Any,
-        table: Any,
-        options: Any,
-        places: Any,
+        time: float, x: float, v: float, h: float, peak: float, model: Any
     ) -> tuple[float, float, bool]:
         half = 0.5 * h
-        a1 = acceleration(time, x, v, peak, packed, table, options, places)
+        a1 = acceleration(time, x, v, peak, model)
         v2 = v + half * a1
-        a2 = acceleration(time + half, x + half * v, v2, peak, packed, table, options, places)
+        a2 = acceleration(time + half, x + half * v, v2, peak, model)
         v3 = v + half * a2
-        a3 = acceleration(time + half, x + half * v2, v3, peak, packed, table, options, places)
+        a3 = acceleration(time + half, x + half * v2, v3, peak, model)
         v4 = v + h * a3
-        a4 = acceleration(time + h, x + h * v3, v4, peak, packed, table, options, places)
+        a4 = acceleration(time + h, x + h * v3, v4, peak, model)
         return (
             x + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4),
             v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4),
@@ -266,33 +256,25 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
 
     @numba.njit(**options)  # type: ignore[untyped-decorator]
     def trapezoid(
-        time: float,
-        x: float,
-        v: float,
-        h: float,
-        peak: float,
-        packed: Any,
-        table: Any,
-        options: Any,
-        places: Any,
+        time: float, x: float, v: float, h: float, peak: float, model: Any
     ) -> tuple[float, float, bool]:
         # The rule for x, x1 = x + h/2 (v + v1), is put into the one for v: one equation for v1.
         half = 0.5 * h
-        a = acceleration(time, x, v, peak, packed, table, options, places)
+        a = acceleration(time, x, v, peak, model)
         known = v + half * a
         new = v + h * a
         # The least size keeps the tolerance above rounding where the hammer is at rest.
         size = abs(v) + abs(h * a) + 1e-3
-        a1 = acceleration(time + h, x + half * (v + new), new, peak, packed, table, options, places)
+        a1 = acceleration(time + h, x + half * (v + new), new, peak, model)
         residual = new - known - half * a1
         if not math.isfinite(residual):
             # The first guess is outside the range of a law; this one ends where the step began.
             new = -v
-            a1 = acceleration(time + h, x, new, peak, packed, table, options, places)
+            a1 = acceleration(time + h, x, new, peak, model)
             residual = new - known - half * a1
         for _ in range(NEWTON_LIMIT):
             trial = new + 1e-7 * size
-            a2 = acceleration(time + h, x + half * (v + trial), trial, peak, packed, table, options, places)
+            a2 = acceleration(time + h, x + half * (v + trial), trial, peak, model)
             change = residual / (1.0 - half * (a2 - a1) / (trial - new))
             if abs(change) <= 1e-10 * size:
                 new -= change
@@ -301,9 +283,7 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
             after = math.inf
             for _ in range(20):
                 trial = new - change
-                a2 = acceleration(
-                    time + h, x + half * (v + trial), trial, peak, packed, table, options, places
-                )
+                a2 = acceleration(time + h, x + half * (v + trial), trial, peak, model)
                 after = trial - known - half * a2
                 if abs(after) < abs(residual):
                     break
@@ -311,24 +291,7 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
             new, a1, residual = trial, a2, after
         return x, v, False
 
-    @numba.njit(**options)  # type: ignore[untyped-decorator]
-    def step(
-        time: float,
-        x: float,
-        v: float,
-        h: float,
-        peak: float,
-        packed: Any,
-        table: Any,
-        options: Any,
-        places: Any,
-    ) -> tuple[float, float, bool]:
-        end: tuple[float, float, bool]
-        if options[2]:
-            end = trapezoid(time, x, v, h, peak, packed, table, options, places)
-        else:
-            end = runge_kutta(time, x, v, h, peak, packed, table, options, places)
-        return end
+    step = trapezoid if implicit else runge_kutta
 
     @numba.njit(**options)  # type: ignore[untyped-decorator]
     def keep(row: Array, time: float, x: float, v: float, peak: float, front: float) -> None:
@@ -338,19 +301,10 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
 
     @numba.njit(**options)  # type: ignore[untyped-decorator]
     def program(
-        packed: Any,
-        table: Any,
-        options: Any,
-        places: Any,
-        steps: Any,
-        reading: int,
-        moments: Array,
-        at_moments: bool,
-        rows: Array,
+        model: Any, steps: Any, reading: int, moments: Array, at_moments: bool, rows: Array
     ) -> tuple[int, int]:
+        packed, (firings, _begins, _segments, fired), (_replace, _is_force, rigid, along), places = model
         front, position, t_end, far = places[1], places[2], places[3], places[4]
-        rigid, along = options[3], options[4]
-        firings, fired = table[0], table[3]
         time, place, speed, peak = 0.0, places[5], places[6], places[5]
         n, settling_since, short = 0, 0.0, 0
         if not at_moments or (moments.size > 0 and moments[0] <= 0.0):
@@ -373,14 +327,12 @@ def _program(functions: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
             if reading == 2 and h == steps[1] and short == 0:
                 short = 10
             h = min(h, t_end - time)
-            new_place, new_speed, solved = step(time, place, speed, h, peak, packed, table, options, places)
+            new_place, new_speed, solved = step(time, place, speed, h, peak, model)
             ends_inside = not (solved and new_place >= position)
             if reading != 1 and not inside and h > steps[1] and ends_inside:
                 h = steps[1]
                 short = 10 if reading == 2 else 0
-                new_place, new_speed, solved = step(
-                    time, place, speed, h, peak, packed, table, options, places
-                )
+                new_place, new_speed, solved = step(time, place, speed, h, peak, model)
             short = max(short - 1, 0)
             if not solved:
                 return n, 1

@@ -162,13 +162,13 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
     """
     rows, others = matching(computed, measured)
     times = max((chart["time"].values for chart in (measured, computed)), key=_spacing)
-    found = np.full(len(rows), np.nan)
+    rms = np.full(len(rows), np.nan)
     for k, (row, other) in enumerate(zip(rows.tolist(), others.tolist(), strict=True)):
         difference = on_times(computed, row, times) - on_times(measured, other, times)
         known = np.isfinite(difference)
         if known.any():
-            found[k] = np.sqrt(np.mean(np.square(difference[known])))
-    return computed["rate"].values[rows], found
+            rms[k] = np.sqrt(np.mean(np.square(difference[known])))
+    return computed["rate"].values[rows], rms
 
 
 def _spacing(times: FloatArray) -> float:
@@ -179,19 +179,19 @@ def _rates(rates: npt.ArrayLike | None) -> FloatArray:
     if rates is None:
         return np.linspace(LOWEST, HIGHEST, RATES)
     try:
-        found = np.atleast_1d(np.array(rates, dtype=np.float64))
+        grid = np.atleast_1d(np.array(rates, dtype=np.float64))
     except (TypeError, ValueError):
         raise InputError("rates: expected numbers, Hz") from None
-    if found.ndim != 1 or found.size == 0:
-        raise InputError(f"rates: an array of shape {found.shape}, expected a list of at least one rate, Hz")
-    odd = found[~(np.isfinite(found) & (found > 0.0))]
+    if grid.ndim != 1 or grid.size == 0:
+        raise InputError(f"rates: an array of shape {grid.shape}, expected a list of at least one rate, Hz")
+    odd = grid[~(np.isfinite(grid) & (grid > 0.0))]
     if odd.size:
         raise InputError(f"rates: {odd[0]:.9g} Hz, expected finite numbers greater than 0 Hz")
-    falling = np.flatnonzero(np.diff(found) <= 0.0)
+    falling = np.flatnonzero(np.diff(grid) <= 0.0)
     if falling.size:
-        before, after = found[falling[0] : falling[0] + 2]
+        before, after = grid[falling[0] : falling[0] + 2]
         raise InputError(f"rates: {after:.9g} Hz follows {before:.9g} Hz, expected ascending rates")
-    return found
+    return grid
 
 
 def _times(times: npt.ArrayLike | None, end: float) -> FloatArray:
@@ -204,9 +204,9 @@ def _times(times: npt.ArrayLike | None, end: float) -> FloatArray:
         if count > MOST_CELLS:
             raise InputError(f"times = {count!r}, expected at most {MOST_CELLS}")
         return np.linspace(0.0, end, int(count))
-    found = np.array(times, dtype=np.float64)
-    if found.ndim != 1 or found.size == 0 or not np.isfinite(found).all():
+    grid = np.array(times, dtype=np.float64)
+    if grid.ndim != 1 or grid.size == 0 or not np.isfinite(grid).all():
         raise InputError("times: expected a list of finite numbers, s")
-    if found[0] < 0.0 or (np.diff(found) <= 0.0).any() or found[-1] <= 0.0:
+    if grid[0] < 0.0 or (np.diff(grid) <= 0.0).any() or grid[-1] <= 0.0:
         raise InputError("times: expected ascending times, s, not negative, the last one greater than 0 s")
-    return found
+    return grid

@@ -86,11 +86,11 @@ def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
         return {}
     codes = str(chart["status"].attrs.get("codes", ""))
     names = dict(part.split(" ", 1) for part in codes.split(", ") if " " in part)
-    found: dict[str, list[float]] = {}
+    failed: dict[str, list[float]] = {}
     for code, rate in zip(chart["status"].values.tolist(), chart["rate"].values.tolist(), strict=True):
         if code != 0:
-            found.setdefault(names.get(str(code), str(code)), []).append(rate)
-    return found
+            failed.setdefault(names.get(str(code), str(code)), []).append(rate)
+    return failed
 
 
 def hammer_attributes(hammer: Hammer) -> dict[str, Any]:

@@ -61,7 +61,7 @@ def load_measured_map(path: str | Path, *, times: npt.ArrayLike | None = None) -
     source = Path(path)
     stored = source.suffix.lower() == ".zarr" or _magic(source).startswith((_CLASSIC, _HDF5))
     records = _stored_records(source) if stored else read_records(source)
-    grid = _common_times(records) if times is None else _given(times)
+    grid = _common_times(records) if times is None else _checked_times(times)
     rows = np.stack([interpolated(record.times, record.displacement, grid) for record in records])
     attributes = {
         "title": f"measured frequency-time map, {source.name}",
@@ -81,11 +81,11 @@ def _magic(path: Path) -> bytes:
         raise InputError(f"{path}: the measured map cannot be read ({error.strerror or error})") from None
 
 
-def _given(times: npt.ArrayLike) -> FloatArray:
-    found = np.array(times, dtype=np.float64).reshape(-1)
-    if not found.size or not np.isfinite(found).all() or (np.diff(found) <= 0.0).any():
+def _checked_times(times: npt.ArrayLike) -> FloatArray:
+    grid = np.array(times, dtype=np.float64).reshape(-1)
+    if not grid.size or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
         raise InputError("times: expected ascending numbers, s")
-    return found
+    return grid
 
 
 def _common_times(records: list[RateRecord]) -> FloatArray:
@@ -102,9 +102,9 @@ def _common_times(records: list[RateRecord]) -> FloatArray:
 
 def _stored_records(path: Path) -> list[RateRecord]:
     what = str(path)
-    with _opened(path) as found:
-        values = {name: _variable(found, what, name) for name in _SI}
-        dimensions = {name: tuple(map(str, found[name].dims)) for name in _SI}
+    with _opened(path) as stored:
+        values = {name: _variable(stored, what, name) for name in _SI}
+        dimensions = {name: tuple(map(str, stored[name].dims)) for name in _SI}
     rates, times, x = values["rate"], values["time"], values["displacement"]
     over = dimensions["displacement"]
     if len(over) != 2 or "rate" not in over or dimensions["rate"] != ("rate",):
@@ -159,18 +159,18 @@ def _opened(path: Path) -> Any:
         raise InputError(f"{path}: the measured map cannot be read ({reason[:200]})") from None
 
 
-def _variable(found: xr.Dataset, what: str, name: str) -> FloatArray:
-    if name not in found.variables:
-        there = ", ".join(map(str, found.variables)) or "nothing"
+def _variable(stored: xr.Dataset, what: str, name: str) -> FloatArray:
+    if name not in stored.variables:
+        there = ", ".join(map(str, stored.variables)) or "nothing"
         raise InputError(f"{what}: expected the variable {name}, there is {there}")
-    unit = found[name].attrs.get("units")
+    unit = stored[name].attrs.get("units")
     if not isinstance(unit, str):
         raise InputError(
             f"{what}: {name} is expected to carry its unit in the attribute units, such as {_SI[name]!r}"
         )
     try:
         factor = to_si(1.0, unit, _SI[name])
-        values = np.asarray(found[name].values, dtype=np.float64) * factor
+        values = np.asarray(stored[name].values, dtype=np.float64) * factor
     except InputError as error:
         raise InputError(f"{what}: {name}: {error}") from None
     except (OSError, TypeError, ValueError):

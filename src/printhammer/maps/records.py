@@ -100,10 +100,10 @@ def read_records(path: Path) -> list[RateRecord]:
     cells = _cells(path)
     names = [_named(cells.what, cell) for cell in cells.heading]
     if sorted(name for name, _unit in names) == sorted(_SI):
-        found = _one_row_a_sample(cells, dict(names))
+        records = _one_row_a_sample(cells, dict(names))
     else:
-        found = _one_column_a_rate(cells, names)
-    return sorted(found, key=lambda record: record.rate)
+        records = _one_column_a_rate(cells, names)
+    return sorted(records, key=lambda record: record.rate)
 
 
 def checked(
@@ -149,12 +149,12 @@ def _one_row_a_sample(cells: Cells, units: dict[str, str]) -> list[RateRecord]:
     rate, time, x = (
         cells.column(index[name], si, units[name], gaps=name == "displacement") for name, si in _SI.items()
     )
-    found = []
+    records = []
     for value in np.unique(rate):
         rows = np.flatnonzero(rate == value)
         places = [f"line {line}" for line in cells.lines[rows]]
-        found.append(checked(cells.what, float(value), time[rows], x[rows], places))
-    return found
+        records.append(checked(cells.what, float(value), time[rows], x[rows], places))
+    return records
 
 
 def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateRecord]:
@@ -162,7 +162,7 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
     if len(columns) != 1 or len(names) < 2:
         raise InputError(f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}")
     times = cells.column(columns[0], "s", names[columns[0]][1])
-    found: dict[float, RateRecord] = {}
+    records: dict[float, RateRecord] = {}
     for k, (name, unit) in enumerate(names):
         if k == columns[0]:
             continue
@@ -176,14 +176,14 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
             raise InputError(
                 f"{cells.what}: column {cells.heading[k]!r}: {error}; expected {_HEADINGS}"
             ) from None
-        if rate in found:
+        if rate in records:
             raise InputError(
                 f"{cells.what}: column {cells.heading[k]!r}: the rate {rate:.9g} Hz has two columns"
             )
         places = [f"line {line}, column {cells.heading[k]!r}" for line in cells.lines]
         x = cells.column(k, "m", unit, gaps=True)
-        found[rate] = checked(cells.what, rate, times, x, places)
-    return list(found.values())
+        records[rate] = checked(cells.what, rate, times, x, places)
+    return list(records.values())
 
 
 def _named(what: str, cell: str) -> tuple[str, str]:

@@ -64,10 +64,7 @@ class _Run:
         self.steps: list[Step] = []
         self.status = ""
         self.guess = 1e-5
-        self._start(*(self._rest_state() if state is None else state))
-
-    def _rest_state(self) -> tuple[float, float]:
-        return self.parts.rest(), 0.0
+        self._start(*((self.parts.rest(), 0.0) if state is None else state))
 
     def _start(self, x: float, v: float) -> None:
         parts = self.parts
@@ -169,12 +166,8 @@ class _Run:
             h *= reach
         theta = min(reach, limit / h)
         if theta > 1e5:
-            return self._rescaled(contact, h * theta)
+            return h * theta, 1.0, *self._expand(contact, h * theta)
         return h, theta, y, v
-
-    def _rescaled(self, contact: Contact, h: float) -> tuple[float, float, Array, Array]:
-        y, v = self._expand(contact, h)
-        return h, 1.0, y, v
 
     def _cell_guards(self, y: Array, h: float) -> list[tuple[str, Array]]:
         table = self.parts.table

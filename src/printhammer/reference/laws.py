@@ -93,7 +93,7 @@ class Table:
         The outer edges of the currents have some slack, for a pulse that ends at zero up to rounding; those
         of the displacements are the range of the magnet.
         """
-        found = []
+        distances = []
         for axis, series in ((0, x), (1, current)):
             edges, place = self.edges[axis], cell[axis]
             slack = 1e-9 * (edges[-1] - edges[0])
@@ -101,8 +101,8 @@ class Table:
                 outer = not 0 <= place + step < edges.size - 1
                 kind = "range-left" if outer else f"cell {axis} {step}"
                 if not outer or axis == 1:
-                    found.append((kind, offset(sign * series, outer * slack - sign * edge)))
-        return found
+                    distances.append((kind, offset(sign * series, outer * slack - sign * edge)))
+        return distances
 
 
 class ReferenceHammer:

@@ -116,26 +116,32 @@ def _motion_series(
     ``spring``: (force at x = 0, slope). ``contact``: (sigma or 0, K, p, E, q, scale). ``drive``: series
     in s/h. SI throughout.
     """
+
+    def product(a: Array, b: Array, k: int) -> float:
+        """Coefficient k of a product."""
+        total = 0.0
+        for j in range(k + 1):
+            total += a[j] * b[k - j]
+        return total
+
+    def power(p: float, a: Array, b: Array, k: int) -> float:
+        """Coefficient k > 0 of b = a**p, from those before it."""
+        total = 0.0
+        for j in range(1, k + 1):
+            total += (p * j - (k - j)) * a[j] * b[k - j]
+        return float(total / (k * a[0]))
+
     n = y.size - 1
     sigma, big_k, p, big_e, q, scale = contact[0], contact[1], contact[2], contact[3], contact[4], contact[5]
-    x = np.zeros(n + 1)
-    root = np.zeros(n + 1)
-    gap = np.zeros(n + 1)
-    r = np.zeros(n + 1)
-    r_p = np.zeros(n + 1)
-    r_q = np.zeros(n + 1)
-    chain = np.zeros((4, n + 1))
-    current_power = np.zeros((4, n + 1))
-    x_power = np.zeros((4, n + 1))
+    rows = np.zeros((7, n + 1))
+    x, root, gap, r, r_p, r_q, speed = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
+    chain, current_power, x_power = np.zeros((4, n + 1)), np.zeros((4, n + 1)), np.zeros((4, n + 1))
     if magnet_kind == 1:
         for k in range(n + 1):
             drop = magnet[1] if k == 0 else 0.0
             current_power[1, k] = drop - (magnet[2] * drive[k] if is_current else 0.0)
         for k in range(n + 1):
-            total = 0.0
-            for j in range(k + 1):
-                total += current_power[1, j] * current_power[1, k - j]
-            gap[k] = total
+            gap[k] = product(current_power[1], current_power[1], k)
     elif magnet_kind == 2:
         current_power[0, 0] = 1.0
         for k in range(n + 1):
@@ -143,10 +149,7 @@ def _motion_series(
         current_power[1, 0] -= magnet[1]
         for e in range(2, 4):
             for k in range(n + 1):
-                total = 0.0
-                for j in range(k + 1):
-                    total += current_power[1, j] * current_power[e - 1, k - j]
-                current_power[e, k] = total
+                current_power[e, k] = product(current_power[1], current_power[e - 1], k)
         x_power[0, 0] = 1.0
     for k in range(n):
         x[k] = y[k] if k > 0 else ref + y[0]
@@ -158,68 +161,36 @@ def _motion_series(
                 root[0] = 1.0 / math.sqrt(x[0])
                 force += magnet[0]
             else:
-                total = 0.0
-                for j in range(1, k + 1):
-                    total += (-0.5 * j - (k - j)) * x[j] * root[k - j]
-                root[k] = total / (k * x[0])
+                root[k] = power(-0.5, x, root, k)
             for j in range(k + 1):
                 force -= gap[j] * root[k - j]
         elif magnet_kind == 2:
             x_power[1, k] = y[k] if k > 0 else (ref - magnet[0]) + y[0]
             for e in range(2, 4):
-                total = 0.0
-                for j in range(k + 1):
-                    total += x_power[1, j] * x_power[e - 1, k - j]
-                x_power[e, k] = total
+                x_power[e, k] = product(x_power[1], x_power[e - 1], k)
             for e in range(4):
                 for f in range(4):
-                    total = 0.0
-                    for j in range(k + 1):
-                        total += x_power[e, j] * current_power[f, k - j]
-                    force += magnet[2 + 4 * e + f] * total
+                    force += magnet[2 + 4 * e + f] * product(x_power[e], current_power[f], k)
         if sigma != 0.0:
             r[k] = sigma * y[k] / scale
+            speed[k] = sigma * v[k]
             if p == 1.0:
                 r_p[k] = r[k]
             elif p == 11.0:
                 # r2, r3, r4, r8 by products: an integer power needs no division by r, which may be tiny.
-                for e in range(4):
-                    total = 0.0
-                    for j in range(k + 1):
-                        if e == 0:
-                            total += r[j] * r[k - j]
-                        elif e == 1:
-                            total += chain[0, j] * r[k - j]
-                        elif e == 2:
-                            total += chain[0, j] * chain[0, k - j]
-                        else:
-                            total += chain[2, j] * chain[2, k - j]
-                    chain[e, k] = total
-                for j in range(k + 1):
-                    r_p[k] += chain[3, j] * chain[1, k - j]
-            elif k == 0:
-                r_p[0] = r[0] ** p
+                chain[0, k] = product(r, r, k)
+                chain[1, k] = product(chain[0], r, k)
+                chain[2, k] = product(chain[0], chain[0], k)
+                chain[3, k] = product(chain[2], chain[2], k)
+                r_p[k] = product(chain[3], chain[1], k)
             else:
-                total = 0.0
-                for j in range(1, k + 1):
-                    total += (p * j - (k - j)) * r[j] * r_p[k - j]
-                r_p[k] = total / (k * r[0])
+                r_p[k] = power(p, r, r_p, k) if k > 0 else r[0] ** p
             push = big_k * r_p[k]
-            if big_e != 0.0:
-                if q == 0.0:
-                    push += big_e * sigma * v[k]
-                else:
-                    if k == 0:
-                        r_q[0] = r[0] ** q
-                    else:
-                        total = 0.0
-                        for j in range(1, k + 1):
-                            total += (q * j - (k - j)) * r[j] * r_q[k - j]
-                        r_q[k] = total / (k * r[0])
-                    total = 0.0
-                    for j in range(k + 1):
-                        total += r_q[j] * sigma * v[k - j]
-                    push += big_e * total
+            if big_e != 0.0 and q == 0.0:
+                push += big_e * speed[k]
+            elif big_e != 0.0:
+                r_q[k] = power(q, r, r_q, k) if k > 0 else r[0] ** q
+                push += big_e * product(r_q, speed, k)
             force -= sigma * push
         v[k + 1] = h * force / (mass * (k + 1))
         y[k + 1] = h * v[k] / (k + 1)

@@ -81,11 +81,11 @@ def squared_current(drive: Drive, start: float, end: float) -> float:
     for low, high in zip([start, *inside], [*inside, end], strict=True):
         before = math.inf
         for halving in range(_HALVINGS):
-            found = _gauss(drive, np.linspace(low, high, 2**halving + 1))
-            if abs(found - before) <= _HEAT_ERROR * found:
+            integral = _gauss(drive, np.linspace(low, high, 2**halving + 1))
+            if abs(integral - before) <= _HEAT_ERROR * integral:
                 break
-            before = found
-        total.append(found)
+            before = integral
+        total.append(integral)
     return math.fsum(total)
 
 

@@ -143,7 +143,7 @@ def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid:
         return []
     peaks = problem.peaks(record)
     times = problem.firings
-    found: list[Contact] = []
+    contacts: list[Contact] = []
     dotted: set[int] = set()
     for row, (surface, t_in, v_in, t_out, v_out, _node, initial) in enumerate(record.contacts):
         is_pack = int(surface) == PACK_SURFACE
@@ -154,7 +154,7 @@ def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid:
             extra = fired in dotted
             dotted.add(fired)
         hard = rigid and not is_pack
-        found.append(
+        contacts.append(
             Contact(
                 surface="pack" if is_pack else "backstop",
                 t_in=float(t_in),
@@ -170,7 +170,7 @@ def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid:
                 initial=bool(initial),
             )
         )
-    return found
+    return contacts
 
 
 def loading_works(

@@ -8,6 +8,7 @@ in the ensemble, nor on the number of threads.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
@@ -25,9 +26,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.drive.trains import Drive
+    from printhammer.kernel.compile.lanes import LaneKinds
     from printhammer.kernel.model.laws import Laws
     from printhammer.results.result import Entries
-    from printhammer.run.ensemble_group import LaneKinds
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
@@ -186,7 +187,6 @@ class Ensemble:
         self.ends = np.broadcast_to(moments, (self.size,)).astype(np.float64)
         self.states = self._states(rows)
         self.states[:, 0] = self._checked_starts(begun)
-        self._groups: list[Group] | None = None
 
     def _states(self, rows: FloatArray | None) -> FloatArray:
         full = np.zeros((self.size, 5))
@@ -220,31 +220,29 @@ class Ensemble:
             raise InputError(f"starts = {start!r} s, expected a number from 0 to before the end at {end!r} s")
         return starts
 
-    @property
+    @cached_property
     def groups(self) -> list[Group]:
         """The members, sorted by the laws of their parts."""
-        if self._groups is None:
-            alike: dict[Hashable, list[int]] = {}
-            laws: dict[tuple[int, str], Laws] = {}
-            kinds: dict[bytes, LaneKinds | None] = {}
-            for i, (hammer, drive) in enumerate(zip(self.hammers, self.drives, strict=True)):
-                key = (id(hammer), drive.quantity)
-                if key not in laws:
-                    laws[key] = laws_of(hammer, drive)
-                kernel = laws[key], kernel_of(drive, kinds), bool(self.states[i, 3] >= 0.0)
-                alike.setdefault(kernel, []).append(i)
-            self._groups = [
-                Group(
-                    np.array(members),
-                    [self.hammers[i] for i in members],
-                    [self.drives[i] for i in members],
-                    self.states[members],
-                    self.ends[members],
-                    self.tolerance,
-                )
-                for members in alike.values()
-            ]
-        return self._groups
+        alike: dict[Hashable, list[int]] = {}
+        laws: dict[tuple[int, str], Laws] = {}
+        kinds: dict[bytes, LaneKinds | None] = {}
+        for i, (hammer, drive) in enumerate(zip(self.hammers, self.drives, strict=True)):
+            key = (id(hammer), drive.quantity)
+            if key not in laws:
+                laws[key] = laws_of(hammer, drive)
+            kernel = laws[key], kernel_of(drive, kinds), bool(self.states[i, 3] >= 0.0)
+            alike.setdefault(kernel, []).append(i)
+        return [
+            Group(
+                np.array(members),
+                [self.hammers[i] for i in members],
+                [self.drives[i] for i in members],
+                self.states[members],
+                self.ends[members],
+                self.tolerance,
+            )
+            for members in alike.values()
+        ]
 
     def motion(self, member: int) -> Motion:
         """Return everything about one member.
@@ -328,9 +326,9 @@ class Ensemble:
         for job in jobs:
             job.finish(x)
         return EnsembleResult(
-            status=self._gathered([job.status for job in jobs]),
-            reached=self._gathered([job.reached for job in jobs]),
-            steps=self._gathered([job.steps for job in jobs]),
+            status=self._gathered([job.kept.status for job in jobs]),
+            reached=self._gathered([job.kept.reached for job in jobs]),
+            steps=self._gathered([job.kept.steps for job in jobs]),
             dots=self._dot_table(jobs) if dots else None,
             strobes=None if strobes is None else self._strobes(jobs, moments),
             x=None if times is None else x,
@@ -342,10 +340,8 @@ class Ensemble:
             whole[group.members] = gathered
         return whole
 
-    def _spread(self, jobs: Sequence[Job], which: str) -> FloatArray:
+    def _spread(self, tables: Sequence[FloatArray], starts: Sequence[npt.NDArray[np.int64]]) -> FloatArray:
         """Return ragged rows of the results as one array (members, rows, columns), filled up with NaN."""
-        tables = [getattr(job, which) for job in jobs]
-        starts = [getattr(job, f"{which}_starts") for job in jobs]
         most = max((int(np.diff(start).max(initial=0)) for start in starts), default=0)
         whole = np.full((self.size, most, tables[0].shape[1] if tables else MOST_COLUMNS), np.nan)
         for group, table, start in zip(self.groups, tables, starts, strict=True):
@@ -355,37 +351,39 @@ class Ensemble:
         return whole
 
     def _dot_table(self, jobs: Sequence[Job]) -> DotTable:
-        found = self._spread(jobs, "dots")
-        fired_at = np.full(found.shape[:2], np.nan)
+        starts = [job.group.batch.firing_starts for job in jobs]
+        dots = self._spread([job.kept.dots for job in jobs], starts)
+        fired_at = np.full(dots.shape[:2], np.nan)
         for i, drive in enumerate(self.drives):
             fired_at[i, : len(drive.times)] = drive.times
-        reached = self._gathered([job.reached for job in jobs])
+        reached = self._gathered([job.kept.reached for job in jobs])
         fired = fired_at <= reached[:, np.newaxis]
-        contacts = np.nan_to_num(found[:, :, 0]).astype(np.int64)
+        contacts = np.nan_to_num(dots[:, :, 0]).astype(np.int64)
         return DotTable(
             fired=fired,
             fired_at=fired_at,
             struck=contacts > 0,
-            flight_time=found[:, :, 1] - fired_at,
-            impact_speed=found[:, :, 2],
-            peak_force=found[:, :, 5],
-            indentation=found[:, :, 4],
-            contact_time=found[:, :, 3] - found[:, :, 1],
+            flight_time=dots[:, :, 1] - fired_at,
+            impact_speed=dots[:, :, 2],
+            peak_force=dots[:, :, 5],
+            indentation=dots[:, :, 4],
+            contact_time=dots[:, :, 3] - dots[:, :, 1],
             extra_contacts=np.maximum(contacts - 1, 0),
         )
 
     def _strobes(self, jobs: Sequence[Job], moments: Sequence[FloatArray]) -> Strobes:
-        found = self._spread(jobs, "strobes")
-        t = np.full(found.shape[:2], np.nan)
+        starts = [job.kept.strobe_starts for job in jobs]
+        states = self._spread([job.kept.strobes for job in jobs], starts)
+        t = np.full(states.shape[:2], np.nan)
         for i, moment in enumerate(moments):
             t[i, : len(moment)] = moment
-        mode = found[:, :, 2]
+        mode = states[:, :, 2]
         return Strobes(
             t=t,
-            x=found[:, :, 0],
-            v=found[:, :, 1],
+            x=states[:, :, 0],
+            v=states[:, :, 1],
             branch=np.where(np.isnan(mode), -1, np.nan_to_num(mode)).astype(np.int64),
-            memory=found[:, :, 3],
+            memory=states[:, :, 3],
         )
 
     def _moments(self, strobes: Literal["firings"] | Sequence[npt.ArrayLike] | None) -> list[FloatArray]:
@@ -420,10 +418,10 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
 
 
 def _each(values: npt.ArrayLike, name: str) -> FloatArray:
-    found = _numbers(values, name)
-    if found.ndim > 1:
-        raise InputError(f"{name}: an array of shape {found.shape}, expected one number for each member")
-    return np.atleast_1d(found)
+    values_of = _numbers(values, name)
+    if values_of.ndim > 1:
+        raise InputError(f"{name}: an array of shape {values_of.shape}, expected one number for each member")
+    return np.atleast_1d(values_of)
 
 
 def _numbers(values: npt.ArrayLike, name: str) -> FloatArray:
@@ -434,7 +432,7 @@ def _numbers(values: npt.ArrayLike, name: str) -> FloatArray:
 
 
 def _ascending(times: npt.ArrayLike, name: str) -> FloatArray:
-    found = _numbers(times, name).reshape(-1)
-    if not np.isfinite(found).all() or (np.diff(found) < 0.0).any() or (found < 0.0).any():
+    moments = _numbers(times, name).reshape(-1)
+    if not np.isfinite(moments).all() or (np.diff(moments) < 0.0).any() or (moments < 0.0).any():
         raise InputError(f"{name}: expected ascending numbers, not negative")
-    return found
+    return moments

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.kernel.lanes import layout as lane_layout
-from printhammer.kernel.model.layout import END, MAGNET, PLACES
+from printhammer.kernel.lanes.batch import Batch, Kept
+from printhammer.kernel.model.layout import CUBIC_PIECE, END, EXPONENTIAL_PIECE, MAGNET, PLACES, SINE_PIECE
 from printhammer.kernel.single import carry
 from printhammer.run.problem import MAX_STEPS, Problem, scales_of
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
+    from printhammer.kernel.compile.lanes import LaneKinds
     from printhammer.kernel.compile.specialise import Kernel
     from printhammer.support.arrays import FloatArray
 
@@ -29,16 +31,11 @@ _DOT_WIDTH: Final = 6
 _STROBE_WIDTH: Final = 4
 _PIECE: Final = 4 * lane_layout.LANES
 """Members in one piece of work for lanes."""
-_CUBIC, _EXPONENTIAL, _SINE = 0.0, 1.0, 2.0
 
 
 def starts_of(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.int64]:
     """Return where each of some arrays begins when they are put one after the other, and the end of all."""
     return np.concatenate([[0], np.cumsum([len(array) for array in arrays])]).astype(np.int64)
-
-
-LaneKinds = tuple[int, bool, bool]
-"""Number of rates of exponentials in the waveforms of a drive, whether there is a cubic piece, a sine."""
 
 
 def kernel_of(drive: Drive, known: dict[bytes, LaneKinds | None]) -> Hashable:
@@ -79,15 +76,12 @@ class Group:
         tolerance: float,
     ) -> None:
         self.members = members
-        self.states = states
-        self.ends = ends
         rows: dict[tuple[Any, ...], int] = {}
         waves: dict[bytes, int] = {}
         peaks: dict[bytes, float] = {}
         problems: list[Problem] = []
         tables: list[FloatArray] = []
-        self.hammer_of = np.zeros(len(members), np.int64)
-        self.waveform_of = np.zeros(len(members), np.int64)
+        hammer_of, waveform_of = np.zeros((2, len(members)), np.int64)
         forms_of: dict[int, tuple[int, float]] = {}
         typical: dict[tuple[Any, ...], float] = {}
         for i, (hammer, drive) in enumerate(zip(hammers, drives, strict=True)):
@@ -103,7 +97,7 @@ class Group:
                     if form not in peaks:
                         peaks[form] = drive.largest_pulse
                     forms_of[id(drive)] = waves[form], peaks[form]
-            self.waveform_of[i], peak = forms_of[id(drive)]
+            waveform_of[i], peak = forms_of[id(drive)]
             x, v = float(states[i, 1]), float(states[i, 2])
             key: tuple[Any, ...] = (id(hammer), peak, drive.quantity)
             if key not in typical:
@@ -116,28 +110,34 @@ class Group:
             if key not in rows:
                 rows[key] = len(problems)
                 problems.append(Problem(hammer, drive, (x, v), 0.0, tolerance))
-            self.hammer_of[i] = rows[key]
+            hammer_of[i] = rows[key]
         firings = [np.asarray(drive.times, dtype=np.float64) for drive in drives]
         begins = [np.asarray(drive.kernel_arrays()[1], dtype=np.int64) for drive in drives]
-        self.replace = bool(drives[0].kernel_arrays()[3])
         self.kernel: Kernel = problems[0].kernel
         self.laws = problems[0].laws
-        width = max(problem.constants.size for problem in problems)
-        self.hammers = np.zeros((len(problems), width))
+        constants = np.zeros((len(problems), max(problem.constants.size for problem in problems)))
         for row, problem in enumerate(problems):
-            self.hammers[row, : problem.constants.size] = problem.constants
-        self.controls = np.array([problem.control for problem in problems])
-        self.bounds = np.array([problem.bounds for problem in problems])
-        self.piece_starts = starts_of(tables)
-        self.pieces = np.concatenate(tables)
-        self.firing_starts = starts_of(firings)
-        self.firings = np.concatenate(firings)
-        self.begins = np.concatenate(begins)
-        self.most_firings = max(len(times) for times in firings)
-        self.uniform = len(problems) == 1 and len(tables) == 1
+            constants[row, : problem.constants.size] = problem.constants
         forms = [closed_form(table) for table in tables]
-        self.rates = np.array([rates for rates, _kinds in forms])
         self.lane_kinds = forms[0][1]
+        self.uniform = len(problems) == 1 and len(tables) == 1
+        self.most_firings = max(len(times) for times in firings)
+        self.batch = Batch(
+            hammer_of=hammer_of,
+            hammers=constants,
+            controls=np.array([problem.control for problem in problems]),
+            bounds=np.array([problem.bounds for problem in problems]),
+            waveform_of=waveform_of,
+            piece_starts=starts_of(tables),
+            pieces=np.concatenate(tables),
+            rates=np.array([rates for rates, _kinds in forms]),
+            firing_starts=starts_of(firings),
+            firings=np.concatenate(firings),
+            begins=np.concatenate(begins),
+            replace=bool(drives[0].kernel_arrays()[3]),
+            states=states,
+            ends=ends,
+        )
 
     def fits_lanes(self) -> bool:
         """Tell whether there is a kernel for lanes for these members."""
@@ -145,11 +145,12 @@ class Group:
 
         if self.lane_kinds is None or not suits(self.laws):
             return False
-        used = {role: self.hammers[:, place : place + 16] for role, place in PLACES.items()}
-        used["magnet"] = self.hammers[:, MAGNET:]
+        hammers = self.batch.hammers
+        used = {role: hammers[:, place : place + 16] for role, place in PLACES.items()}
+        used["magnet"] = hammers[:, MAGNET:]
         return all(
             not used[role][:, count:].any() for role, (_place, count) in lane_layout.PLACES.items()
-        ) and bool((self.states[:, 3] < 0.0).all())
+        ) and bool((self.batch.states[:, 3] < 0.0).all())
 
     @property
     def lane_kernel(self) -> Kernel:
@@ -168,14 +169,14 @@ def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
     """
     pieces = table[table[:, 1] != END]
     kind = pieces[:, 1]
-    decays = np.unique(pieces[kind == _EXPONENTIAL, 4])
-    frequencies = np.unique(pieces[kind == _SINE, 4])
+    decays = np.unique(pieces[kind == EXPONENTIAL_PIECE, 4])
+    frequencies = np.unique(pieces[kind == SINE_PIECE, 4])
     rates = [0.0] * lane_layout.RATES_WIDTH
     if len(decays) > 2 or len(frequencies) > 1:
         return rates, None
     rates[: len(decays)] = decays
     rates[2 : 2 + len(frequencies)] = frequencies
-    return rates, (len(decays), bool(pieces[kind == _CUBIC, 3:].any()), len(frequencies) > 0)
+    return rates, (len(decays), bool(pieces[kind == CUBIC_PIECE, 3:].any()), len(frequencies) > 0)
 
 
 class Job:
@@ -204,25 +205,27 @@ class Job:
         x: npt.NDArray[np.float32],
     ) -> None:
         self.group = group
-        self.order = np.arange(len(group.members))
-        self.want_dots = want_dots
-        self.grid = grid
         count = len(group.members)
+        self.order = np.arange(count)
         own = [moments[member] for member in group.members]
-        self.strobes_starts = starts_of(own)
-        self.strobe_times = np.concatenate(own)
-        self.strobes = np.empty((self.strobe_times.size, _STROBE_WIDTH))
-        self.dots_starts = group.firing_starts
-        self.dots = np.empty((group.firings.size if want_dots else 0, _DOT_WIDTH))
-        self.status = np.zeros(count, np.int64)
-        self.steps = np.zeros(count, np.int64)
-        self.reached = np.zeros(count)
-        self.x = x if count == len(x) else np.empty((count, grid.size), np.float32)
+        strobe_times = np.concatenate(own)
+        self.kept = Kept(
+            strobe_starts=starts_of(own),
+            strobe_times=strobe_times,
+            grid=grid,
+            want_dots=want_dots,
+            status=np.zeros(count, np.int64),
+            reached=np.zeros(count),
+            steps=np.zeros(count, np.int64),
+            dots=np.empty((group.batch.firings.size if want_dots else 0, _DOT_WIDTH)),
+            strobes=np.empty((strobe_times.size, _STROBE_WIDTH)),
+            x=x if count == len(x) else np.empty((count, grid.size), np.float32),
+        )
 
     def finish(self, x: npt.NDArray[np.float32]) -> None:
         """Put the displacements of a group that is not the whole where they belong."""
-        if self.x is not x:
-            x[self.group.members] = self.x
+        if self.kept.x is not x:
+            x[self.group.members] = self.kept.x
 
     def share_out(self, threads: int) -> int:
         """Spread the members over pieces so that neighbours do not come together; return their length.
@@ -252,39 +255,17 @@ class Job:
         left_over = np.empty(which.size, np.int64)
         left = group.lane_kernel.lanes(
             which,
-            group.hammer_of,
-            group.hammers,
-            group.controls,
-            group.bounds,
-            group.waveform_of,
-            group.piece_starts,
-            group.pieces,
-            group.rates,
-            group.firing_starts,
-            group.firings,
-            group.begins,
-            group.replace,
-            group.states,
-            group.ends,
-            self.strobes_starts,
-            self.strobe_times,
-            self.grid,
-            self.want_dots,
+            group.batch,
+            self.kept,
+            group.uniform,
             np.zeros(group.most_firings, np.int64),
             np.zeros(1 + 7 * group.most_firings),
-            group.uniform,
             np.zeros((lane_layout.POOLS + 1, lane_layout.POOL_SIZE)),
             np.zeros(lane_layout.POOLS, np.int64),
             np.zeros((lane_layout.POOLS, lane_layout.LANES), np.int64),
             np.zeros((lane_layout.LANES, lane_layout.SLOT_WIDTH)),
             np.zeros(lane_layout.LANES, np.int64),
             left_over,
-            self.status,
-            self.reached,
-            self.steps,
-            self.dots,
-            self.strobes,
-            self.x,
         )
         self._one_by_one(left_over[:left])
 
@@ -297,35 +278,14 @@ class Job:
             prepare = False
             done = group.kernel.members(
                 which,
-                group.hammer_of,
-                group.hammers,
-                group.controls,
-                group.bounds,
-                group.waveform_of,
-                group.piece_starts,
-                group.pieces,
-                group.firing_starts,
-                group.firings,
-                group.begins,
-                group.replace,
-                group.states,
-                group.ends,
+                group.batch,
+                self.kept,
                 MAX_STEPS,
-                self.strobes_starts,
-                self.strobe_times,
-                self.grid,
-                self.want_dots,
                 under_way,
                 live,
                 np.empty((nodes, 5)),
                 np.empty((contacts, 7)),
                 np.zeros(carry.SIZE),
-                self.status,
-                self.reached,
-                self.steps,
-                self.dots,
-                self.strobes,
-                self.x,
             )
             which = which[done:]
             nodes, contacts = 4 * nodes, 4 * contacts

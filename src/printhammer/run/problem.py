@@ -153,8 +153,8 @@ def scales_of(hammer: Hammer, drive: Drive, state: tuple[float, float]) -> tuple
     current, push = (0.0, largest_value) if drive.quantity == "force" else (largest_value, 0.0)
 
     def force(x: float) -> float:
-        found = [abs(static.free(x, i)) for i in (0.0, current)]
-        return push + max((f for f in found if math.isfinite(f)), default=0.0)
+        sizes = [abs(static.free(x, i)) for i in (0.0, current)]
+        return push + max((f for f in sizes if math.isfinite(f)), default=0.0)
 
     if hammer.position is not None and hammer.front is not None:
         way = hammer.front - hammer.position

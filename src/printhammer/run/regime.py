@@ -120,9 +120,9 @@ class Regime:
         if isinstance(hammer, Regime):
             named = ("period", "rate", "waveform", "drive", "overlap")
             values = (period, rate, waveform, drive, overlap)
-            given = [name for name, value in zip(named, values, strict=True) if value is not None]
-            if given:
-                raise InputError(f"a regime is given, expected no {' or '.join(given)} beside it")
+            named_beside = [name for name, value in zip(named, values, strict=True) if value is not None]
+            if named_beside:
+                raise InputError(f"a regime is given, expected no {' or '.join(named_beside)} beside it")
             return hammer if phase is None else replace(hammer, phase=part)
         overlap = "add" if overlap is None else overlap
         if drive is not None:
@@ -146,12 +146,12 @@ class Regime:
         """What every firing does, or the endless force."""
         if self.drive is not None:
             return self.drive.waveform
-        found = self.waveform if self.waveform is not None else self.hammer.waveform
-        if found is None:
+        waveform = self.waveform if self.waveform is not None else self.hammer.waveform
+        if waveform is None:
             raise InputError(
                 f"the hammer {self.hammer.name!r} has no waveform to fire, expected a [waveform]"
             )
-        return found
+        return waveform
 
     @property
     def rate(self) -> float:
@@ -224,12 +224,12 @@ class Regime:
         if name not in self.names:
             raise unknown(name, self.names)
         if name.startswith(DRIVE) and self.drive is not None:
-            found = getattr(self.drive.waveform, self._of_force(name))
+            number = getattr(self.drive.waveform, self._of_force(name))
         elif name.startswith(WAVEFORM) and self.waveform is not None:
-            found = getattr(self.waveform, self._of_waveform(name))
+            number = getattr(self.waveform, self._of_waveform(name))
         else:
-            found = self.hammer.constants[name].si
-        return float(found)
+            number = self.hammer.constants[name].si
+        return float(number)
 
     def quantity(self, name: str) -> Quantity:
         """Return unit, meaning and symbol of a constant by name; see `with_`.
@@ -269,9 +269,10 @@ class Regime:
             There is no number of that name, or the value is not possible.
         """
         if name in (PERIOD, RATE):
-            return self._with_period(
-                period_of_rate(value) if name == RATE else read_positive(value, "s", name)
-            )
+            period = period_of_rate(value) if name == RATE else read_positive(value, "s", name)
+            if self.drive is not None:
+                return self._with_force(frequency=1.0 / period)
+            return replace(self, period=period)
         self.value(name)
         if name.startswith(DRIVE):
             return self._with_force(**{self._of_force(name): float(value)})
@@ -286,20 +287,15 @@ class Regime:
     def names(self) -> list[str]:
         """Names of all constants that `with_` takes."""
         own = self.waveform
-        found = [name for name in self.hammer.constants if own is None or not name.startswith(WAVEFORM)]
+        names = [name for name in self.hammer.constants if own is None or not name.startswith(WAVEFORM)]
         if own is not None:
-            given = [name for name in quantities(type(own)) if getattr(own, name) is not None]
-            found += [f"{WAVEFORM}{name}" for name in given]
+            fields = [name for name in quantities(type(own)) if getattr(own, name) is not None]
+            names += [f"{WAVEFORM}{name}" for name in fields]
         if self.drive is not None:
-            found = [name for name in found if not name.startswith(WAVEFORM)]
-            found += [f"{DRIVE}{name}" for name in _FORCE if isinstance(self.drive, SineForce)]
+            names = [name for name in names if not name.startswith(WAVEFORM)]
+            names += [f"{DRIVE}{name}" for name in _FORCE if isinstance(self.drive, SineForce)]
         fixed = self.drive is not None and not isinstance(self.drive, SineForce)
-        return [*([] if fixed else [PERIOD, RATE]), *found]
-
-    def _with_period(self, period: float) -> Self:
-        if self.drive is not None:
-            return self._with_force(frequency=1.0 / period)
-        return replace(self, period=period)
+        return [*([] if fixed else [PERIOD, RATE]), *names]
 
     def _with_force(self, **changed: float) -> Self:
         if not isinstance(self.drive, SineForce):
@@ -361,7 +357,7 @@ def regimes_of(
     """
     many = [hammers] if isinstance(hammers, Hammer | Regime) else list(hammers)
     fired: list[tuple[Any, Drive | None]] = [(None, drive) for drive in drives or ()]
-    if drives is None and periods is None and many and all(isinstance(one, Regime) for one in many):
+    if drives is None and periods is None and many and all(isinstance(hammer, Regime) for hammer in many):
         fired = [(None, None)]
     elif drives is None:
         if periods is None:

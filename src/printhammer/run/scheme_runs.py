@@ -15,16 +15,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.kernel import schemes_1983
-from printhammer.kernel.model.modes import (
-    BACKSTOP,
-    BACKSTOP_SURFACE,
-    FREE,
-    LOADING,
-    OK,
-    PACK_SURFACE,
-    STEP_UNDERFLOW,
-    UNLOADING,
-)
+from printhammer.kernel.model import modes as M
 from printhammer.parts import absent
 from printhammer.run.problem import Problem, Record
 
@@ -106,7 +97,9 @@ class SchemeProblem(Problem):
         """Integrate to time `end`, s; a run that diverged has the status of a step that cannot be taken."""
         run = self.integrate(end)
         nodes = self._nodes(run.t, run.x, run.v)
-        return Record(OK if run.status == "ok" else STEP_UNDERFLOW, nodes, _contacts(nodes), len(nodes) - 1)
+        return Record(
+            M.OK if run.status == "ok" else M.STEP_UNDERFLOW, nodes, _contacts(nodes), len(nodes) - 1
+        )
 
     @property
     def _rigid(self) -> bool:
@@ -118,14 +111,14 @@ class SchemeProblem(Problem):
         keep = np.isfinite(x) & np.isfinite(v)
         nodes = np.zeros((int(keep.sum()), 5))
         nodes[:, 0], nodes[:, 1], nodes[:, 2] = t[keep], x[keep], v[keep]
-        nodes[:, 3] = FREE
+        nodes[:, 3] = M.FREE
         peak = 0.0
         for node in nodes:
             if position is not None and node[1] < position and not self._rigid:
-                node[3], node[4] = BACKSTOP, math.sqrt(position - node[1])
+                node[3], node[4] = M.BACKSTOP, math.sqrt(position - node[1])
             elif front is not None and node[1] > front:
                 peak = node[1] if node[2] >= 0.0 else max(peak, node[1])
-                node[3], node[4] = (LOADING, 0.0) if node[2] >= 0.0 else (UNLOADING, peak)
+                node[3], node[4] = (M.LOADING, 0.0) if node[2] >= 0.0 else (M.UNLOADING, peak)
             else:
                 peak = 0.0
         return nodes
@@ -157,7 +150,7 @@ class SchemeProblem(Problem):
         current = 0.0 if self.laws.force_drive else value
         pack = elastic = viscous = 0.0
         if front is not None and x > front:
-            if mode == UNLOADING and v < 0.0:
+            if mode == M.UNLOADING and v < 0.0:
                 memory = self._law("pack_memory")(packed["pack"], peak)
                 pack = self._law("pack_unloading")(packed["pack"], x, v, memory)
             else:
@@ -177,7 +170,7 @@ class SchemeProblem(Problem):
         for row, contact in enumerate(record.contacts):
             first = int(contact[5])
             last = len(nodes) if math.isnan(contact[3]) else int(np.searchsorted(nodes[:, 0], contact[3]))
-            pack = contact[0] == PACK_SURFACE
+            pack = contact[0] == M.PACK_SURFACE
             depth = nodes[first:last, 1] - (self.hammer.front or 0.0)
             force = -table[first:last, 5]
             if not pack:
@@ -209,8 +202,8 @@ class SchemeProblem(Problem):
 
 def _contacts(nodes: FloatArray) -> FloatArray:
     """Return the contacts of a run recorded at step ends, as the kernel records them."""
-    surface = np.where(nodes[:, 3] == BACKSTOP, BACKSTOP_SURFACE, -1)
-    surface = np.where((nodes[:, 3] == LOADING) | (nodes[:, 3] == UNLOADING), PACK_SURFACE, surface)
+    surface = np.where(nodes[:, 3] == M.BACKSTOP, M.BACKSTOP_SURFACE, -1)
+    surface = np.where((nodes[:, 3] == M.LOADING) | (nodes[:, 3] == M.UNLOADING), M.PACK_SURFACE, surface)
     changes = np.flatnonzero(np.diff(surface)) + 1
     rows = []
     for first, last in zip(np.r_[0, changes], np.r_[changes, len(surface)], strict=True):

@@ -50,6 +50,7 @@ _PLAIN = (
     "model.layout",
     "model.transitions",
     "single.carry",
+    "lanes.batch",
     "methods.hermite",
     "compile.compiling",
     "methods.dop853_tableau",

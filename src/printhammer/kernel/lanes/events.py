@@ -13,28 +13,15 @@ import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.lanes import layout as R
-from printhammer.kernel.methods.hermite import position_root, rises_through
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION, Train
-from printhammer.kernel.model.modes import (
-    BACKSTOP,
-    EDGE,
-    FREE,
-    LEFT_BACKSTOP,
-    LEFT_FRONT,
-    LOADING,
-    NEAR_TOUCH,
-    NO_SWITCH,
-    REACHED_FRONT,
-    REVERSAL,
-    UNLOADING,
-    UNRESOLVED,
-)
+from printhammer.kernel.methods.hermite import rises_through
+from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION, Control, ForceLaw, Train
 from printhammer.kernel.model.transitions import FOLLOWING
 
 if TYPE_CHECKING:
     from printhammer.kernel.lanes.drive import add_up
     from printhammer.kernel.lanes.steps import lane_acceleration, lane_contact_rate
-    from printhammer.kernel.methods.contact import leave, reach_time
+    from printhammer.kernel.methods.contact import contact_switch
     from printhammer.kernel.methods.landing import first_switch, land_on_level, land_on_reversal
     from printhammer.kernel.model.forces import Hammer, pack_force
     from printhammer.kernel.model.laws import RELOAD_ALONG_UNLOADING, pack_memory
@@ -43,7 +30,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.single.run import contact_unit
     from printhammer.kernel.single.stretch import firing_before
 
-MODE_OF = (FREE, LOADING, UNLOADING, BACKSTOP)
+MODE_OF = (M.FREE, M.LOADING, M.UNLOADING, M.BACKSTOP)
 """Mode of the members in each pool."""
 
 STAYS = -1
@@ -216,7 +203,7 @@ def note_strobes(
         strobes[strobe, 0] = x
         strobes[strobe, 1] = v
         strobes[strobe, 2] = mode
-        strobes[strobe, 3] = kept if mode == UNLOADING else 0.0
+        strobes[strobe, 3] = kept if mode == M.UNLOADING else 0.0
         strobe += 1
     slot[R.NEXT_STROBE] = strobe
     slot[R.NEXT_TIME] = times[strobe] if strobe < times.size else np.inf
@@ -277,17 +264,17 @@ def turn_in_pack(
     """
     # As in the plain kernel: swings too small to be told from rest would never end.
     still = R.STILL * control[1] * control[1] / control[0]
-    inward = lane_acceleration(pool, i, t, x, 0.0, LOADING, 0.0) > 0.0
+    inward = lane_acceleration(pool, i, t, x, 0.0, M.LOADING, 0.0) > 0.0
     if (inward and which == R.LOADING_POOL) or (RELOAD_ALONG_UNLOADING and which == R.UNLOADING_POOL):
         return LEAVES
     dot = int(slot[R.DOT])
     if dot >= 0 and not dots[dot, 4] >= x - hammer[FRONT]:
         dots[dot, 4] = x - hammer[FRONT]
-        dots[dot, 5] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
+        dots[dot, 5] = -pack_force(x, 0.0, M.LOADING, 0.0, hammer)
     if inward:
-        enter(pool, i, t, x, 0.0, LOADING, slot[R.PACK_STEP], 0.0)
+        enter(pool, i, t, x, 0.0, M.LOADING, slot[R.PACK_STEP], 0.0)
         return R.LOADING_POOL if pool[R.A * R.BLOCK + i] > still else LEAVES
-    enter(pool, i, t, x, 0.0, UNLOADING, slot[R.PACK_STEP], pack_memory(hammer[PACK:BACKSTOP_PART], x))
+    enter(pool, i, t, x, 0.0, M.UNLOADING, slot[R.PACK_STEP], pack_memory(hammer[PACK:BACKSTOP_PART], x))
     pool[R.PEAK * R.BLOCK + i] = x
     return R.UNLOADING_POOL if pool[R.A * R.BLOCK + i] < -still else LEAVES
 
@@ -311,14 +298,14 @@ def after_switch(
     """Go on after a switch; return the pool in which, or that the member leaves the lanes."""
     remember_step(pool, i, which, slot)
     pool[R.T * R.BLOCK + i] = t
-    if switch == REVERSAL:
+    if switch == M.REVERSAL:
         if x <= hammer[FRONT]:
             return LEAVES
         return turn_in_pack(pool, i, t, x, which, slot, dots, hammer, control)
     following = FOLLOWING[MODE_OF[which], switch]
-    if following == BACKSTOP:
+    if following == M.BACKSTOP:
         return enter_contact(pool, i, v, slot, control) if v < 0.0 else LEAVES
-    if following == LOADING:
+    if following == M.LOADING:
         if not v > 0.0:
             return LEAVES
         slot[R.DOT] = -1.0
@@ -329,19 +316,19 @@ def after_switch(
                 slot[R.DOT] = fired
                 dots[fired, 1] = t
                 dots[fired, 2] = v
-        enter(pool, i, t, x, v, LOADING, slot[R.PACK_STEP], 0.0)
+        enter(pool, i, t, x, v, M.LOADING, slot[R.PACK_STEP], 0.0)
         return R.LOADING_POOL
-    if following != FREE:
+    if following != M.FREE:
         return LEAVES
     away, level = v, hammer[POSITION]
-    if switch == LEFT_FRONT:
+    if switch == M.LEFT_FRONT:
         away, level = -v, hammer[FRONT]
         if int(slot[R.DOT]) >= 0:
             dots[int(slot[R.DOT]), 3] = t
         slot[R.DOT] = -1.0
     if not away > 0.0:
         return LEAVES
-    enter(pool, i, t, level, v, FREE, slot[R.FREE_STEP], 0.0)
+    enter(pool, i, t, level, v, M.FREE, slot[R.FREE_STEP], 0.0)
     return R.FREE_POOL
 
 
@@ -375,70 +362,35 @@ def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Ha
         x = pool[R.X * R.BLOCK + i]
         if not dots[dot, 4] >= x - hammer[FRONT]:
             dots[dot, 4] = x - hammer[FRONT]
-            dots[dot, 5] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
-
-
-@compiled
-def look_off_backstop(pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Any) -> Any:
-    """Find and locate the switch in a step off the backstop.
-
-    Returns the switch (NO_SWITCH, UNRESOLVED, or its name) and time, displacement and velocity there.
-    """
-    start = (pool[i], pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i], pool[R.A * R.BLOCK + i])
-    h = pool[R.LENGTH * R.BLOCK + i]
-    end = (
-        pool[R.NEW_T * R.BLOCK + i],
-        pool[R.NEW_X * R.BLOCK + i],
-        pool[R.NEW_V * R.BLOCK + i],
-        pool[R.NEW_A * R.BLOCK + i],
-    )
-    mode = MODE_OF[which]
-    memory = pool[R.MEMORY * R.BLOCK + i]
-    switch, fraction, upper, level, sign = first_switch(
-        start, end, h, mode, memory, pool[R.PEAK * R.BLOCK + i], hammer, live, control
-    )
-    if switch in (NO_SWITCH, UNRESOLVED):
-        return switch, end[0], end[1], end[2]
-    if switch == REVERSAL:
-        turn = land_on_reversal(start, h, fraction, sign, mode, memory, hammer, live, control)
-        return switch, turn[0], turn[1], 0.0
-    found = land_on_level(start, h, fraction, upper, level, sign, mode, memory, hammer, live, control)
-    return switch, found[0], found[1], found[2]
-
-
-@compiled
-def look_in_contact(pool: Any, i: int, hammer: Hammer, live: Drive, control: Any) -> Any:
-    """Find and locate the switch in a step in the backstop; as `look_off_backstop`, with w, v and dv/ds."""
-    t, w, v, kv = pool[i], pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i], pool[R.A * R.BLOCK + i]
-    h = pool[R.LENGTH * R.BLOCK + i]
-    t1, w1 = pool[R.NEW_T * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
-    v1, kv1 = pool[R.NEW_V * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
-    t_next = pool[R.NEXT * R.BLOCK + i]
-    code = rises_through(-w, v, kv, -w1, v1, kv1, h, 0.0)
-    if code in (UNRESOLVED, NEAR_TOUCH):
-        return UNRESOLVED, t1, w1, v1, kv1
-    switch = NO_SWITCH
-    upper = 1.0
-    if code == REACHED_FRONT:
-        guess = position_root(-w, v, kv, -w1, v1, kv1, h, 0.0, 1.0)
-        t1, w1, v1, kv1, upper = leave((t, w, v, kv), h, guess, 1.0, hammer, live, control)
-        switch = LEFT_BACKSTOP
-    if t1 >= t_next:
-        if t1 > t_next:
-            t1, w1, v1, kv1 = reach_time((t, w, v, kv), h, upper, t1, t_next, hammer, live)
-            switch = EDGE
-        elif switch == NO_SWITCH:
-            switch = EDGE
-    return switch, t1, w1, v1, kv1
+            dots[dot, 5] = -pack_force(x, 0.0, M.LOADING, 0.0, hammer)
 
 
 @compiled
 def locate(
-    pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Any
+    pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Control
 ) -> tuple[int, float, float, float]:
-    """Find the switch in the latest step with the plain kernel: its name, time, displacement, velocity."""
+    """Find the switch in the latest step with the plain kernel: its name, time, displacement, velocity.
+
+    In the contact pool w instead of the displacement; NO_SWITCH or UNRESOLVED instead of a name.
+    """
+    start = (pool[i], pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i], pool[R.A * R.BLOCK + i])
+    h = pool[R.LENGTH * R.BLOCK + i]
+    t, x = pool[R.NEW_T * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
+    v, a = pool[R.NEW_V * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
     if which == R.CONTACT_POOL:
-        switch, t, w, v, _kv = look_in_contact(pool, i, hammer, live, control)
-        return switch, t, w, v
-    switch, t, x, v = look_off_backstop(pool, i, which, hammer, live, control)
+        code = rises_through(-start[1], start[2], start[3], -x, v, a, h, 0.0)
+        if code in (M.UNRESOLVED, M.NEAR_TOUCH):
+            return M.UNRESOLVED, t, x, v
+        t_next = pool[R.NEXT * R.BLOCK + i]
+        leaves = code == M.REACHED_FRONT
+        switch, end = contact_switch(start, (t, x, v, a), h, leaves, t_next, hammer, live, control)
+        return switch, end[0], end[1], end[2]
+    law = ForceLaw(MODE_OF[which], pool[R.MEMORY * R.BLOCK + i], hammer, live)
+    peak = pool[R.PEAK * R.BLOCK + i]
+    switch, fraction, upper, level, sign = first_switch(start, (t, x, v, a), h, law, peak, control)
+    if switch == M.REVERSAL:
+        turn = land_on_reversal(start, h, fraction, sign, law, control)
+        return switch, turn[0], turn[1], 0.0
+    if switch not in (M.NO_SWITCH, M.UNRESOLVED):
+        t, x, v, a = land_on_level(start, h, fraction, upper, level, sign, law, control)
     return switch, t, x, v

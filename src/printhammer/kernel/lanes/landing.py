@@ -12,18 +12,8 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.lanes import layout as R
 from printhammer.kernel.methods.hermite import position_root, rises_through, turns_down, velocity_root
+from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import FRONT, POSITION
-from printhammer.kernel.model.modes import (
-    EDGE,
-    LEFT_BACKSTOP,
-    LEFT_FRONT,
-    NEAR_TOUCH,
-    NO_SWITCH,
-    REACHED_BACKSTOP,
-    REACHED_FRONT,
-    REVERSAL,
-    UNRESOLVED,
-)
 
 if TYPE_CHECKING:
     from printhammer.kernel.lanes.events import (
@@ -40,34 +30,24 @@ GOES_ON = -1
 
 
 @inlined
+def ends_of_step(pool: Any, i: int, sign: float) -> tuple[float, float, float, float, float, float, float]:
+    """Return sign * x and its derivatives at both ends of the latest step, and its length."""
+    x, v, a = pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i], pool[R.A * R.BLOCK + i]
+    x1, v1 = pool[R.NEW_X * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
+    a1, h = pool[R.NEW_A * R.BLOCK + i], pool[R.LENGTH * R.BLOCK + i]
+    return sign * x, sign * v, sign * a, sign * x1, sign * v1, sign * a1, h
+
+
+@inlined
 def rises_in_step(pool: Any, i: int, level: float, sign: float) -> int:
     """Tell whether sign * x rises through sign * `level` in the latest step, see `rises_through`."""
-    return rises_through(
-        sign * pool[R.X * R.BLOCK + i],
-        sign * pool[R.V * R.BLOCK + i],
-        sign * pool[R.A * R.BLOCK + i],
-        sign * pool[R.NEW_X * R.BLOCK + i],
-        sign * pool[R.NEW_V * R.BLOCK + i],
-        sign * pool[R.NEW_A * R.BLOCK + i],
-        pool[R.LENGTH * R.BLOCK + i],
-        sign * level,
-    )
+    return rises_through(*ends_of_step(pool, i, sign), sign * level)
 
 
 @inlined
 def level_part(pool: Any, i: int, level: float, sign: float) -> float:
     """Return the part of the latest step where sign * x rises through sign * `level`."""
-    return position_root(
-        sign * pool[R.X * R.BLOCK + i],
-        sign * pool[R.V * R.BLOCK + i],
-        sign * pool[R.A * R.BLOCK + i],
-        sign * pool[R.NEW_X * R.BLOCK + i],
-        sign * pool[R.NEW_V * R.BLOCK + i],
-        sign * pool[R.NEW_A * R.BLOCK + i],
-        pool[R.LENGTH * R.BLOCK + i],
-        sign * level,
-        1.0,
-    )
+    return position_root(*ends_of_step(pool, i, sign), sign * level, 1.0)
 
 
 @compiled
@@ -75,17 +55,17 @@ def guess_free(pool: Any, i: int, hammer: Hammer) -> tuple[int, float]:
     """Return the switch inside the latest step in free flight, and the part of the step where it may be."""
     down = rises_in_step(pool, i, hammer[POSITION], -1.0)
     up = rises_in_step(pool, i, hammer[FRONT], 1.0)
-    if UNRESOLVED in (down, up):
-        return UNRESOLVED, 1.0
-    if NEAR_TOUCH in (down, up):
-        return NEAR_TOUCH, 1.0
-    switch, part = NO_SWITCH, 2.0
-    if down == REACHED_FRONT:
-        switch, part = REACHED_BACKSTOP, level_part(pool, i, hammer[POSITION], -1.0)
-    if up == REACHED_FRONT:
+    if M.UNRESOLVED in (down, up):
+        return M.UNRESOLVED, 1.0
+    if M.NEAR_TOUCH in (down, up):
+        return M.NEAR_TOUCH, 1.0
+    switch, part = M.NO_SWITCH, 2.0
+    if down == M.REACHED_FRONT:
+        switch, part = M.REACHED_BACKSTOP, level_part(pool, i, hammer[POSITION], -1.0)
+    if up == M.REACHED_FRONT:
         other = level_part(pool, i, hammer[FRONT], 1.0)
         if other < part:
-            switch, part = REACHED_FRONT, other
+            switch, part = M.REACHED_FRONT, other
     return switch, part
 
 
@@ -96,20 +76,20 @@ def guess_in_pack(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, f
     turn = -1.0 if which == R.UNLOADING_POOL else 1.0
     v0, a0 = turn * pool[R.V * R.BLOCK + i], turn * pool[R.A * R.BLOCK + i]
     v1, a1 = turn * pool[R.NEW_V * R.BLOCK + i], turn * pool[R.NEW_A * R.BLOCK + i]
-    switch, part = NO_SWITCH, 2.0
+    switch, part = M.NO_SWITCH, 2.0
     if which == R.UNLOADING_POOL:
         code = rises_in_step(pool, i, hammer[FRONT], -1.0)
-        if code in (UNRESOLVED, NEAR_TOUCH):
+        if code in (M.UNRESOLVED, M.NEAR_TOUCH):
             return code, 1.0
-        if code == REACHED_FRONT:
-            switch, part = LEFT_FRONT, level_part(pool, i, hammer[FRONT], -1.0)
+        if code == M.REACHED_FRONT:
+            switch, part = M.LEFT_FRONT, level_part(pool, i, hammer[FRONT], -1.0)
     code = turns_down(turn * pool[R.X * R.BLOCK + i], v0, a0, turn * pool[R.NEW_X * R.BLOCK + i], v1, a1, h)
-    if code == UNRESOLVED:
-        return UNRESOLVED, 1.0
-    if code == REACHED_FRONT:
+    if code == M.UNRESOLVED:
+        return M.UNRESOLVED, 1.0
+    if code == M.REACHED_FRONT:
         other = velocity_root(v0, a0, v1, a1, h)
         if other < part:
-            switch, part = REVERSAL, other
+            switch, part = M.REVERSAL, other
     return switch, part
 
 
@@ -123,18 +103,18 @@ def guess_in_contact(pool: Any, i: int) -> tuple[int, float]:
     h = pool[R.LENGTH * R.BLOCK + i]
     t_next = pool[R.NEXT * R.BLOCK + i]
     code = rises_through(-w0, v0, kv0, -w1, v1, kv1, h, 0.0)
-    if code in (UNRESOLVED, NEAR_TOUCH):
-        return UNRESOLVED, 1.0
-    if code == REACHED_FRONT:
+    if code in (M.UNRESOLVED, M.NEAR_TOUCH):
+        return M.UNRESOLVED, 1.0
+    if code == M.REACHED_FRONT:
         part = position_root(-w0, v0, kv0, -w1, v1, kv1, h, 0.0, 1.0)
         if quintic(part, h, t0, 2.0 * w0, -2.0 * v0, t1, 2.0 * w1, -2.0 * v1) < t_next:
-            return LEFT_BACKSTOP, part
-        return EDGE, part_at(pool, i, t_next)
+            return M.LEFT_BACKSTOP, part
+        return M.EDGE, part_at(pool, i, t_next)
     if t1 == t_next:
-        return EDGE, 1.0
+        return M.EDGE, 1.0
     if t1 > t_next:
-        return EDGE, part_at(pool, i, t_next)
-    return NO_SWITCH, 1.0
+        return M.EDGE, part_at(pool, i, t_next)
+    return M.NO_SWITCH, 1.0
 
 
 @compiled
@@ -174,7 +154,7 @@ def land(
     # A tenth of the smaller allowance is the tolerance; the next order is far below what is closed.
     allowed = 10.0 * control[3] * control[0]
     if which == R.CONTACT_POOL:
-        if switch == EDGE:
+        if switch == M.EDGE:
             target = pool[R.NEXT * R.BLOCK + i]
             rest = (target - t) / (2.0 * x)
             good = x > 0.0 and abs(rest) * (abs(v) + abs(a * rest)) <= 1e-4 * x
@@ -184,12 +164,12 @@ def land(
             rest = x / v
             good = abs(a * rest) <= 1e-4 * abs(v)
             t, x, v = t + x * rest, 0.0, v + 0.5 * a * rest
-    elif switch == REVERSAL:
+    elif switch == M.REVERSAL:
         rest = -v / a
         good = abs(0.5 * v * rest) <= allowed
         t, x, v = t + rest, x + 0.5 * v * rest, 0.0
     else:
-        level = hammer[POSITION] if switch == REACHED_BACKSTOP else hammer[FRONT]
+        level = hammer[POSITION] if switch == M.REACHED_BACKSTOP else hammer[FRONT]
         rest = (level - x) / v
         good = abs(0.5 * a * rest * rest) <= allowed and abs(a * rest) <= 1e-3 * abs(v)
         rest -= 0.5 * a * rest * rest / v

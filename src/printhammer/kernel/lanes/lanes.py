@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry, inlined
 from printhammer.kernel.lanes import layout as R
+from printhammer.kernel.lanes.batch import control_of, train_of
 from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING, Train
 from printhammer.kernel.model.modes import BACKSTOP, EDGE, FREE, NEAR_TOUCH, NO_SWITCH, OK, UNRESOLVED
 
 if TYPE_CHECKING:
+    from printhammer.kernel.lanes.batch import Batch, Kept
     from printhammer.kernel.lanes.drive import add_up
     from printhammer.kernel.lanes.events import (
         DONE,
@@ -51,9 +53,7 @@ FINE = 1e-6
 
 
 @compiled
-def place_constants(
-    pool: Any, i: int, hammer: Hammer, control: Any, low: float, high: float, rates: Any
-) -> None:
+def place_constants(pool: Any, i: int, hammer: Hammer, control: Any, bounds: Any, rates: Any) -> None:
     """Write what belongs to a member's hammer and waveform into a lane."""
     for row in range(R.RATES_WIDTH):
         pool[(R.RATES + row) * R.BLOCK + i] = rates[row]
@@ -72,8 +72,8 @@ def place_constants(
         pool[at + (R.MAGNET + row) * R.BLOCK] = hammer[MAGNET + row]
     for row in range(4):
         pool[(R.CONTROL + row) * R.BLOCK + i] = control[row]
-    pool[R.LOWEST * R.BLOCK + i] = low
-    pool[R.HIGHEST * R.BLOCK + i] = high
+    pool[R.LOWEST * R.BLOCK + i] = max(bounds[0], bounds[2] - bounds[3])
+    pool[R.HIGHEST * R.BLOCK + i] = min(bounds[1], bounds[2] + bounds[3])
 
 
 @compiled
@@ -144,18 +144,19 @@ def look_after(
     i: int,
     which: int,
     slot: Any,
-    rates: Any,
-    train: Train,
-    hammer: Hammer,
-    control: Any,
-    grid: Any,
-    times: Any,
-    strobes: Any,
-    x_of: Any,
-    dots: Any,
-    want_dots: bool,
+    batch: Batch,
+    kept: Kept,
+    under_way: Any,
+    live: Any,
 ) -> int:
     """Do what the event of a lane asks for; return the pool where the member goes on."""
+    m = int(slot[R.MEMBER])
+    row = batch.hammer_of[m]
+    hammer, control = batch.hammers[row], control_of(batch, row)
+    train = train_of(batch, m, under_way, live)
+    times = kept.strobe_times[kept.strobe_starts[m] : kept.strobe_starts[m + 1]]
+    strobes = kept.strobes[kept.strobe_starts[m] : kept.strobe_starts[m + 1]]
+    dots = kept.dots[batch.firing_starts[m] : batch.firing_starts[m + 1]]
     event = int(pool[R.EVENT * R.BLOCK + i])
     switch = NO_SWITCH
     t, x, v = pool[i], 0.0, 0.0
@@ -191,70 +192,53 @@ def look_after(
     if pool[R.SAMPLE * R.BLOCK + i] <= t:
         if slot[R.NEXT_TIME] <= t:
             note_strobes(pool, i, which, t, done, slot, times, strobes, train, hammer)
-        note_samples(pool, i, which, t, done, control[3] < FINE, slot, grid, x_of, hammer[POSITION])
+        note_samples(pool, i, which, t, done, control[3] < FINE, slot, kept.grid, kept.x, hammer[POSITION])
     if done:
         close_member(pool, i, which, slot, dots, hammer)
+        kept.status[m] = OK
+        kept.reached[m] = pool[i]
+        kept.steps[m] = int(pool[R.STEPS * R.BLOCK + i])
+        sample = int(slot[R.NEXT_SAMPLE])
+        blank_states(strobes, int(slot[R.NEXT_STROBE]), times.size, kept.x[m], sample, kept.grid.size)
         return DONE
     target = STAYS
     if switch not in (NO_SWITCH, EDGE):
         target = after_switch(
-            switch, pool, i, t, x, v, which, slot, dots, want_dots, train.firings, hammer, control
+            switch, pool, i, t, x, v, which, slot, dots, kept.want_dots, train.firings, hammer, control
         )
         if target == LEAVES:
             return LEAVES
         which = target
     if t >= pool[R.NEXT * R.BLOCK + i]:
-        new_edge(pool, i, which, slot[R.END], train, rates)
+        new_edge(pool, i, which, slot[R.END], train, batch.rates[batch.waveform_of[m]])
     return target
 
 
 @entry
 def lanes(
     which: Any,
-    hammer_of: Any,
-    hammers: Any,
-    controls: Any,
-    bounds: Any,
-    waveform_of: Any,
-    piece_starts: Any,
-    pieces: Any,
-    rates: Any,
-    firing_starts: Any,
-    firings: Any,
-    begins: Any,
-    replace: bool,
-    states: Any,
-    ends: Any,
-    strobe_starts: Any,
-    strobe_times: Any,
-    grid: Any,
-    want_dots: bool,
+    batch: Batch,
+    kept: Kept,
+    uniform: bool,
     under_way: Any,
     live: Any,
-    uniform: bool,
     pools: Any,
     counts: Any,
     members_in: Any,
     slots: Any,
     spare: Any,
     left_over: Any,
-    status: Any,
-    reached: Any,
-    steps: Any,
-    dots: Any,
-    strobes: Any,
-    x: Any,
 ) -> int:
     """Integrate the members `which` and fill their rows of the results.
 
-    Parameters as in :func:`printhammer.kernel.lanes.members.members`, and
-
-    rates : float64 array, shape (W, 3)
-        Rates of the two exponentials and angular frequency of the sine in the waveforms of each set.
-    under_way, live : array
-        Working space as in :func:`printhammer.kernel.single.run.run`.
+    Parameters
+    ----------
+    which, batch, kept
+        As in :func:`printhammer.kernel.lanes.members.members`.
     uniform : bool
         Whether all members have the same hammer and waveforms.
+    under_way, live : array
+        Working space as in :func:`printhammer.kernel.single.run.run`.
     pools : float64 array, shape (POOLS + 1, POOL_SIZE)
     counts : int64 array, shape (POOLS,)
     members_in : int64 array, shape (POOLS, LANES)
@@ -281,62 +265,36 @@ def lanes(
     for lane in range(R.LANES):
         spare[lane] = lane
     if uniform and which.size > 0:
-        row = hammer_of[which[0]]
-        control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
+        row, rates = batch.hammer_of[which[0]], batch.rates[batch.waveform_of[which[0]]]
+        hammer, bounds = batch.hammers[row], batch.bounds[row]
         for p in range(R.POOLS):
             for lane in range(R.LANES):
-                place_constants(
-                    pools[p],
-                    place(lane),
-                    hammers[row],
-                    control,
-                    lowest(bounds[row]),
-                    highest(bounds[row]),
-                    rates[waveform_of[which[0]]],
-                )
+                place_constants(pools[p], place(lane), hammer, control_of(batch, row), bounds, rates)
     while True:
         while spares > 0 and waiting < which.size:
             m = which[waiting]
             waiting += 1
             number = spare[spares - 1]
             slot = slots[number]
-            row = hammer_of[m]
-            control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
-            wave = waveform_of[m]
-            train = Train(
-                firings[firing_starts[m] : firing_starts[m + 1]],
-                begins[firing_starts[m] : firing_starts[m + 1]],
-                pieces[piece_starts[wave] : piece_starts[wave + 1]],
-                replace,
-                under_way,
-                live,
-            )
-            if want_dots:
-                clear_dots(dots[firing_starts[m] : firing_starts[m + 1]])
+            row, rates = batch.hammer_of[m], batch.rates[batch.waveform_of[m]]
+            hammer, control = batch.hammers[row], control_of(batch, row)
+            train = train_of(batch, m, under_way, live)
+            if kept.want_dots:
+                clear_dots(kept.dots[batch.firing_starts[m] : batch.firing_starts[m + 1]])
             slot[R.MEMBER] = m
             slot[R.NEXT_SAMPLE] = 0
             slot[R.NEXT_STROBE] = 0
-            first = strobe_starts[m]
-            slot[R.NEXT_TIME] = strobe_times[first] if first < strobe_starts[m + 1] else math.inf
+            first = kept.strobe_starts[m]
+            slot[R.NEXT_TIME] = kept.strobe_times[first] if first < kept.strobe_starts[m + 1] else math.inf
             target = begin_member(
-                stage,
-                0,
-                states[m],
-                ends[m],
-                rates[wave],
-                train,
-                hammers[row],
-                control,
-                slot,
+                stage, 0, batch.states[m], batch.ends[m], rates, train, hammer, control, slot
             )
             if target == LEAVES:
                 left_over[left] = m
                 left += 1
                 continue
             if not uniform:
-                place_constants(
-                    stage, 0, hammers[row], control, lowest(bounds[row]), highest(bounds[row]), rates[wave]
-                )
+                place_constants(stage, 0, hammer, control, batch.bounds[row], rates)
             spares -= 1
             copy_lane(stage, 0, pools[target], place(counts[target]), carried)
             members_in[target, counts[target]] = number
@@ -357,39 +315,12 @@ def lanes(
                 number = members_in[p, lane]
                 slot = slots[number]
                 m = int(slot[R.MEMBER])
-                row = hammer_of[m]
                 if pool[R.EVENT * R.BLOCK + i] == R.SAMPLED and slot[R.NEXT_TIME] > pool[i]:
-                    fine = controls[row, 3] < FINE
-                    note_samples(pool, i, p, pool[i], False, fine, slot, grid, x, hammers[row, POSITION])
+                    row = batch.hammer_of[m]
+                    fine, b = batch.controls[row, 3] < FINE, batch.hammers[row, POSITION]
+                    note_samples(pool, i, p, pool[i], False, fine, slot, kept.grid, kept.x, b)
                     continue
-                control = (controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3])
-                wave = waveform_of[m]
-                train = Train(
-                    firings[firing_starts[m] : firing_starts[m + 1]],
-                    begins[firing_starts[m] : firing_starts[m + 1]],
-                    pieces[piece_starts[wave] : piece_starts[wave + 1]],
-                    replace,
-                    under_way,
-                    live,
-                )
-                own_times = strobe_times[strobe_starts[m] : strobe_starts[m + 1]]
-                own_strobes = strobes[strobe_starts[m] : strobe_starts[m + 1]]
-                target = look_after(
-                    pool,
-                    i,
-                    p,
-                    slot,
-                    rates[wave],
-                    train,
-                    hammers[row],
-                    control,
-                    grid,
-                    own_times,
-                    own_strobes,
-                    x,
-                    dots[firing_starts[m] : firing_starts[m + 1]],
-                    want_dots,
-                )
+                target = look_after(pool, i, p, slot, batch, kept, under_way, live)
                 if target in (STAYS, p):
                     continue
                 if target >= 0:
@@ -397,19 +328,7 @@ def lanes(
                     members_in[target, counts[target]] = number
                     counts[target] += 1
                 else:
-                    if target == DONE:
-                        status[m] = OK
-                        reached[m] = pool[i]
-                        steps[m] = int(pool[R.STEPS * R.BLOCK + i])
-                        blank_states(
-                            own_strobes,
-                            int(slot[R.NEXT_STROBE]),
-                            own_times.size,
-                            x[m],
-                            int(slot[R.NEXT_SAMPLE]),
-                            grid.size,
-                        )
-                    else:
+                    if target == LEAVES:
                         left_over[left] = m
                         left += 1
                     spare[spares] = number
@@ -417,15 +336,3 @@ def lanes(
                 counts[p] -= 1
                 copy_lane(pool, place(counts[p]), pool, i, carried)
                 members_in[p, lane] = members_in[p, counts[p]]
-
-
-@compiled
-def lowest(bounds: Any) -> float:
-    """Return the least displacement of `bounds`, see :func:`printhammer.kernel.single.run.run`."""
-    return float(max(bounds[0], bounds[2] - bounds[3]))
-
-
-@compiled
-def highest(bounds: Any) -> float:
-    """Return the largest displacement of `bounds`."""
-    return float(min(bounds[1], bounds[2] + bounds[3]))

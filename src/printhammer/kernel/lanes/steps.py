@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.lanes import layout as R
 from printhammer.kernel.lanes.layout import BLOCK
+from printhammer.kernel.model.layout import ForceLaw
 from printhammer.kernel.model.modes import FREE, LOADING, UNLOADING
 
 if TYPE_CHECKING:
@@ -21,60 +22,34 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.forces import acceleration, backstop_acceleration
     from printhammer.kernel.model.laws import backstop_elastic
 
+    State = tuple[float, float, float, float]
+
 PHASE_LIMIT = 2.0
+
+
+@inlined
+def four_at(pool: Any, at: int) -> Any:
+    """Return four rows of a lane."""
+    return pool[at], pool[at + BLOCK], pool[at + 2 * BLOCK], pool[at + 3 * BLOCK]
+
+
+@inlined
+def twelve_at(pool: Any, at: int) -> Any:
+    """Return twelve rows of a lane."""
+    return four_at(pool, at) + four_at(pool, at + 4 * BLOCK) + four_at(pool, at + 8 * BLOCK)
 
 
 @inlined
 def drive_at(pool: Any, i: int) -> Any:
     """Return the drive of a lane."""
-    at = R.DRIVE * BLOCK + i
-    return (
-        pool[at],
-        pool[at + BLOCK],
-        pool[at + 2 * BLOCK],
-        pool[at + 3 * BLOCK],
-        pool[at + 4 * BLOCK],
-        pool[at + 5 * BLOCK],
-        pool[at + 6 * BLOCK],
-        pool[at + 7 * BLOCK],
-        pool[at + 8 * BLOCK],
-        pool[at + 9 * BLOCK],
-        pool[at + 10 * BLOCK],
-        pool[at + 11 * BLOCK],
-    )
+    return twelve_at(pool, R.DRIVE * BLOCK + i)
 
 
 @inlined
 def hammer_at(pool: Any, i: int) -> Any:
     """Return the constants of a lane's hammer."""
     at = R.HAMMER * BLOCK + i
-    return (
-        pool[at],
-        pool[at + BLOCK],
-        pool[at + 2 * BLOCK],
-        pool[at + 3 * BLOCK],
-        pool[at + 4 * BLOCK],
-        pool[at + 5 * BLOCK],
-        pool[at + 6 * BLOCK],
-        pool[at + 7 * BLOCK],
-        pool[at + 8 * BLOCK],
-        pool[at + 9 * BLOCK],
-        pool[at + 10 * BLOCK],
-        pool[at + 11 * BLOCK],
-        pool[at + 12 * BLOCK],
-        pool[at + 13 * BLOCK],
-        pool[at + 14 * BLOCK],
-        pool[at + 15 * BLOCK],
-        pool[at + 16 * BLOCK],
-        pool[at + 17 * BLOCK],
-        pool[at + 18 * BLOCK],
-        pool[at + 19 * BLOCK],
-        pool[at + 20 * BLOCK],
-        pool[at + 21 * BLOCK],
-        pool[at + 22 * BLOCK],
-        pool[at + 23 * BLOCK],
-        pool[at + 24 * BLOCK],
-    )
+    return twelve_at(pool, at) + twelve_at(pool, at + 12 * BLOCK) + (pool[at + 24 * BLOCK],)
 
 
 @inlined
@@ -87,23 +62,11 @@ def factor(ratio: float) -> float:
 
 @inlined
 def settle(
-    pool: Any,
-    i: int,
-    t: float,
-    x: float,
-    v: float,
-    a: float,
-    h: float,
-    t1: float,
-    x1: float,
-    v1: float,
-    a1: float,
-    ratio: float,
-    sure: bool,
-    edge: bool,
-    outside: bool,
+    pool: Any, i: int, start: State, h: float, end: State, ratio: float, sure: bool, edge: bool, outside: bool
 ) -> None:
     """Make a step valid or not, and write down what it brought."""
+    t, x, v, a = start
+    t1, x1, v1, a1 = end
     small = ratio <= 1.0
     sure = sure and pool[R.LANDING * BLOCK + i] == 0.0
     valid = small and sure
@@ -157,22 +120,44 @@ def time_to_level(distance: float, v: float, a: float) -> float:
     return time if (under_root >= 0.0 and (fast or a > 0.0)) else math.inf
 
 
+@inlined
+def start_at(pool: Any, i: int) -> State:
+    """Return time, displacement, velocity and acceleration of a lane; in the backstop w and dv/ds."""
+    return pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
+
+
+@inlined
+def timed_step(pool: Any, i: int, start: State, h: float, law: ForceLaw) -> tuple[float, State, float, bool]:
+    """Take a step of `h` [s], at most to the next edge, off the backstop.
+
+    Returns
+    -------
+    tuple
+        Its length, the state at its end, its error over what is allowed, whether it ends at the edge.
+    """
+    t, x, v, a = start
+    left = pool[R.NEXT * BLOCK + i] - t
+    edge = h >= left
+    h = left if edge else h
+    x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, law)
+    t1 = pool[R.NEXT * BLOCK + i] if edge else t + h
+    return h, (t1, x1, v1, a1), nystrom_ratio(pool, i, error_x, error_v), edge
+
+
 @compiled
 def free_block(pool: Any, begin: int) -> None:
     """Take a step in each lane of a block of members in free flight."""
     pool = pool[begin:]
     for i in range(BLOCK):
-        t, x, v, a = pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
+        start = start_at(pool, i)
+        _t, x, v, a = start
         hammer = hammer_at(pool, i)
-        drive = drive_at(pool, i)
         h = pool[R.H * BLOCK + i]
         h = min(h, 1.02 * time_to_level(x - hammer[R.POSITION], -v, -a))
         h = min(h, 1.02 * time_to_level(hammer[R.FRONT] - x, v, a))
-        left = pool[R.NEXT * BLOCK + i] - t
-        edge = h >= left
-        h = left if edge else h
-        x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, FREE, 0.0, hammer, drive)
-        ratio = nystrom_ratio(pool, i, error_x, error_v)
+        law = ForceLaw(FREE, 0.0, hammer, drive_at(pool, i))
+        h, end, ratio, edge = timed_step(pool, i, start, h, law)
+        _t1, x1, v1, a1 = end
         c1 = x + 0.2 * h * v
         c2 = c1 + 0.2 * h * (v + 0.25 * h * a)
         c4 = x1 - 0.2 * h * v1
@@ -182,8 +167,7 @@ def free_block(pool: Any, begin: int) -> None:
         sure = low > hammer[R.POSITION] and high < hammer[R.FRONT]
         outside = max(min(low, x1), min(x, hammer[R.POSITION])) <= pool[R.LOWEST * BLOCK + i]
         outside = outside or min(high, hammer[R.FRONT]) >= pool[R.HIGHEST * BLOCK + i]
-        t1 = pool[R.NEXT * BLOCK + i] if edge else t + h
-        settle(pool, i, t, x, v, a, h, t1, x1, v1, a1, ratio, sure, edge, outside)
+        settle(pool, i, start, h, end, ratio, sure, edge, outside)
 
 
 @compiled
@@ -191,20 +175,14 @@ def loading_block(pool: Any, begin: int) -> None:
     """Take a step in each lane of a block of members on the loading branch of the pack."""
     pool = pool[begin:]
     for i in range(BLOCK):
-        t, x, v, a = pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
-        h = pool[R.H * BLOCK + i]
-        left = pool[R.NEXT * BLOCK + i] - t
-        edge = h >= left
-        h = left if edge else h
-        hammer = hammer_at(pool, i)
-        drive = drive_at(pool, i)
-        x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, LOADING, 0.0, hammer, drive)
-        ratio = nystrom_ratio(pool, i, error_x, error_v)
-        low = min(v + h * a / 3.0, v1 - h * a1 / 3.0, v1)
-        sure = low > 0.0
+        start = start_at(pool, i)
+        _t, x, v, a = start
+        law = ForceLaw(LOADING, 0.0, hammer_at(pool, i), drive_at(pool, i))
+        h, end, ratio, edge = timed_step(pool, i, start, pool[R.H * BLOCK + i], law)
+        _t1, x1, v1, a1 = end
+        sure = min(v + h * a / 3.0, v1 - h * a1 / 3.0, v1) > 0.0
         outside = max(x1, x + h * v) >= pool[R.HIGHEST * BLOCK + i]
-        t1 = pool[R.NEXT * BLOCK + i] if edge else t + h
-        settle(pool, i, t, x, v, a, h, t1, x1, v1, a1, ratio, sure, edge, outside)
+        settle(pool, i, start, h, end, ratio, sure, edge, outside)
 
 
 @compiled
@@ -212,21 +190,14 @@ def unloading_block(pool: Any, begin: int) -> None:
     """Take a step in each lane of a block of members on the unloading branch of the pack."""
     pool = pool[begin:]
     for i in range(BLOCK):
-        t, x, v, a = pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
-        h = pool[R.H * BLOCK + i]
-        left = pool[R.NEXT * BLOCK + i] - t
-        edge = h >= left
-        h = left if edge else h
-        hammer = hammer_at(pool, i)
-        drive = drive_at(pool, i)
-        memory = pool[R.MEMORY * BLOCK + i]
-        x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, UNLOADING, memory, hammer, drive)
+        start = start_at(pool, i)
+        _t, _x, v, a = start
+        law = ForceLaw(UNLOADING, pool[R.MEMORY * BLOCK + i], hammer_at(pool, i), drive_at(pool, i))
+        h, end, ratio, edge = timed_step(pool, i, start, pool[R.H * BLOCK + i], law)
+        _t1, x1, v1, a1 = end
+        sure = max(v + h * a / 3.0, v1 - h * a1 / 3.0, v1) < 0.0 and x1 > law.hammer[R.FRONT]
         # On the steep branch the estimate of order 6 is too small by about this factor.
-        ratio = 5.0 * nystrom_ratio(pool, i, error_x, error_v)
-        high = max(v + h * a / 3.0, v1 - h * a1 / 3.0, v1)
-        sure = high < 0.0 and x1 > hammer[R.FRONT]
-        t1 = pool[R.NEXT * BLOCK + i] if edge else t + h
-        settle(pool, i, t, x, v, a, h, t1, x1, v1, a1, ratio, sure, edge, False)
+        settle(pool, i, start, h, end, 5.0 * ratio, sure, edge, False)
 
 
 @inlined
@@ -244,7 +215,8 @@ def contact_block(pool: Any, begin: int) -> None:
     """Take a step in s in each lane of a block of members in the backstop."""
     pool = pool[begin:]
     for i in range(BLOCK):
-        t, w, v, kv = pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
+        start = start_at(pool, i)
+        t, w, v, kv = start
         h = pool[R.H * BLOCK + i]
         hammer = hammer_at(pool, i)
         drive = drive_at(pool, i)
@@ -264,7 +236,7 @@ def contact_block(pool: Any, begin: int) -> None:
         high = max(c1, c2, c3, c4, w1)
         outside = hammer[R.POSITION] - high * high <= pool[R.LOWEST * BLOCK + i]
         sure = low > 0.0 and t1 < pool[R.NEXT * BLOCK + i]
-        settle(pool, i, t, w, v, kv, h, t1, w1, v1, kv1, ratio, sure, False, outside)
+        settle(pool, i, start, h, (t1, w1, v1, kv1), ratio, sure, False, outside)
 
 
 @compiled

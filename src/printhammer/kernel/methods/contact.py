@@ -8,17 +8,8 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.methods.hermite import position_root, rises_through
 from printhammer.kernel.methods.landing import FAILED, step_factor
+from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET, Control
-from printhammer.kernel.model.modes import (
-    ANY_SCALES,
-    EDGE,
-    LEFT_BACKSTOP,
-    NEAR_TOUCH,
-    NO_SWITCH,
-    PUSH_ENDED,
-    REACHED_FRONT,
-    UNRESOLVED,
-)
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.dop853 import contact_step
@@ -75,7 +66,7 @@ def leave(
     low, high = 0.0, upper
     negligible = 1e-12 * math.sqrt(control[0])
     for _ in range(80):
-        t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, fraction * h, hammer, drive, ANY_SCALES)
+        t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, fraction * h, hammer, drive, M.ANY_SCALES)
         if w1 < 0.0:
             high = fraction
         else:
@@ -102,7 +93,7 @@ def reach_time(
     for _ in range(80):
         if not (low < fraction < high):
             fraction = 0.5 * (low + high)
-        t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, fraction * h, hammer, drive, ANY_SCALES)
+        t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, fraction * h, hammer, drive, M.ANY_SCALES)
         if t1 > target:
             high = fraction
         else:
@@ -127,13 +118,40 @@ def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive:
     low, high = 0.0, upper
     for _ in range(60):
         middle = 0.5 * (low + high)
-        _t1, w1, v1, _kv1, _error = contact_step(t, w, v, kv, middle * h, hammer, drive, ANY_SCALES)
+        _t1, w1, v1, _kv1, _error = contact_step(t, w, v, kv, middle * h, hammer, drive, M.ANY_SCALES)
         if backstop_switch(hammer[BACKSTOP_PART:MAGNET], w1, v1) > 0.0:
             low = middle
         else:
             high = middle
-    t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, high * h, hammer, drive, ANY_SCALES)
+    t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, high * h, hammer, drive, M.ANY_SCALES)
     return t1, w1, v1, kv1
+
+
+@inlined
+def contact_switch(
+    start: ContactState,
+    end: ContactState,
+    h: float,
+    leaves: bool,
+    t_next: float,
+    hammer: Hammer,
+    drive: Drive,
+    control: Control,
+) -> tuple[int, ContactState]:
+    """Return the first switch in a step of `h` in s that may have left the backstop, and the state there."""
+    _t, w, v, kv = start
+    switch, upper = M.NO_SWITCH, 1.0
+    if leaves:
+        guess = position_root(-w, v, kv, -end[1], end[2], end[3], h, 0.0, 1.0)
+        left = leave(start, h, guess, 1.0, hammer, drive, control)
+        switch, end, upper = M.LEFT_BACKSTOP, (left[0], left[1], left[2], left[3]), left[4]
+    if not BACKSTOP_PULLS and backstop_switch(hammer[BACKSTOP_PART:MAGNET], end[1], end[2]) <= 0.0:
+        switch, end = M.PUSH_ENDED, end_push(start, h, upper, hammer, drive)
+    if end[0] > t_next:
+        return M.EDGE, reach_time(start, h, upper, end[0], t_next, hammer, drive)
+    if end[0] == t_next and switch == M.NO_SWITCH:
+        switch = M.EDGE
+    return switch, end
 
 
 @inlined
@@ -168,28 +186,11 @@ def advance_contact(
                 return FAILED, start, h
             continue
         code = rises_through(-w, v, kv, -w1, v1, kv1, h, 0.0)
-        if code in (UNRESOLVED, NEAR_TOUCH):
+        if code in (M.UNRESOLVED, M.NEAR_TOUCH):
             if h > shortest:
                 h *= 0.5
                 continue
-            code = NO_SWITCH
-        following = h * step_factor(ratio)
-        switch = NO_SWITCH
+            code = M.NO_SWITCH
         end = (t1, w1, v1, kv1)
-        upper = 1.0
-        if code == REACHED_FRONT:
-            guess = position_root(-w, v, kv, -w1, v1, kv1, h, 0.0, 1.0)
-            left = leave(start, h, guess, 1.0, hammer, drive, control)
-            switch = LEFT_BACKSTOP
-            end = (left[0], left[1], left[2], left[3])
-            upper = left[4]
-        if not BACKSTOP_PULLS and backstop_switch(hammer[BACKSTOP_PART:MAGNET], end[1], end[2]) <= 0.0:
-            end = end_push(start, h, upper, hammer, drive)
-            switch = PUSH_ENDED
-        if end[0] >= t_next:
-            if end[0] > t_next:
-                end = reach_time(start, h, upper, end[0], t_next, hammer, drive)
-                switch = EDGE
-            elif switch == NO_SWITCH:
-                switch = EDGE
-        return switch, end, following
+        switch, end = contact_switch(start, end, h, code == M.REACHED_FRONT, t_next, hammer, drive, control)
+        return switch, end, h * step_factor(ratio)

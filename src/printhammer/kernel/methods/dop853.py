@@ -19,8 +19,11 @@ from printhammer.kernel.methods import dop853_tableau as T
 
 if TYPE_CHECKING:
     Numbers = tuple[float, ...]
+    Three = tuple[float, float, float]
+    Slopes = tuple[Three, ...]
 
     from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
+    from printhammer.kernel.model.layout import ForceLaw
     from printhammer.kernel.model.pulses import Drive
 
 
@@ -33,64 +36,57 @@ def combined_error(e5: float, e3: float) -> float:
 
 
 @inlined
-def dot2(c: Numbers, k: Numbers) -> float:
-    """Return the scalar product of the first 2 of weights and slopes; those that follow, of more."""
-    return c[0] * k[0] + c[1] * k[1]
+def plus(total: Three, c: float, k: Three) -> Three:
+    """Return a sum of slopes and one more, times its weight."""
+    return total[0] + c * k[0], total[1] + c * k[1], total[2] + c * k[2]
 
 
 @inlined
-def dot3(c: Numbers, k: Numbers) -> float:
-    """Return the sum of 3 products."""
-    return dot2(c, k) + c[2] * k[2]
+def sum1(c: Numbers, k: Slopes) -> Three:
+    """Return the first slope times its weight; the functions that follow add up more."""
+    return c[0] * k[0][0], c[0] * k[0][1], c[0] * k[0][2]
+
+
+def _longer(fewer: Any, last: int) -> Any:
+    def total(c: Numbers, k: Slopes) -> Three:
+        return plus(fewer(c, k), c[last], k[last])
+
+    return inlined(total)
+
+
+sum2 = _longer(sum1, 1)
+sum3 = _longer(sum2, 2)
+sum4 = _longer(sum3, 3)
+sum5 = _longer(sum4, 4)
+sum6 = _longer(sum5, 5)
+sum7 = _longer(sum6, 6)
+sum8 = _longer(sum7, 7)
+sum9 = _longer(sum8, 8)
 
 
 @inlined
-def dot4(c: Numbers, k: Numbers) -> float:
-    """Return the sum of 4 products."""
-    return dot3(c, k) + c[3] * k[3]
+def along(y: Three, h: float, slope: Three) -> Three:
+    """Return the state a step of `h` along a slope from `y`."""
+    return y[0] + h * slope[0], y[1] + h * slope[1], y[2] + h * slope[2]
 
 
 @inlined
-def dot5(c: Numbers, k: Numbers) -> float:
-    """Return the sum of 5 products."""
-    return dot4(c, k) + c[4] * k[4]
+def time_slope(t: float, y: Three, law: ForceLaw) -> Three:
+    """Return the rates of time, position and velocity; `t` is exact where the time in `y` is a sum."""
+    mode, memory, hammer, drive = law
+    return 1.0, y[2], acceleration(t, y[1], y[2], mode, memory, hammer, drive)
 
 
 @inlined
-def dot6(c: Numbers, k: Numbers) -> float:
-    """Return the sum of 6 products."""
-    return dot5(c, k) + c[5] * k[5]
-
-
-@inlined
-def dot7(c: Numbers, k: Numbers) -> float:
-    """Return the sum of 7 products."""
-    return dot6(c, k) + c[6] * k[6]
-
-
-@inlined
-def dot8(c: Numbers, k: Numbers) -> float:
-    """Return the sum of 8 products."""
-    return dot7(c, k) + c[7] * k[7]
-
-
-@inlined
-def dot9(c: Numbers, k: Numbers) -> float:
-    """Return the sum of 9 products."""
-    return dot8(c, k) + c[8] * k[8]
+def contact_slope(y: Three, hammer: Hammer, drive: Drive) -> Three:
+    """Return the derivatives of time, w and velocity with s."""
+    pace = 2.0 * y[1]
+    return pace, -y[2], pace * backstop_acceleration(y[0], y[1], y[2], hammer, drive)
 
 
 @compiled
 def time_step(
-    t0: float,
-    x0: float,
-    v1: float,
-    a1: float,
-    h: float,
-    mode: int,
-    memory: float,
-    hammer: Hammer,
-    drive: Drive,
+    t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
     """Advance position and velocity by `h` [s]; for accelerations that depend on the velocity.
 
@@ -99,55 +95,42 @@ def time_step(
     tuple of float
         Position [m], velocity [m/s] and acceleration [m/s^2] at the end, and their error estimates.
     """
-    v0 = v1
-    v2 = v0 + h * (T.A02[0] * a1)
-    x = x0 + h * (T.A02[0] * v1)
-    a2 = acceleration(t0 + T.C02 * h, x, v2, mode, memory, hammer, drive)
-    v3 = v0 + h * dot2(T.A03, (a1, a2))
-    x = x0 + h * dot2(T.A03, (v1, v2))
-    a3 = acceleration(t0 + T.C03 * h, x, v3, mode, memory, hammer, drive)
-    v4 = v0 + h * dot2(T.A04, (a1, a3))
-    x = x0 + h * dot2(T.A04, (v1, v3))
-    a4 = acceleration(t0 + T.C04 * h, x, v4, mode, memory, hammer, drive)
-    v5 = v0 + h * dot3(T.A05, (a1, a3, a4))
-    x = x0 + h * dot3(T.A05, (v1, v3, v4))
-    a5 = acceleration(t0 + T.C05 * h, x, v5, mode, memory, hammer, drive)
-    v6 = v0 + h * dot3(T.A06, (a1, a4, a5))
-    x = x0 + h * dot3(T.A06, (v1, v4, v5))
-    a6 = acceleration(t0 + T.C06 * h, x, v6, mode, memory, hammer, drive)
-    v7 = v0 + h * dot4(T.A07, (a1, a4, a5, a6))
-    x = x0 + h * dot4(T.A07, (v1, v4, v5, v6))
-    a7 = acceleration(t0 + T.C07 * h, x, v7, mode, memory, hammer, drive)
-    v8 = v0 + h * dot5(T.A08, (a1, a4, a5, a6, a7))
-    x = x0 + h * dot5(T.A08, (v1, v4, v5, v6, v7))
-    a8 = acceleration(t0 + T.C08 * h, x, v8, mode, memory, hammer, drive)
-    v9 = v0 + h * dot6(T.A09, (a1, a4, a5, a6, a7, a8))
-    x = x0 + h * dot6(T.A09, (v1, v4, v5, v6, v7, v8))
-    a9 = acceleration(t0 + T.C09 * h, x, v9, mode, memory, hammer, drive)
-    v10 = v0 + h * dot7(T.A10, (a1, a4, a5, a6, a7, a8, a9))
-    x = x0 + h * dot7(T.A10, (v1, v4, v5, v6, v7, v8, v9))
-    a10 = acceleration(t0 + T.C10 * h, x, v10, mode, memory, hammer, drive)
-    v11 = v0 + h * dot8(T.A11, (a1, a4, a5, a6, a7, a8, a9, a10))
-    x = x0 + h * dot8(T.A11, (v1, v4, v5, v6, v7, v8, v9, v10))
-    a11 = acceleration(t0 + T.C11 * h, x, v11, mode, memory, hammer, drive)
-    v12 = v0 + h * dot9(T.A12, (a1, a4, a5, a6, a7, a8, a9, a10, a11))
-    x = x0 + h * dot9(T.A12, (v1, v4, v5, v6, v7, v8, v9, v10, v11))
-    a12 = acceleration(t0 + h, x, v12, mode, memory, hammer, drive)
-    v = (v1, v6, v7, v8, v9, v10, v11, v12)
-    a = (a1, a6, a7, a8, a9, a10, a11, a12)
-    x_end = x0 + h * dot8(T.B, v)
-    v_end = v0 + h * dot8(T.B, a)
-    a_end = acceleration(t0 + h, x_end, v_end, mode, memory, hammer, drive)
-    error_x = combined_error(h * dot8(T.E5, v), h * dot8(T.E3, v))
-    error_v = combined_error(h * dot8(T.E5, a), h * dot8(T.E3, a))
-    return x_end, v_end, a_end, error_x, error_v
+    y, k1 = (t0, x0, v0), (1.0, v0, a0)
+    y2 = along(y, h, sum1(T.A02, (k1,)))
+    k2 = time_slope(t0 + T.C02 * h, y2, law)
+    y3 = along(y, h, sum2(T.A03, (k1, k2)))
+    k3 = time_slope(t0 + T.C03 * h, y3, law)
+    y4 = along(y, h, sum2(T.A04, (k1, k3)))
+    k4 = time_slope(t0 + T.C04 * h, y4, law)
+    y5 = along(y, h, sum3(T.A05, (k1, k3, k4)))
+    k5 = time_slope(t0 + T.C05 * h, y5, law)
+    y6 = along(y, h, sum3(T.A06, (k1, k4, k5)))
+    k6 = time_slope(t0 + T.C06 * h, y6, law)
+    y7 = along(y, h, sum4(T.A07, (k1, k4, k5, k6)))
+    k7 = time_slope(t0 + T.C07 * h, y7, law)
+    y8 = along(y, h, sum5(T.A08, (k1, k4, k5, k6, k7)))
+    k8 = time_slope(t0 + T.C08 * h, y8, law)
+    y9 = along(y, h, sum6(T.A09, (k1, k4, k5, k6, k7, k8)))
+    k9 = time_slope(t0 + T.C09 * h, y9, law)
+    y10 = along(y, h, sum7(T.A10, (k1, k4, k5, k6, k7, k8, k9)))
+    k10 = time_slope(t0 + T.C10 * h, y10, law)
+    y11 = along(y, h, sum8(T.A11, (k1, k4, k5, k6, k7, k8, k9, k10)))
+    k11 = time_slope(t0 + T.C11 * h, y11, law)
+    y12 = along(y, h, sum9(T.A12, (k1, k4, k5, k6, k7, k8, k9, k10, k11)))
+    k12 = time_slope(t0 + h, y12, law)
+    k = (k1, k6, k7, k8, k9, k10, k11, k12)
+    _t, x, v = along(y, h, sum8(T.B, k))
+    a = time_slope(t0 + h, (t0, x, v), law)[2]
+    e5, e3 = sum8(T.E5, k), sum8(T.E3, k)
+    error_x = combined_error(h * e5[1], h * e3[1])
+    return x, v, a, error_x, combined_error(h * e5[2], h * e3[2])
 
 
 @compiled
 def contact_step(
-    t0: float, w0: float, v1: float, kv1: float, h: float, hammer: Hammer, drive: Drive, scales: Any
+    t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float]:
-    """Advance time, w and velocity in the backstop by `h` in s, from a state whose dv/ds is `kv1`.
+    """Advance time, w and velocity in the backstop by `h` in s, from a state whose dv/ds is `kv0`.
 
     Returns
     -------
@@ -155,88 +138,22 @@ def contact_step(
         Time [s], w [m^0.5], velocity [m/s] and dv/ds at the end, and the error estimate, the sum of those of
         time, w and velocity in units of `scales`.
     """
-    v0 = v1
-    kw1 = -v1
-    kt1 = 2.0 * w0
-    w = w0 + h * (T.A02[0] * kw1)
-    v = v0 + h * (T.A02[0] * kv1)
-    t = t0 + h * (T.A02[0] * kt1)
-    kw2 = -v
-    kt2 = 2.0 * w
-    kv2 = kt2 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot2(T.A03, (kw1, kw2))
-    v = v0 + h * dot2(T.A03, (kv1, kv2))
-    t = t0 + h * dot2(T.A03, (kt1, kt2))
-    kw3 = -v
-    kt3 = 2.0 * w
-    kv3 = kt3 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot2(T.A04, (kw1, kw3))
-    v = v0 + h * dot2(T.A04, (kv1, kv3))
-    t = t0 + h * dot2(T.A04, (kt1, kt3))
-    kw4 = -v
-    kt4 = 2.0 * w
-    kv4 = kt4 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot3(T.A05, (kw1, kw3, kw4))
-    v = v0 + h * dot3(T.A05, (kv1, kv3, kv4))
-    t = t0 + h * dot3(T.A05, (kt1, kt3, kt4))
-    kw5 = -v
-    kt5 = 2.0 * w
-    kv5 = kt5 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot3(T.A06, (kw1, kw4, kw5))
-    v = v0 + h * dot3(T.A06, (kv1, kv4, kv5))
-    t = t0 + h * dot3(T.A06, (kt1, kt4, kt5))
-    kw6 = -v
-    kt6 = 2.0 * w
-    kv6 = kt6 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot4(T.A07, (kw1, kw4, kw5, kw6))
-    v = v0 + h * dot4(T.A07, (kv1, kv4, kv5, kv6))
-    t = t0 + h * dot4(T.A07, (kt1, kt4, kt5, kt6))
-    kw7 = -v
-    kt7 = 2.0 * w
-    kv7 = kt7 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot5(T.A08, (kw1, kw4, kw5, kw6, kw7))
-    v = v0 + h * dot5(T.A08, (kv1, kv4, kv5, kv6, kv7))
-    t = t0 + h * dot5(T.A08, (kt1, kt4, kt5, kt6, kt7))
-    kw8 = -v
-    kt8 = 2.0 * w
-    kv8 = kt8 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot6(T.A09, (kw1, kw4, kw5, kw6, kw7, kw8))
-    v = v0 + h * dot6(T.A09, (kv1, kv4, kv5, kv6, kv7, kv8))
-    t = t0 + h * dot6(T.A09, (kt1, kt4, kt5, kt6, kt7, kt8))
-    kw9 = -v
-    kt9 = 2.0 * w
-    kv9 = kt9 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot7(T.A10, (kw1, kw4, kw5, kw6, kw7, kw8, kw9))
-    v = v0 + h * dot7(T.A10, (kv1, kv4, kv5, kv6, kv7, kv8, kv9))
-    t = t0 + h * dot7(T.A10, (kt1, kt4, kt5, kt6, kt7, kt8, kt9))
-    kw10 = -v
-    kt10 = 2.0 * w
-    kv10 = kt10 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot8(T.A11, (kw1, kw4, kw5, kw6, kw7, kw8, kw9, kw10))
-    v = v0 + h * dot8(T.A11, (kv1, kv4, kv5, kv6, kv7, kv8, kv9, kv10))
-    t = t0 + h * dot8(T.A11, (kt1, kt4, kt5, kt6, kt7, kt8, kt9, kt10))
-    kw11 = -v
-    kt11 = 2.0 * w
-    kv11 = kt11 * backstop_acceleration(t, w, v, hammer, drive)
-    w = w0 + h * dot9(T.A12, (kw1, kw4, kw5, kw6, kw7, kw8, kw9, kw10, kw11))
-    v = v0 + h * dot9(T.A12, (kv1, kv4, kv5, kv6, kv7, kv8, kv9, kv10, kv11))
-    t = t0 + h * dot9(T.A12, (kt1, kt4, kt5, kt6, kt7, kt8, kt9, kt10, kt11))
-    kw12 = -v
-    kt12 = 2.0 * w
-    kv12 = kt12 * backstop_acceleration(t, w, v, hammer, drive)
-    kt = (kt1, kt6, kt7, kt8, kt9, kt10, kt11, kt12)
-    kw = (kw1, kw6, kw7, kw8, kw9, kw10, kw11, kw12)
-    kv = (kv1, kv6, kv7, kv8, kv9, kv10, kv11, kv12)
-    t_end = t0 + h * dot8(T.B, kt)
-    w_end = w0 + h * dot8(T.B, kw)
-    v_end = v0 + h * dot8(T.B, kv)
-    kv_end = 2.0 * w_end * backstop_acceleration(t_end, w_end, v_end, hammer, drive)
-    t5 = h * dot8(T.E5, kt)
-    w5 = h * dot8(T.E5, kw)
-    v5 = h * dot8(T.E5, kv)
-    t3 = h * dot8(T.E3, kt)
-    w3 = h * dot8(T.E3, kw)
-    v3 = h * dot8(T.E3, kv)
-    error5 = abs(t5) / scales[0] + abs(w5) / scales[1] + abs(v5) / scales[2]
-    error3 = abs(t3) / scales[0] + abs(w3) / scales[1] + abs(v3) / scales[2]
-    return t_end, w_end, v_end, kv_end, combined_error(error5, error3)
+    y, k1 = (t0, w0, v0), (2.0 * w0, -v0, kv0)
+    k2 = contact_slope(along(y, h, sum1(T.A02, (k1,))), hammer, drive)
+    k3 = contact_slope(along(y, h, sum2(T.A03, (k1, k2))), hammer, drive)
+    k4 = contact_slope(along(y, h, sum2(T.A04, (k1, k3))), hammer, drive)
+    k5 = contact_slope(along(y, h, sum3(T.A05, (k1, k3, k4))), hammer, drive)
+    k6 = contact_slope(along(y, h, sum3(T.A06, (k1, k4, k5))), hammer, drive)
+    k7 = contact_slope(along(y, h, sum4(T.A07, (k1, k4, k5, k6))), hammer, drive)
+    k8 = contact_slope(along(y, h, sum5(T.A08, (k1, k4, k5, k6, k7))), hammer, drive)
+    k9 = contact_slope(along(y, h, sum6(T.A09, (k1, k4, k5, k6, k7, k8))), hammer, drive)
+    k10 = contact_slope(along(y, h, sum7(T.A10, (k1, k4, k5, k6, k7, k8, k9))), hammer, drive)
+    k11 = contact_slope(along(y, h, sum8(T.A11, (k1, k4, k5, k6, k7, k8, k9, k10))), hammer, drive)
+    k12 = contact_slope(along(y, h, sum9(T.A12, (k1, k4, k5, k6, k7, k8, k9, k10, k11))), hammer, drive)
+    k = (k1, k6, k7, k8, k9, k10, k11, k12)
+    end = along(y, h, sum8(T.B, k))
+    kv = contact_slope(end, hammer, drive)[2]
+    e5, e3 = sum8(T.E5, k), sum8(T.E3, k)
+    error5 = abs(h * e5[0]) / scales[0] + abs(h * e5[1]) / scales[1] + abs(h * e5[2]) / scales[2]
+    error3 = abs(h * e3[0]) / scales[0] + abs(h * e3[1]) / scales[1] + abs(h * e3[2]) / scales[2]
+    return end[0], end[1], end[2], kv, combined_error(error5, error3)

@@ -13,27 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.methods.hermite import position_root, rises_through, turns_down, velocity_root
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control
-from printhammer.kernel.model.modes import (
-    BACKSTOP_RELEASED,
-    EDGE,
-    FREE,
-    LEFT_BACKSTOP,
-    LEFT_FRONT,
-    LOADING,
-    NEAR_TOUCH,
-    NO_SWITCH,
-    PACK_RELEASED,
-    PUSH_BEGAN,
-    PUSH_ENDED,
-    REACHED_BACKSTOP,
-    REACHED_FRONT,
-    REACHED_PEAK,
-    RELOADING,
-    REVERSAL,
-    UNLOADING,
-    UNRESOLVED,
-)
+from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control, ForceLaw
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.dop853 import time_step
@@ -48,7 +29,6 @@ if TYPE_CHECKING:
         backstop_switch,
         pack_switch,
     )
-    from printhammer.kernel.model.pulses import Drive
 
 State = Any
 """Time, position, velocity, acceleration."""
@@ -59,12 +39,12 @@ FAILED = -1
 
 @inlined
 def plain_step(
-    t: float, x: float, v: float, a: float, h: float, mode: int, memory: float, hammer: Hammer, drive: Drive
+    t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
     """Take one step of `h` [s] with the method that suits the mode."""
-    if HAS_PACK and not MEMORY and mode == LOADING:
-        return time_step(t, x, v, a, h, mode, memory, hammer, drive)
-    return nystrom_step(t, x, v, a, h, mode, memory, hammer, drive)
+    if HAS_PACK and not MEMORY and law.mode == M.LOADING:
+        return time_step(t, x, v, a, h, law)
+    return nystrom_step(t, x, v, a, h, law)
 
 
 @compiled
@@ -79,9 +59,9 @@ def error_ratio(error_x: float, error_v: float, mode: int, control: Control) -> 
     worst = ratio_x if ratio_x > ratio_v else ratio_v
     if math.isnan(ratio_x):
         worst = ratio_x
-    if HAS_PACK and not MEMORY and mode == LOADING:
+    if HAS_PACK and not MEMORY and mode == M.LOADING:
         return worst / control[3]
-    if mode in (UNLOADING, RELOADING):
+    if mode in (M.UNLOADING, M.RELOADING):
         # On the steep branch r^11 the estimate of order 6 is too small by about this factor.
         worst *= 5.0
     return worst / control[2]
@@ -104,10 +84,7 @@ def land_on_level(
     upper: float,
     level: float,
     sign: float,
-    mode: int,
-    memory: float,
-    hammer: Hammer,
-    drive: Drive,
+    law: ForceLaw,
     control: Control,
 ) -> State:
     """Return the state at which sign * x rises through sign * `level`, inside `upper` of a step of `h`."""
@@ -116,7 +93,7 @@ def land_on_level(
     negligible = 1e-15 * control[0]
     for _ in range(80):
         step = fraction * h
-        x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, step, mode, memory, hammer, drive)
+        x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, step, law)
         gap = level - x1
         if sign * gap < 0.0:
             high = fraction
@@ -135,15 +112,7 @@ def land_on_level(
 
 @compiled
 def land_on_reversal(
-    start: State,
-    h: float,
-    fraction: float,
-    sign: float,
-    mode: int,
-    memory: float,
-    hammer: Hammer,
-    drive: Drive,
-    control: Control,
+    start: State, h: float, fraction: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, float]:
     """Return the state at which sign * v falls to zero inside a step of `h`, and its fraction of the step."""
     t, x, v, a = start
@@ -151,7 +120,7 @@ def land_on_reversal(
     negligible = 1e-8 * control[1]
     for _ in range(80):
         step = fraction * h
-        x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, step, mode, memory, hammer, drive)
+        x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, step, law)
         if sign * v1 > 0.0:
             low = fraction
         else:
@@ -168,16 +137,15 @@ def land_on_reversal(
 
 
 @compiled
-def longest_still_step(
-    start: State, mode: int, memory: float, hammer: Hammer, drive: Drive, control: Control
-) -> float:
+def longest_still_step(start: State, law: ForceLaw, control: Control) -> float:
     """Return the longest step [s] that is stable for small oscillations about the present place.
 
     Near rest all errors are below the tolerance, those of an unstable step too, until they have grown to it.
     """
     t, x, v, _a = start
+    mode, memory, hammer, drive = law
     small = 1e-5 * control[0]
-    if HAS_PACK and mode in (LOADING, UNLOADING, RELOADING):
+    if HAS_PACK and mode in (M.LOADING, M.UNLOADING, M.RELOADING):
         small = min(small, 1e-3 * (x - hammer[FRONT]))
     if small <= 1e-14 * abs(x):
         return math.inf
@@ -189,7 +157,7 @@ def longest_still_step(
 @compiled
 def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
     """Return the sign function of a contact that may let go: positive while it pushes."""
-    if mode == BACKSTOP_RELEASED:
+    if mode == M.BACKSTOP_RELEASED:
         return backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(max(hammer[POSITION] - x, 0.0)), v)
     return pack_switch(hammer[PACK:BACKSTOP_PART], x, v)
 
@@ -198,20 +166,11 @@ def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
 def lets_go_or_takes_hold(x: float, v: float, mode: int, hammer: Hammer) -> bool:
     """Tell whether a contact that may let go no longer does what its mode says."""
     number = pushes(x, v, mode, hammer)
-    return number > 0.0 if mode in (PACK_RELEASED, BACKSTOP_RELEASED) else number < 0.0
+    return number > 0.0 if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else number < 0.0
 
 
 @compiled
-def land_on_push(
-    start: State,
-    h: float,
-    upper: float,
-    mode: int,
-    memory: float,
-    hammer: Hammer,
-    drive: Drive,
-    control: Control,
-) -> State:
+def land_on_push(start: State, h: float, upper: float, law: ForceLaw, control: Control) -> State:
     """Return the state at which the contact begins or ends to push, inside `upper` of a step of `h`."""
     t, x, v, a = start
     low, high = 0.0, upper
@@ -219,115 +178,83 @@ def land_on_push(
         middle = 0.5 * (low + high)
         if not (low < middle < high):
             break
-        x1, v1, _a1, _ex, _ev = plain_step(t, x, v, a, middle * h, mode, memory, hammer, drive)
-        if lets_go_or_takes_hold(x1, v1, mode, hammer):
+        x1, v1, _a1, _ex, _ev = plain_step(t, x, v, a, middle * h, law)
+        if lets_go_or_takes_hold(x1, v1, law.mode, law.hammer):
             high = middle
         else:
             low = middle
-    x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, high * h, mode, memory, hammer, drive)
+    x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, high * h, law)
     return t + high * h, x1, v1, a1
 
 
 @compiled
 def level_switch(
-    start: State,
-    end: State,
-    h: float,
-    level: float,
-    sign: float,
-    mode: int,
-    memory: float,
-    hammer: Hammer,
-    drive: Drive,
-    control: Control,
+    start: State, end: State, h: float, level: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[int, float, float]:
     """Look for sign * x rising through sign * `level` in a step: a code, the fraction, a bound of it."""
-    _t, x0, v0, a0 = start
-    _t1, x1, v1, a1 = end
-    code = rises_through(sign * x0, sign * v0, sign * a0, sign * x1, sign * v1, sign * a1, h, sign * level)
-    upper = 1.0
-    if code == NEAR_TOUCH:
-        guess = velocity_root(sign * v0, sign * a0, sign * v1, sign * a1, h)
-        turn = land_on_reversal(start, h, guess, sign, mode, memory, hammer, drive, control)
+    x0, v0, a0 = sign * start[1], sign * start[2], sign * start[3]
+    x1, v1, a1 = sign * end[1], sign * end[2], sign * end[3]
+    code = rises_through(x0, v0, a0, x1, v1, a1, h, sign * level)
+    if code == M.NEAR_TOUCH:
+        guess = velocity_root(v0, a0, v1, a1, h)
+        turn = land_on_reversal(start, h, guess, sign, law, control)
         if not sign * turn[1] > sign * level:
-            return NO_SWITCH, 1.0, 1.0
+            return M.NO_SWITCH, 1.0, 1.0
         upper = turn[4]
-        guess = position_root(
-            sign * x0, sign * v0, sign * a0, sign * turn[1], 0.0, sign * turn[3], upper * h, sign * level, 1.0
-        )
-        return REACHED_FRONT, guess * upper, upper
-    if code == REACHED_FRONT:
-        fraction = position_root(
-            sign * x0, sign * v0, sign * a0, sign * x1, sign * v1, sign * a1, h, sign * level, 1.0
-        )
-        return REACHED_FRONT, fraction, 1.0
-    return code, 1.0, upper
+        guess = position_root(x0, v0, a0, sign * turn[1], 0.0, sign * turn[3], upper * h, sign * level, 1.0)
+        return M.REACHED_FRONT, guess * upper, upper
+    if code == M.REACHED_FRONT:
+        return M.REACHED_FRONT, position_root(x0, v0, a0, x1, v1, a1, h, sign * level, 1.0), 1.0
+    return code, 1.0, 1.0
 
 
 @inlined
 def first_switch(
-    start: State,
-    end: State,
-    h: float,
-    mode: int,
-    memory: float,
-    peak: float,
-    hammer: Hammer,
-    drive: Drive,
-    control: Control,
+    start: State, end: State, h: float, law: ForceLaw, peak: float, control: Control
 ) -> tuple[int, float, float, float, float]:
     """Find the first switch inside a step: its name, fraction, upper bound, level and direction."""
-    switch, fraction, upper, level, sign = NO_SWITCH, 2.0, 1.0, 0.0, 1.0
+    mode, hammer = law.mode, law.hammer
+    switch, fraction, upper, level, sign = M.NO_SWITCH, 2.0, 1.0, 0.0, 1.0
     if (
-        (HAS_BACKSTOP and mode == FREE)
-        or (HAS_PACK and mode in (UNLOADING, PACK_RELEASED))
-        or (HAS_PACK and not MEMORY and mode == LOADING)
+        (HAS_BACKSTOP and mode == M.FREE)
+        or (HAS_PACK and mode in (M.UNLOADING, M.PACK_RELEASED))
+        or (HAS_PACK and not MEMORY and mode == M.LOADING)
     ):
-        bound = hammer[POSITION] if mode == FREE else hammer[FRONT]
-        code, f, u = level_switch(start, end, h, bound, -1.0, mode, memory, hammer, drive, control)
-        if code == UNRESOLVED:
-            return UNRESOLVED, f, u, bound, -1.0
-        if code == REACHED_FRONT:
-            switch = REACHED_BACKSTOP if mode == FREE else LEFT_FRONT
+        bound = hammer[POSITION] if mode == M.FREE else hammer[FRONT]
+        code, f, u = level_switch(start, end, h, bound, -1.0, law, control)
+        if code == M.UNRESOLVED:
+            return M.UNRESOLVED, f, u, bound, -1.0
+        if code == M.REACHED_FRONT:
+            switch = M.REACHED_BACKSTOP if mode == M.FREE else M.LEFT_FRONT
             fraction, upper, level, sign = f, u, bound, -1.0
-    if (HAS_PACK and mode in (FREE, RELOADING)) or mode == BACKSTOP_RELEASED:
-        bound = (
-            hammer[POSITION] if mode == BACKSTOP_RELEASED else (peak if mode == RELOADING else hammer[FRONT])
-        )
-        code, f, u = level_switch(start, end, h, bound, 1.0, mode, memory, hammer, drive, control)
-        if code == UNRESOLVED:
-            return UNRESOLVED, f, u, bound, 1.0
-        if code == REACHED_FRONT and f < fraction:
-            if mode == BACKSTOP_RELEASED:
-                switch = LEFT_BACKSTOP
-            else:
-                switch = REACHED_PEAK if mode == RELOADING else REACHED_FRONT
-            fraction, upper, level, sign = f, u, bound, 1.0
-    if HAS_PACK and MEMORY and mode in (LOADING, UNLOADING, RELOADING):
-        turn = -1.0 if mode == UNLOADING else 1.0
+    if (HAS_PACK and mode in (M.FREE, M.RELOADING)) or mode == M.BACKSTOP_RELEASED:
+        bound, reached = hammer[FRONT], M.REACHED_FRONT
+        if mode == M.BACKSTOP_RELEASED:
+            bound, reached = hammer[POSITION], M.LEFT_BACKSTOP
+        elif mode == M.RELOADING:
+            bound, reached = peak, M.REACHED_PEAK
+        code, f, u = level_switch(start, end, h, bound, 1.0, law, control)
+        if code == M.UNRESOLVED:
+            return M.UNRESOLVED, f, u, bound, 1.0
+        if code == M.REACHED_FRONT and f < fraction:
+            switch, fraction, upper, level, sign = reached, f, u, bound, 1.0
+    if HAS_PACK and MEMORY and mode in (M.LOADING, M.UNLOADING, M.RELOADING):
+        turn = -1.0 if mode == M.UNLOADING else 1.0
         code = turns_down(
             turn * start[1], turn * start[2], turn * start[3], turn * end[1], turn * end[2], turn * end[3], h
         )
-        if code == UNRESOLVED:
-            return UNRESOLVED, 1.0, 1.0, 0.0, turn
-        if code == REACHED_FRONT:
+        if code == M.UNRESOLVED:
+            return M.UNRESOLVED, 1.0, 1.0, 0.0, turn
+        if code == M.REACHED_FRONT:
             f = velocity_root(turn * start[2], turn * start[3], turn * end[2], turn * end[3], h)
             if f < fraction:
-                switch, fraction, upper, level, sign = REVERSAL, f, 1.0, 0.0, turn
+                switch, fraction, upper, level, sign = M.REVERSAL, f, 1.0, 0.0, turn
     return switch, fraction, upper, level, sign
 
 
 @inlined
 def advance(
-    start: State,
-    h: float,
-    t_next: float,
-    mode: int,
-    memory: float,
-    peak: float,
-    hammer: Hammer,
-    drive: Drive,
-    control: Control,
+    start: State, h: float, t_next: float, law: ForceLaw, peak: float, control: Control
 ) -> tuple[int, State, float]:
     """Take one accepted step from `start`, at most to `t_next`, ending on the first switch.
 
@@ -337,15 +264,16 @@ def advance(
         The switch (EDGE at `t_next`, NO_SWITCH, FAILED, or its name), the state there, the next step length
         [s].
     """
+    mode = law.mode
     t, x, v, a = start
     shortest = 1e-14 * control[0] / control[1]
     if abs(v) * h + abs(a) * h * h < 1e-6 * control[0]:
-        h = min(h, longest_still_step(start, mode, memory, hammer, drive, control))
+        h = min(h, longest_still_step(start, law, control))
     while True:
         at_edge = h >= t_next - t
         if at_edge:
             h = t_next - t
-        x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, mode, memory, hammer, drive)
+        x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, law)
         ratio = error_ratio(error_x, error_v, mode, control)
         if not ratio <= 1.0:
             h *= step_factor(ratio)
@@ -353,23 +281,21 @@ def advance(
                 return FAILED, start, h
             continue
         end = (t_next if at_edge else t + h, x1, v1, a1)
-        switch, fraction, upper, level, sign = first_switch(
-            start, end, h, mode, memory, peak, hammer, drive, control
-        )
-        if switch == UNRESOLVED and h > shortest:
+        switch, fraction, upper, level, sign = first_switch(start, end, h, law, peak, control)
+        if switch == M.UNRESOLVED and h > shortest:
             h *= 0.5
             continue
         following = h * step_factor(ratio)
-        if switch in (NO_SWITCH, UNRESOLVED):
-            switch = EDGE if at_edge else NO_SWITCH
-        elif switch == REVERSAL:
-            turn = land_on_reversal(start, h, fraction, sign, mode, memory, hammer, drive, control)
+        if switch in (M.NO_SWITCH, M.UNRESOLVED):
+            switch = M.EDGE if at_edge else M.NO_SWITCH
+        elif switch == M.REVERSAL:
+            turn = land_on_reversal(start, h, fraction, sign, law, control)
             end = (turn[0], turn[1], turn[2], turn[3])
         else:
-            end = land_on_level(start, h, fraction, upper, level, sign, mode, memory, hammer, drive, control)
-        may_let_go = HAS_PACK and not PACK_PULLS and mode in (LOADING, PACK_RELEASED)
-        may_let_go = may_let_go or (not BACKSTOP_PULLS and mode == BACKSTOP_RELEASED)
-        if may_let_go and end[0] > t and lets_go_or_takes_hold(end[1], end[2], mode, hammer):
-            end = land_on_push(start, h, min(1.0, (end[0] - t) / h), mode, memory, hammer, drive, control)
-            switch = PUSH_BEGAN if mode in (PACK_RELEASED, BACKSTOP_RELEASED) else PUSH_ENDED
+            end = land_on_level(start, h, fraction, upper, level, sign, law, control)
+        may_let_go = HAS_PACK and not PACK_PULLS and mode in (M.LOADING, M.PACK_RELEASED)
+        may_let_go = may_let_go or (not BACKSTOP_PULLS and mode == M.BACKSTOP_RELEASED)
+        if may_let_go and end[0] > t and lets_go_or_takes_hold(end[1], end[2], mode, law.hammer):
+            end = land_on_push(start, h, min(1.0, (end[0] - t) / h), law, control)
+            switch = M.PUSH_BEGAN if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else M.PUSH_ENDED
         return switch, end, following

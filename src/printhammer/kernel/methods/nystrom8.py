@@ -8,21 +8,13 @@ from printhammer.kernel.compile.compiling import compiled
 from printhammer.kernel.methods import nystrom8_tableau as T
 
 if TYPE_CHECKING:
-    from printhammer.kernel.model.forces import Hammer, acceleration
-    from printhammer.kernel.model.pulses import Drive
+    from printhammer.kernel.model.forces import acceleration
+    from printhammer.kernel.model.layout import ForceLaw
 
 
 @compiled
 def nystrom_step(
-    t0: float,
-    x0: float,
-    v0: float,
-    a1: float,
-    h: float,
-    mode: int,
-    memory: float,
-    hammer: Hammer,
-    drive: Drive,
+    t0: float, x0: float, v0: float, a1: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
     """Advance position and velocity by `h` [s] from a state whose acceleration is `a1`.
 
@@ -32,6 +24,7 @@ def nystrom_step(
         Position [m], velocity [m/s] and acceleration [m/s^2] at the end, and the differences of position and
         velocity to the embedded method of order 6.
     """
+    mode, memory, hammer, drive = law
     h2 = h * h
     a2 = acceleration(t0 + T.C2 * h, x0 + T.C2 * h * v0 + h2 * (T.A21 * a1), v0, mode, memory, hammer, drive)
     s = T.A31 * a1 + T.A32 * a2

@@ -10,16 +10,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
+from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, POSITION, Train
-from printhammer.kernel.model.modes import (
-    ANY_SCALES,
-    BACKSTOP,
-    BACKSTOP_RELEASED,
-    HELD,
-    HELD_LOADING,
-    HELD_UNLOADING,
-    RESTING,
-)
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate
@@ -58,7 +50,7 @@ def powers(
         coil = (magnet_force(c, x, value) - magnet_force(c, x, 0.0)) * v
     pack = -pack_force(x, v, mode, memory, hammer) * v
     backstop = 0.0
-    if mode == BACKSTOP:
+    if mode == M.BACKSTOP:
         backstop = -backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) * v
     return coil, force, pack, backstop
 
@@ -103,13 +95,13 @@ def quadratures(
         if i + 1 < nodes.shape[0] and nodes[i + 1, 0] == t0 and nodes[i + 1, 1] == x0:
             # An impact on a rigid backstop.
             lost = 0.5 * (v0 * v0 - nodes[i + 1, 2] * nodes[i + 1, 2]) / hammer[INVERSE_MASS]
-            out[row, 3] = lost if mode != BACKSTOP and x0 != hammer[FRONT] else 0.0
+            out[row, 3] = lost if mode != M.BACKSTOP and x0 != hammer[FRONT] else 0.0
             continue
-        if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING) or ends[row] <= starts[row]:
+        if mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING) or ends[row] <= starts[row]:
             continue
         memory = memory_of(mode, kept, hammer)
-        kv0 = contact_rate(kept, v0, t0, hammer, train.live) if mode == BACKSTOP else 0.0
-        regular = mode == BACKSTOP and not (kept == 0.0 and v0 == 0.0)
+        kv0 = contact_rate(kept, v0, t0, hammer, train.live) if mode == M.BACKSTOP else 0.0
+        regular = mode == M.BACKSTOP and not (kept == 0.0 and v0 == 0.0)
         low, high = starts[row], ends[row]
         if regular:
             low = s_at(starts[row], t0, kept, v0, kv0, hammer, train.live)
@@ -120,7 +112,9 @@ def quadratures(
             place = 0.5 * (low + high) + 0.5 * (high - low) * point
             share = 0.5 * (high - low) * weight
             if regular:
-                t, w, v, _kv, _error = contact_step(t0, kept, v0, kv0, place, hammer, train.live, ANY_SCALES)
+                t, w, v, _kv, _error = contact_step(
+                    t0, kept, v0, kv0, place, hammer, train.live, M.ANY_SCALES
+                )
                 x = hammer[POSITION] - w * w
                 share *= 2.0 * w
             else:
@@ -131,7 +125,7 @@ def quadratures(
             out[row, 1] += share * force
             out[row, 2] += share * pack
             out[row, 3] += share * backstop
-        if mode == BACKSTOP_RELEASED:
+        if mode == M.BACKSTOP_RELEASED:
             # The backstop has let go: what it still stores is lost as it creeps back.
             first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, train.live)
             last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, train.live)

@@ -12,10 +12,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy import float64
     from numpy.typing import NDArray
 
     Constants = NDArray[float64]
+    Law1 = Callable[[Constants, float], float]
+    Law2 = Callable[[Constants, float, float], float]
+    Law3 = Callable[[Constants, float, float, float], float]
 
 
 @dataclass(frozen=True)
@@ -65,67 +70,30 @@ EXPONENTIALS: int
 CUBIC: bool
 SINE: bool
 
-
-def magnet_force(c: Constants, x: float, current: float) -> float:
-    """Net force of permanent magnet and coil [N] at displacement `x` [m] and `current` [A]."""
-    raise NotImplementedError
-
-
-def magnet_energy(c: Constants, x: float) -> float:
-    """Energy [J] of which minus the slope is the magnet force at zero current."""
-    raise NotImplementedError
-
-
-def spring_force(c: Constants, x: float) -> float:
-    """Force of the spring [N]."""
-    raise NotImplementedError
-
-
-def spring_energy(c: Constants, x: float) -> float:
-    """Energy [J] of which minus the slope is the spring force."""
-    raise NotImplementedError
-
-
-def pack_loading(c: Constants, x: float, v: float) -> float:
-    """Force of the pack [N] on the loading branch, negative where it pushes back."""
-    raise NotImplementedError
-
-
-def pack_memory(c: Constants, peak: float) -> float:
-    """Return what `pack_unloading` needs of the latest local maximum `peak` [m]."""
-    raise NotImplementedError
-
-
-def pack_unloading(c: Constants, x: float, v: float, memory: float) -> float:
-    """Force of the pack [N] on the unloading branch."""
-    raise NotImplementedError
-
-
-def pack_switch(c: Constants, x: float, v: float) -> float:
-    """Return a number that is positive while the pack pushes and negative where its law would pull."""
-    raise NotImplementedError
-
-
-def backstop_elastic(c: Constants, w: float) -> float:
-    """Elastic force of the backstop [N] at compression ``w**2`` [m]."""
-    raise NotImplementedError
-
-
-def backstop_viscous(c: Constants, w: float, v: float) -> float:
-    """Dissipative force of the backstop [N]."""
-    raise NotImplementedError
-
-
-def backstop_energy(c: Constants, w: float) -> float:
-    """Energy [J] stored elastically in the backstop."""
-    raise NotImplementedError
-
-
-def backstop_switch(c: Constants, w: float, v: float) -> float:
-    """Return a number that is positive while the backstop pushes and negative where its law would pull."""
-    raise NotImplementedError
-
-
-def backstop_rebound(c: Constants, v_in: float) -> float:
-    """Velocity [m/s] after an impact on a rigid backstop with velocity `v_in` < 0."""
-    raise NotImplementedError
+# Each takes the packed constants of its part first.
+magnet_force: Law2
+"""Net force of permanent magnet and coil [N] at a displacement [m] and a current [A]."""
+magnet_energy: Law1
+"""Energy [J] at a displacement [m], of which minus the slope is the magnet force at zero current."""
+spring_force: Law1
+"""Force of the spring [N] at a displacement [m]."""
+spring_energy: Law1
+"""Energy [J] at a displacement [m], of which minus the slope is the spring force."""
+pack_loading: Law2
+"""Force of the pack [N] on the loading branch, negative where it pushes; of displacement and velocity."""
+pack_memory: Law1
+"""What `pack_unloading` needs of the latest local maximum [m]."""
+pack_unloading: Law3
+"""Force of the pack [N] on the unloading branch; of displacement, velocity and memory."""
+pack_switch: Law2
+"""Positive while the pack pushes, negative where its law would pull; of displacement and velocity."""
+backstop_elastic: Law1
+"""Elastic force of the backstop [N] at w, compression ``w**2`` [m]."""
+backstop_viscous: Law2
+"""Dissipative force of the backstop [N]; of w and velocity."""
+backstop_energy: Law1
+"""Energy [J] stored elastically in the backstop at w."""
+backstop_switch: Law2
+"""Positive while the backstop pushes, negative where its law would pull; of w and velocity."""
+backstop_rebound: Law1
+"""Velocity [m/s] after an impact on a rigid backstop with a velocity below zero."""

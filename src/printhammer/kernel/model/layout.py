@@ -48,5 +48,14 @@ class Train(NamedTuple):
     live: Any
 
 
+class ForceLaw(NamedTuple):
+    """What the force off the backstop depends on beside time, displacement and velocity."""
+
+    mode: int
+    memory: float
+    hammer: Any
+    drive: Any
+
+
 Control = tuple[float, float, float, float]
 """Scales of displacement and velocity, allowances of the error estimates of order 6 and 7."""

@@ -6,24 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from printhammer.kernel.model.modes import (
-    BACKSTOP,
-    BACKSTOP_RELEASED,
-    FREE,
-    LEFT_BACKSTOP,
-    LEFT_FRONT,
-    LOADING,
-    MODE_NAMES,
-    PACK_RELEASED,
-    PUSH_BEGAN,
-    PUSH_ENDED,
-    REACHED_BACKSTOP,
-    REACHED_FRONT,
-    REACHED_PEAK,
-    RELOADING,
-    REVERSAL,
-    UNLOADING,
-)
+from printhammer.kernel.model import modes as M
 
 NO_JUMP = 0
 """Where a contact lets go or takes hold its force is zero."""
@@ -35,31 +18,31 @@ TURN = 4
 """The velocity passes zero, where a law with memory changes."""
 
 TRANSITIONS: Final = (
-    (FREE, REACHED_BACKSTOP, BACKSTOP, AT_POSITION),
-    (FREE, REACHED_FRONT, LOADING, AT_FRONT),
-    (LOADING, LEFT_FRONT, FREE, AT_FRONT),
-    (UNLOADING, LEFT_FRONT, FREE, AT_FRONT),
-    (PACK_RELEASED, LEFT_FRONT, FREE, AT_FRONT),
-    (BACKSTOP, LEFT_BACKSTOP, FREE, AT_POSITION),
-    (BACKSTOP_RELEASED, LEFT_BACKSTOP, FREE, AT_POSITION),
-    (RELOADING, REACHED_PEAK, LOADING, AT_PEAK),
-    (LOADING, REVERSAL, UNLOADING, TURN),
-    (RELOADING, REVERSAL, UNLOADING, TURN),
+    (M.FREE, M.REACHED_BACKSTOP, M.BACKSTOP, AT_POSITION),
+    (M.FREE, M.REACHED_FRONT, M.LOADING, AT_FRONT),
+    (M.LOADING, M.LEFT_FRONT, M.FREE, AT_FRONT),
+    (M.UNLOADING, M.LEFT_FRONT, M.FREE, AT_FRONT),
+    (M.PACK_RELEASED, M.LEFT_FRONT, M.FREE, AT_FRONT),
+    (M.BACKSTOP, M.LEFT_BACKSTOP, M.FREE, AT_POSITION),
+    (M.BACKSTOP_RELEASED, M.LEFT_BACKSTOP, M.FREE, AT_POSITION),
+    (M.RELOADING, M.REACHED_PEAK, M.LOADING, AT_PEAK),
+    (M.LOADING, M.REVERSAL, M.UNLOADING, TURN),
+    (M.RELOADING, M.REVERSAL, M.UNLOADING, TURN),
     # A reversal on the front itself ends the contact; of the others, the forces tell which it is.
-    (RELOADING, REVERSAL, FREE, AT_FRONT),
-    (UNLOADING, REVERSAL, UNLOADING, TURN),
-    (UNLOADING, REVERSAL, RELOADING, TURN),
-    (UNLOADING, REVERSAL, LOADING, TURN),
-    (LOADING, PUSH_ENDED, PACK_RELEASED, NO_JUMP),
-    (PACK_RELEASED, PUSH_BEGAN, LOADING, NO_JUMP),
-    (BACKSTOP, PUSH_ENDED, BACKSTOP_RELEASED, NO_JUMP),
-    (BACKSTOP_RELEASED, PUSH_BEGAN, BACKSTOP, NO_JUMP),
+    (M.RELOADING, M.REVERSAL, M.FREE, AT_FRONT),
+    (M.UNLOADING, M.REVERSAL, M.UNLOADING, TURN),
+    (M.UNLOADING, M.REVERSAL, M.RELOADING, TURN),
+    (M.UNLOADING, M.REVERSAL, M.LOADING, TURN),
+    (M.LOADING, M.PUSH_ENDED, M.PACK_RELEASED, NO_JUMP),
+    (M.PACK_RELEASED, M.PUSH_BEGAN, M.LOADING, NO_JUMP),
+    (M.BACKSTOP, M.PUSH_ENDED, M.BACKSTOP_RELEASED, NO_JUMP),
+    (M.BACKSTOP_RELEASED, M.PUSH_BEGAN, M.BACKSTOP, NO_JUMP),
 )
 """Mode, the switch that ends it, the mode that follows, and how a variation jumps there."""
 
-FOLLOWING = np.full((len(MODE_NAMES), PUSH_BEGAN + 1), -1)
+FOLLOWING = np.full((len(M.MODE_NAMES), M.PUSH_BEGAN + 1), -1)
 """The mode after a switch, by mode and switch; after a reversal where the wire goes out again."""
-JUMPS = np.full((len(MODE_NAMES), len(MODE_NAMES)), NO_JUMP)
+JUMPS = np.full((len(M.MODE_NAMES), len(M.MODE_NAMES)), NO_JUMP)
 """The jump between two modes; of unloading to unloading, only where the local maximum is a new one."""
 
 for _mode, _switch, _following, _jump in reversed(TRANSITIONS):

@@ -10,19 +10,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
-from printhammer.kernel.model.layout import BACKSTOP_PART, MAGNET, PACK, POSITION, SPRING, Train
-from printhammer.kernel.model.modes import (
-    ANY_SCALES,
-    BACKSTOP,
-    BACKSTOP_SURFACE,
-    HELD,
-    HELD_LOADING,
-    HELD_UNLOADING,
-    LOADING,
-    RELOADING,
-    RESTING,
-    UNLOADING,
-)
+from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.layout import BACKSTOP_PART, MAGNET, PACK, POSITION, SPRING, ForceLaw, Train
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate
@@ -49,7 +38,7 @@ SAMPLES = 4
 @compiled
 def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
     """Return what the unloading branch needs of the local maximum `kept` at a node."""
-    if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING, HELD_UNLOADING):
+    if HAS_PACK and MEMORY and mode in (M.UNLOADING, M.RELOADING, M.HELD_UNLOADING):
         return pack_memory(hammer[PACK:BACKSTOP_PART], kept)
     return 0.0
 
@@ -57,11 +46,11 @@ def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
 @compiled
 def branch_of(mode: int) -> int:
     """Return the mode whose force acts in `mode`, which may be one of rest."""
-    if mode == HELD:
-        return BACKSTOP
-    if mode == HELD_LOADING:
-        return LOADING
-    return UNLOADING if mode == HELD_UNLOADING else mode
+    if mode == M.HELD:
+        return M.BACKSTOP
+    if mode == M.HELD_LOADING:
+        return M.LOADING
+    return M.UNLOADING if mode == M.HELD_UNLOADING else mode
 
 
 @compiled
@@ -114,7 +103,7 @@ def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, 
         s += change
         if abs(change) <= 1e-15 * s:
             break
-        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
+        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, M.ANY_SCALES)
     return s
 
 
@@ -123,19 +112,19 @@ def state_in_step(
     t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float]:
     """Return displacement, velocity and w at time `t` [s] in the step that begins at a node."""
-    if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING) or t <= t0:
-        return x0, v0, kept if mode in (BACKSTOP, HELD) else 0.0
-    if mode == BACKSTOP:
+    if mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING) or t <= t0:
+        return x0, v0, kept if mode in (M.BACKSTOP, M.HELD) else 0.0
+    if mode == M.BACKSTOP:
         kv0 = contact_rate(kept, v0, t0, hammer, drive)
         if kept == 0.0 and v0 == 0.0:
             a0 = acceleration(t0, x0, v0, mode, 0.0, hammer, drive)
             return x0 + 0.5 * a0 * (t - t0) ** 2, a0 * (t - t0), math.sqrt(max(-0.5 * a0, 0.0)) * (t - t0)
         s = s_at(t, t0, kept, v0, kv0, hammer, drive)
-        _t1, w1, v1, _kv1, _error = contact_step(t0, kept, v0, kv0, s, hammer, drive, ANY_SCALES)
+        _t1, w1, v1, _kv1, _error = contact_step(t0, kept, v0, kv0, s, hammer, drive, M.ANY_SCALES)
         return hammer[POSITION] - w1 * w1, v1, w1
     memory = memory_of(mode, kept, hammer)
     a0 = acceleration(t0, x0, v0, mode, memory, hammer, drive)
-    x1, v1, _a1, _ex, _ev = plain_step(t0, x0, v0, a0, t - t0, mode, memory, hammer, drive)
+    x1, v1, _a1, _ex, _ev = plain_step(t0, x0, v0, a0, t - t0, ForceLaw(mode, memory, hammer, drive))
     return x1, v1, 0.0
 
 
@@ -180,10 +169,9 @@ def resample(
         out[row, 3] = magnet_force(hammer[MAGNET:], x, 0.0 if FORCE_DRIVE else value)
         out[row, 4] = spring_force(hammer[SPRING:PACK], x)
         out[row, 5] = pack_force(x, v, branch_of(mode), memory_of(mode, kept, hammer), hammer)
-        out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if mode in (BACKSTOP, HELD) else 0.0
-        out[row, 7] = (
-            backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if mode in (BACKSTOP, HELD) else 0.0
-        )
+        compressed = mode in (M.BACKSTOP, M.HELD)
+        out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if compressed else 0.0
+        out[row, 7] = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if compressed else 0.0
         out[row, 8] = mode
 
 
@@ -192,9 +180,9 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, drive: Dr
     """Return depth [m] and contact force [N] at time `t` in the step that begins at `node`."""
     mode = int(node[3])
     x, v, w = state_in_step(t, node[0], node[1], node[2], mode, node[4], hammer, drive)
-    if surface == BACKSTOP_SURFACE:
+    if surface == M.BACKSTOP_SURFACE:
         force = 0.0
-        if mode in (BACKSTOP, HELD):
+        if mode in (M.BACKSTOP, M.HELD):
             c = hammer[BACKSTOP_PART:MAGNET]
             force = backstop_elastic(c, w) + backstop_viscous(c, w, v)
         return hammer[POSITION] - x, force

@@ -8,21 +8,13 @@ from printhammer.kernel.compile.compiling import compiled
 from printhammer.kernel.model.modes import RELOADING, UNLOADING
 
 if TYPE_CHECKING:
-    from printhammer.kernel.model.forces import Hammer, acceleration
-    from printhammer.kernel.model.pulses import Drive
+    from printhammer.kernel.model.forces import acceleration
+    from printhammer.kernel.model.layout import ForceLaw
 
 
 @compiled
 def rest_ends(
-    t: float,
-    x: float,
-    pause: float,
-    mode: int,
-    memory: float,
-    lowest: float,
-    highest: float,
-    hammer: Hammer,
-    drive: Drive,
+    t: float, x: float, pause: float, lowest: float, highest: float, law: ForceLaw
 ) -> tuple[bool, float]:
     """Tell whether the acceleration at rest leaves the range from `lowest` to `highest` within `pause` [s].
 
@@ -31,6 +23,7 @@ def rest_ends(
     tuple
         Whether it does, and the time [s] from `t` to then, or `pause`.
     """
+    mode, memory, hammer, drive = law
     low = 0.0
     high = 0.5 * pause
     a = acceleration(t + high, x, 0.0, mode, memory, hammer, drive)

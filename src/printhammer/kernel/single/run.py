@@ -5,35 +5,18 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled, entry
+from printhammer.kernel.compile.compiling import compiled, entry, inlined
 from printhammer.kernel.methods.landing import FAILED
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control, Train
-from printhammer.kernel.model.modes import (
-    BACKSTOP,
-    BACKSTOP_RELEASED,
-    BACKSTOP_SURFACE,
-    EDGE,
-    FREE,
-    HELD,
-    HELD_LOADING,
-    HELD_UNLOADING,
-    LEFT_BACKSTOP,
-    LEFT_FRONT,
-    LOADING,
-    NO_SWITCH,
-    OK,
-    PACK_SURFACE,
-    PAUSED,
-    RANGE_LEFT,
-    REACHED_BACKSTOP,
-    REACHED_FRONT,
-    RELOADING,
-    RESTING,
-    REVERSAL,
-    RUNAWAY,
-    STEP_LIMIT,
-    STEP_UNDERFLOW,
-    UNLOADING,
+from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    FRONT,
+    MAGNET,
+    PACK,
+    POSITION,
+    Control,
+    ForceLaw,
+    Train,
 )
 from printhammer.kernel.model.transitions import FOLLOWING
 from printhammer.kernel.single import carry as C
@@ -84,18 +67,18 @@ def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
                 not BACKSTOP_PULLS
                 and backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(b - x), v) <= 0.0
             ):
-                return BACKSTOP_RELEASED
-            return BACKSTOP
+                return M.BACKSTOP_RELEASED
+            return M.BACKSTOP
         if x <= b and RIGID and v <= 0.0:
-            return RESTING if v == 0.0 and a < 0.0 else FREE
+            return M.RESTING if v == 0.0 and a < 0.0 else M.FREE
         if x == b and (v < 0.0 or (v == 0.0 and a < 0.0)):
-            return BACKSTOP
+            return M.BACKSTOP
     if HAS_PACK and x >= hammer[FRONT]:
         if x > hammer[FRONT] and v < 0.0 and MEMORY:
-            return UNLOADING
+            return M.UNLOADING
         if x > hammer[FRONT] or v > 0.0:
-            return LOADING
-    return FREE
+            return M.LOADING
+    return M.FREE
 
 
 @compiled
@@ -115,13 +98,13 @@ def time_to_level(distance: float, v: float, a: float) -> float:
 @compiled
 def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Hammer) -> float:
     """Shorten a step that would overshoot the backstop or the pack front by far."""
-    if HAS_BACKSTOP and mode == FREE:
+    if HAS_BACKSTOP and mode == M.FREE:
         height = x - hammer[POSITION]
         if height > 0.0:
             h = min(h, 1.02 * time_to_level(height, -v, -a))
         elif height == 0.0 and v > 0.0 and a < 0.0:
             h = min(h, -2.04 * v / a)
-    if HAS_PACK and mode == FREE and x < hammer[FRONT]:
+    if HAS_PACK and mode == M.FREE and x < hammer[FRONT]:
         h = min(h, 1.02 * time_to_level(hammer[FRONT] - x, v, a))
     return h
 
@@ -130,39 +113,28 @@ def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Ham
 def out_of_bounds(x: float, bounds: Any) -> int:
     """Return the status of a displacement: `bounds` is (lowest, highest, origin, far)."""
     if not (bounds[0] <= x <= bounds[1]):
-        return RANGE_LEFT
+        return M.RANGE_LEFT
     if abs(x - bounds[2]) > bounds[3]:
-        return RUNAWAY
-    return OK
+        return M.RUNAWAY
+    return M.OK
 
 
 @compiled
-def left_range(
-    start: State,
-    end: State,
-    mode: int,
-    memory: float,
-    hammer: Hammer,
-    drive: Drive,
-    control: Control,
-    bounds: Any,
-) -> tuple[bool, State]:
+def left_range(start: State, end: State, law: ForceLaw, control: Control, bounds: Any) -> tuple[bool, State]:
     """Tell whether a step from `start` to `end` leaves the range, even briefly, and the state there."""
     h = end[0] - start[0]
     for side in range(2):
         bound = bounds[side]
         sign = 1.0 if side == 1 else -1.0
         # A backstop that does not lie outside the range keeps the armature off its lower end.
-        if math.isinf(bound) or h <= 0.0 or (HAS_BACKSTOP and side == 0 and mode == FREE):
+        if math.isinf(bound) or h <= 0.0 or (HAS_BACKSTOP and side == 0 and law.mode == M.FREE):
             continue
         if start[1] == bound and sign * end[1] > sign * bound:
             return True, start
-        code, fraction, upper = level_switch(start, end, h, bound, sign, mode, memory, hammer, drive, control)
-        if code == REACHED_FRONT:
-            return True, land_on_level(
-                start, h, fraction, upper, bound, sign, mode, memory, hammer, drive, control
-            )
-    return out_of_bounds(end[1], bounds) == RANGE_LEFT, end
+        code, fraction, upper = level_switch(start, end, h, bound, sign, law, control)
+        if code == M.REACHED_FRONT:
+            return True, land_on_level(start, h, fraction, upper, bound, sign, law, control)
+    return out_of_bounds(end[1], bounds) == M.RANGE_LEFT, end
 
 
 @compiled
@@ -170,8 +142,8 @@ def failure(x: float, v: float, bounds: Any, control: Control) -> int:
     """Return the status of a run whose step became too short."""
     near = 0.05 * control[0]
     if (x - bounds[0] < near and v <= 0.0) or (bounds[1] - x < near and v >= 0.0):
-        return RANGE_LEFT
-    return STEP_UNDERFLOW
+        return M.RANGE_LEFT
+    return M.STEP_UNDERFLOW
 
 
 @compiled
@@ -179,20 +151,20 @@ def reversed_mode(
     t: float, x: float, mode: int, peak: float, memory: float, hammer: Hammer, drive: Drive
 ) -> tuple[int, float, float]:
     """Return mode, peak and memory after the velocity became zero inside the pack."""
-    if mode == LOADING:
-        if acceleration(t, x, 0.0, LOADING, memory, hammer, drive) > 0.0:
-            return LOADING, peak, memory
-        return UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
-    if mode == RELOADING:
-        return UNLOADING, peak, memory
+    if mode == M.LOADING:
+        if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
+            return M.LOADING, peak, memory
+        return M.UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
+    if mode == M.RELOADING:
+        return M.UNLOADING, peak, memory
     if RELOAD_ALONG_UNLOADING:
-        again = acceleration(t, x, 0.0, UNLOADING, memory, hammer, drive) > 0.0
-        return (RELOADING if again else UNLOADING), peak, memory
+        again = acceleration(t, x, 0.0, M.UNLOADING, memory, hammer, drive) > 0.0
+        return (M.RELOADING if again else M.UNLOADING), peak, memory
     # As printed, the loading branch is the stronger one below the peak: the wire goes in again only if the
     # other forces overcome it, else this point is at once a new local maximum.
-    if acceleration(t, x, 0.0, LOADING, memory, hammer, drive) > 0.0:
-        return LOADING, peak, memory
-    return UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
+    if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
+        return M.LOADING, peak, memory
+    return M.UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
 
 
 @compiled
@@ -211,6 +183,12 @@ def contact_unit(v: float, control: Control) -> float:
     """Return the scale of s for a touch with velocity `v`; a Hertz contact lasts |v|^-0.6 in s."""
     speed = max(abs(v), 1e-6 * control[1])
     return float(math.sqrt(control[0]) / (control[1] ** 0.4 * speed**0.6))
+
+
+@inlined
+def kept_in(mode: int, w: float, peak: float) -> float:
+    """Return what a node keeps of the state beside displacement and velocity."""
+    return w if mode == M.BACKSTOP else (peak if mode in (M.UNLOADING, M.RELOADING) else 0.0)
 
 
 @entry
@@ -262,7 +240,7 @@ def run(
     used = 0
     touched = 0
     steps = 0
-    status = OK
+    status = M.OK
     time_scale = control[0] / control[1]
     still = STILL * control[1] / time_scale
     memory = 0.0
@@ -283,21 +261,21 @@ def run(
         touched = carry_contact(contacts, mode)
     else:
         first, last, edge = pass_edges(t, train, 0, 0)
-        a = acceleration(t, x, v, FREE, memory, hammer, drive)
+        a = acceleration(t, x, v, M.FREE, memory, hammer, drive)
         mode = first_mode(x, v, a, hammer)
         if carry[C.STATE] == C.ON_BRANCH:
             mode, peak = int(carry[C.MODE]), carry[C.PEAK]
-        if mode in (UNLOADING, RELOADING):
+        if mode in (M.UNLOADING, M.RELOADING):
             memory = pack_memory(hammer[PACK:BACKSTOP_PART], peak)
         h_free = 0.02 * time_scale
         h_pack = 0.005 * time_scale
         h_contact = 0.05
-        h = h_pack if mode in (LOADING, UNLOADING) else h_free
-        if mode in (LOADING, UNLOADING, RELOADING):
-            touched = open_contact(contacts, touched, PACK_SURFACE, t, v, 0, True)
-        elif mode in (BACKSTOP, BACKSTOP_RELEASED, RESTING):
-            touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, 0, True)
-        if mode in (BACKSTOP, BACKSTOP_RELEASED):
+        h = h_pack if mode in (M.LOADING, M.UNLOADING) else h_free
+        if mode in (M.LOADING, M.UNLOADING, M.RELOADING):
+            touched = open_contact(contacts, touched, M.PACK_SURFACE, t, v, 0, True)
+        elif mode in (M.BACKSTOP, M.BACKSTOP_RELEASED, M.RESTING):
+            touched = open_contact(contacts, touched, M.BACKSTOP_SURFACE, t, v, 0, True)
+        if mode in (M.BACKSTOP, M.BACKSTOP_RELEASED):
             w = math.sqrt(hammer[POSITION] - x)
         a = acceleration(t, x, v, mode, memory, hammer, drive)
         started = mode
@@ -305,18 +283,10 @@ def run(
         wait = WAIT * time_scale
         stuck = 0
         t_before = t - time_scale
-    used = add_node(
-        nodes,
-        used,
-        t,
-        x,
-        v,
-        mode,
-        w if mode == BACKSTOP else (peak if mode in (UNLOADING, RELOADING) else 0.0),
-    )
-    while t < t_end and status == OK:
-        if used >= pause_after and mode in (FREE, BACKSTOP):
-            status = PAUSED
+    used = add_node(nodes, used, t, x, v, mode, kept_in(mode, w, peak))
+    while t < t_end and status == M.OK:
+        if used >= pause_after and mode in (M.FREE, M.BACKSTOP):
+            status = M.PAUSED
             break
         t_next = min(edge, t_end)
         if t_next <= t:
@@ -324,38 +294,38 @@ def run(
             a = acceleration(t, x, v, mode, memory, hammer, drive)
             entered = True
             continue
-        if mode == RESTING and a > 0.0:
+        if mode == M.RESTING and a > 0.0:
             close_contact(contacts, touched, t, 0.0)
-            mode = FREE
-            relabel_node(nodes, used, FREE)
+            mode = M.FREE
+            relabel_node(nodes, used, M.FREE)
         steps += 1
         if steps > max_steps:
-            status = STEP_LIMIT
+            status = M.STEP_LIMIT
             break
         stuck = stuck + 1 if t == t_before else 0
         t_before = t
         if stuck > STUCK:
-            status = STEP_UNDERFLOW
+            status = M.STEP_UNDERFLOW
             break
-        switch, left = NO_SWITCH, OK
-        if mode == BACKSTOP:
+        switch, left = M.NO_SWITCH, M.OK
+        if mode == M.BACKSTOP:
             if entered:
                 kv = contact_rate(w, v, t, hammer, drive)
                 entered = False
             idle = first == last
             if w > 0.0 and idle and abs(v) <= 1e-14 * control[1] and abs(kv) <= 0.1 * still * 2.0 * w:
-                relabel_node(nodes, used, HELD)
+                relabel_node(nodes, used, M.HELD)
                 t = t_next
-                switch = EDGE
+                switch = M.EDGE
             elif w == 0.0 and v == 0.0:
                 t, w, v = kick_into_backstop(t, a, t_next, control)
                 kv = contact_rate(w, v, t, hammer, drive)
-                switch = EDGE if t == t_next else NO_SWITCH
+                switch = M.EDGE if t == t_next else M.NO_SWITCH
             else:
-                touching = w == 0.0 and started != BACKSTOP
+                touching = w == 0.0 and started != M.BACKSTOP
                 unit = 1.0
-                if started != BACKSTOP:
-                    started = BACKSTOP
+                if started != M.BACKSTOP:
+                    started = M.BACKSTOP
                     unit = contact_unit(v, control)
                     h = h_contact * unit
                 switch, end, h = advance_contact((t, w, v, kv), h, t_next, hammer, drive, control)
@@ -363,94 +333,97 @@ def run(
                     h_contact = h / unit
                 t, w, v, kv = end
             x = hammer[POSITION] - w * w
-        elif mode == RESTING or (v == 0.0 and abs(a) <= still and mode in (UNLOADING, LOADING, RELOADING)):
+        elif mode == M.RESTING or (
+            v == 0.0 and abs(a) <= still and mode in (M.UNLOADING, M.LOADING, M.RELOADING)
+        ):
             pause = t_next - t
             if first < last:
                 pause = min(pause, wait)
-            least, most = (-math.inf, 0.0) if mode == RESTING else (-still, still)
-            if mode != RESTING:
-                relabel_node(nodes, used, HELD_LOADING if mode == LOADING else HELD_UNLOADING)
-            ended, pause = rest_ends(t, x, pause, mode, memory, least, most, hammer, drive)
-            wait = WAIT * time_scale if ended or mode == RESTING else min(2.0 * wait, time_scale)
-            switch = EDGE if pause == t_next - t else NO_SWITCH
-            t = t_next if switch == EDGE else t + pause
+            least, most = (-math.inf, 0.0) if mode == M.RESTING else (-still, still)
+            if mode != M.RESTING:
+                relabel_node(nodes, used, M.HELD_LOADING if mode == M.LOADING else M.HELD_UNLOADING)
+            law = ForceLaw(mode, memory, hammer, drive)
+            ended, pause = rest_ends(t, x, pause, least, most, law)
+            wait = WAIT * time_scale if ended or mode == M.RESTING else min(2.0 * wait, time_scale)
+            switch = M.EDGE if pause == t_next - t else M.NO_SWITCH
+            t = t_next if switch == M.EDGE else t + pause
             a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
-            if not ended and switch == NO_SWITCH:
+            if not ended and switch == M.NO_SWITCH:
                 # The node at which the rest began holds on.
                 continue
-            if ended and mode != RESTING and not goes_on_in(a, mode):
+            if ended and mode != M.RESTING and not goes_on_in(a, mode):
                 mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
                 a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
         else:
             if started != mode:
-                h = h_pack if mode in (LOADING, UNLOADING) else h_free
+                h = h_pack if mode in (M.LOADING, M.UNLOADING) else h_free
             fresh = started != mode
             started = mode
             h = sensible_step(h, x, v, a, mode, hammer)
             start = (t, x, v, a)
-            switch, end, h = advance(start, h, t_next, mode, memory, peak, hammer, drive, control)
-            outside, bound_state = left_range(start, end, mode, memory, hammer, drive, control, bounds)
+            law = ForceLaw(mode, memory, hammer, drive)
+            switch, end, h = advance(start, h, t_next, law, peak, control)
+            outside, bound_state = left_range(start, end, law, control, bounds)
             if switch != FAILED and outside:
-                end, switch, left = bound_state, NO_SWITCH, RANGE_LEFT
+                end, switch, left = bound_state, M.NO_SWITCH, M.RANGE_LEFT
             t, x, v, a = end
-            if fresh and mode == FREE:
+            if fresh and mode == M.FREE:
                 h_free = h
-            elif fresh and mode == LOADING:
+            elif fresh and mode == M.LOADING:
                 h_pack = h
         if switch == FAILED:
             status = failure(x, v, bounds, control)
             break
-        status = left if left != OK else out_of_bounds(x, bounds)
-        entered = entered or switch != NO_SWITCH
-        if switch == EDGE:
+        status = left if left != M.OK else out_of_bounds(x, bounds)
+        entered = entered or switch != M.NO_SWITCH
+        if switch == M.EDGE:
             first, last, edge = pass_edges(t, train, first, last)
             a = acceleration(t, x, v, mode, memory, hammer, drive)
-            if mode == BACKSTOP:
+            if mode == M.BACKSTOP:
                 kv = contact_rate(w, v, t, hammer, drive)
-        elif switch != NO_SWITCH:
-            if switch == REACHED_BACKSTOP:
-                touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, used, False)
+        elif switch != M.NO_SWITCH:
+            if switch == M.REACHED_BACKSTOP:
+                touched = open_contact(contacts, touched, M.BACKSTOP_SURFACE, t, v, used, False)
                 if RIGID:
-                    used = add_node(nodes, used, t, x, v, FREE, 0.0)
+                    used = add_node(nodes, used, t, x, v, M.FREE, 0.0)
                     v = backstop_rebound(hammer[BACKSTOP_PART:MAGNET], v)
-                    a = acceleration(t, x, v, FREE, memory, hammer, drive)
+                    a = acceleration(t, x, v, M.FREE, memory, hammer, drive)
                     if a < 0.0 and v * v <= -2.0 * a * 1e-12 * control[0]:
                         v = 0.0
-                        mode = RESTING
+                        mode = M.RESTING
                     else:
                         close_contact(contacts, touched, t, v)
                 else:
                     mode = FOLLOWING[mode, switch]
                     w = 0.0
-            elif switch == REACHED_FRONT:
+            elif switch == M.REACHED_FRONT:
                 v = max(v, 0.0)
                 # A touch without velocity opens a contact only if the armature is pushed on.
-                if v > 0.0 or acceleration(t, x, v, FREE, memory, hammer, drive) > 0.0:
-                    touched = open_contact(contacts, touched, PACK_SURFACE, t, v, used, False)
+                if v > 0.0 or acceleration(t, x, v, M.FREE, memory, hammer, drive) > 0.0:
+                    touched = open_contact(contacts, touched, M.PACK_SURFACE, t, v, used, False)
                     mode = FOLLOWING[mode, switch]
-            elif switch == REVERSAL:
+            elif switch == M.REVERSAL:
                 if x <= hammer[FRONT]:
                     close_contact(contacts, touched, t, v)
-                    mode = FREE
+                    mode = M.FREE
                 else:
                     mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
-            elif switch in (LEFT_FRONT, LEFT_BACKSTOP):
+            elif switch in (M.LEFT_FRONT, M.LEFT_BACKSTOP):
                 close_contact(contacts, touched, t, v)
-                x = hammer[POSITION] if switch == LEFT_BACKSTOP else hammer[FRONT]
+                x = hammer[POSITION] if switch == M.LEFT_BACKSTOP else hammer[FRONT]
                 mode = FOLLOWING[mode, switch]
-                if switch == LEFT_BACKSTOP and v <= 0.0:
+                if switch == M.LEFT_BACKSTOP and v <= 0.0:
                     v = 0.0
-                    if acceleration(t, x, v, FREE, memory, hammer, drive) < 0.0:
-                        touched = open_contact(contacts, touched, BACKSTOP_SURFACE, t, v, used, False)
-                        mode = BACKSTOP
+                    if acceleration(t, x, v, M.FREE, memory, hammer, drive) < 0.0:
+                        touched = open_contact(contacts, touched, M.BACKSTOP_SURFACE, t, v, used, False)
+                        mode = M.BACKSTOP
                         w = 0.0
             else:
                 mode = FOLLOWING[mode, switch]
-                if mode == BACKSTOP:
+                if mode == M.BACKSTOP:
                     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
             a = acceleration(t, x, v, mode, memory, hammer, drive)
-        kept = w if mode == BACKSTOP else (peak if mode in (UNLOADING, RELOADING) else 0.0)
-        used = add_node(nodes, used, t, x, v, mode, kept)
+        used = add_node(nodes, used, t, x, v, mode, kept_in(mode, w, peak))
     carry[C.STATE] = C.GOES_ON
     carry[C.MODE], carry[C.PEAK], carry[C.MEMORY_NOW] = mode, peak, memory
     carry[C.TIME], carry[C.POSITION_NOW], carry[C.VELOCITY], carry[C.ACCELERATION] = t, x, v, a

@@ -25,16 +25,7 @@ from printhammer.kernel.methods.dop853_tableau import FULL_B as B
 from printhammer.kernel.methods.dop853_tableau import STAGES
 from printhammer.kernel.model.layout import INVERSE_MASS, POSITION
 from printhammer.kernel.model.modes import BACKSTOP, LOADING, RELOADING, UNLOADING
-from printhammer.kernel.variational.layout import (
-    ENERGY,
-    FIRST_COLUMN,
-    MEMORIES,
-    PEAK,
-    STAGE,
-    START,
-    STATE,
-    TIME,
-)
+from printhammer.kernel.variational import layout as V
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.forces import acceleration, backstop_acceleration
@@ -64,7 +55,7 @@ def force_slopes(
         velocity. In the backstop those with displacement are times 2 w, but for the first.
     """
     scales, bounds, hammer, drive, _forcing = setting
-    value = drive_value(y[TIME], drive)
+    value = drive_value(y[V.TIME], drive)
     if HAS_BACKSTOP and mode == BACKSTOP:
         w = y[0]
         with_w, with_v, lost_w, lost_v = contact_slopes(w, y[1], scales, hammer)
@@ -89,20 +80,20 @@ def column_rates(
     if HAS_BACKSTOP and mode == BACKSTOP:
         pace = 2.0 * y[0]
         rates[0] = -v
-        rates[1] = pace * backstop_acceleration(y[TIME], y[0], v, hammer, drive)
+        rates[1] = pace * backstop_acceleration(y[V.TIME], y[0], v, hammer, drive)
     else:
         pace = 1.0
         rates[0] = v
-        rates[1] = acceleration(y[TIME], y[0], v, mode, memory, hammer, drive)
-    rates[TIME] = pace
+        rates[1] = acceleration(y[V.TIME], y[0], v, mode, memory, hammer, drive)
+    rates[V.TIME] = pace
     slopes = force_slopes(y, mode, memory, peak, peaks, setting)
     by_x = (pace * slopes[0] + slopes[1]) * hammer[INVERSE_MASS]
     by_v = pace * slopes[2] * hammer[INVERSE_MASS]
     by_peak = slopes[3] * hammer[INVERSE_MASS]
     for k in range(columns.shape[1]):
-        j = FIRST_COLUMN + CHANGING * k
+        j = V.FIRST_COLUMN + CHANGING * k
         rates[j] = pace * y[j + 1]
-        rates[j + 1] = by_x * y[j] + by_v * y[j + 1] + by_peak * columns[PEAK, k]
+        rates[j + 1] = by_x * y[j] + by_v * y[j + 1] + by_peak * columns[V.PEAK, k]
     if FORCED:
         add_forcing(rates, y, columns, mode, memory, slopes, setting)
 
@@ -113,8 +104,8 @@ def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Sett
 
     The run's own steps follow the state: near rest, where that hardly moves, they are longer.
     """
-    slopes = force_slopes(work[START], mode, memory, peak, work[MEMORIES], setting)
-    pace = 2.0 * work[START, 0] if mode == BACKSTOP else 1.0
+    slopes = force_slopes(work[V.START], mode, memory, peak, work[V.MEMORIES], setting)
+    pace = 2.0 * work[V.START, 0] if mode == BACKSTOP else 1.0
     by_x = (pace * slopes[0] + slopes[1]) * setting.hammer[INVERSE_MASS]
     by_v = pace * slopes[2] * setting.hammer[INVERSE_MASS]
     rate = max(math.sqrt(abs(pace * by_x)), abs(by_v))
@@ -126,8 +117,8 @@ def column_step(
     length: float, columns: Any, work: Any, mode: int, memory: float, peak: float, setting: Setting
 ) -> None:
     """Take one step of `length` (s, or of the variable s in the backstop) from row START of `work`."""
-    count = FIRST_COLUMN + CHANGING * columns.shape[1]
-    start, y, peaks = work[START], work[STAGE], work[MEMORIES]
+    count = V.FIRST_COLUMN + CHANGING * columns.shape[1]
+    start, y, peaks = work[V.START], work[V.STAGE], work[V.MEMORIES]
     for stage in range(STAGES):
         for i in range(count):
             y[i] = start[i]
@@ -146,19 +137,19 @@ def column_step(
 def take_in(work: Any, columns: Any) -> None:
     """Put what of the columns changes between switches in row START of `work`."""
     for k in range(columns.shape[1]):
-        j = FIRST_COLUMN + CHANGING * k
-        for i in range(STATE):
-            work[START, j + i] = columns[i, k]
-        for i in range(CHANGING - STATE):
-            work[START, j + STATE + i] = columns[ENERGY + i, k]
+        j = V.FIRST_COLUMN + CHANGING * k
+        for i in range(V.STATE):
+            work[V.START, j + i] = columns[i, k]
+        for i in range(CHANGING - V.STATE):
+            work[V.START, j + V.STATE + i] = columns[V.ENERGY + i, k]
 
 
 @compiled
 def bring_back(work: Any, columns: Any) -> None:
     """Take it out of there."""
     for k in range(columns.shape[1]):
-        j = FIRST_COLUMN + CHANGING * k
-        for i in range(STATE):
-            columns[i, k] = work[START, j + i]
-        for i in range(CHANGING - STATE):
-            columns[ENERGY + i, k] = work[START, j + STATE + i]
+        j = V.FIRST_COLUMN + CHANGING * k
+        for i in range(V.STATE):
+            columns[i, k] = work[V.START, j + i]
+        for i in range(CHANGING - V.STATE):
+            columns[V.ENERGY + i, k] = work[V.START, j + V.STATE + i]

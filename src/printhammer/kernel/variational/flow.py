@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import edges_at, pass_edges
     from printhammer.kernel.single.resample import branch_of
     from printhammer.kernel.variational.forcing import set_live_moves
+    from printhammer.kernel.variational.layout import Carried
     from printhammer.kernel.variational.steps import begin_step, carry
     from printhammer.kernel.variational.switches import pass_moving_edges, pass_node
 
@@ -65,18 +66,9 @@ def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
 
 
 @compiled
-def note_mark(
-    states: Any,
-    seen: Any,
-    growth: Any,
-    track: Any,
-    node: Any,
-    initial: Any,
-    columns: Any,
-    work: Any,
-    hammer: Hammer,
-) -> None:
+def note_mark(node: Any, initial: Any, hammer: Hammer, carried: Carried) -> None:
     """Enter state, columns and their growth at a mark; at the first mark the columns begin."""
+    columns, work, track, states, changes, growth, _passed = carried
     mode = int(node[3])
     row = int(track[DUE])
     remembers = HAS_PACK and MEMORY and branch_of(mode) in (UNLOADING, RELOADING)
@@ -91,7 +83,7 @@ def note_mark(
             track[GROWN + k] = 0.0
         growth[row, k] = track[GROWN + k]
         track[GROWN + k] = 0.0
-    copy_columns(columns, seen[row])
+    copy_columns(columns, changes[row])
     track[DUE] += 1.0
 
 
@@ -121,17 +113,9 @@ def flow(
     renormalise: bool,
     ended: bool,
     initial: Any,
-    columns: Any,
-    work: Any,
-    track: Any,
-    states: Any,
-    seen: Any,
-    growth: Any,
-    passed: Any,
+    carried: Carried,
 ) -> None:
     """Carry columns along a stretch of a run, from the first mark to the last.
-
-    Without forcing a column has r = 3 rows, with it 7; see :mod:`printhammer.kernel.variational.layout`.
 
     Parameters
     ----------
@@ -153,19 +137,8 @@ def flow(
         Whether the run ends with the stretch; otherwise a mark at its end belongs to the next one.
     initial : float64 array, shape (3, n)
         Changes of displacement, velocity and latest local maximum at the first mark.
-    columns : float64 array, shape (r, n)
-        Those at the end of the stretch or at the last mark.
-    work : float64 array, shape (15, `work_width`)
-        Working space.
-    track : float64 array, shape (2 + n,)
-        Zeros, but one at place 1, before the first stretch; what is needed to go on afterwards, at place 1
-        whether the motion is differentiable so far.
-    states : float64 array, shape (m, 4)
-        Displacement, velocity, mode and latest local maximum at the marks.
-    seen, growth : float64 array, shapes (m, r, n) and (m, n)
-        The columns at the marks, and the logarithms of their growth since the mark before.
-    passed : float64 array, shape (q, 2, r, n)
-        The columns at the wanted nodes before the switch there and after it.
+    carried : Carried
+        The columns, and what is noted of them.
     """
     train = Train(*train)
     # Without forcing nothing of it may travel through the calls: that alone would cost a tenth.
@@ -173,6 +146,7 @@ def flow(
     if FORCED:
         forcing = Forcing(*forced_by)
     setting = Setting(scales, bounds, hammer, train.live, forcing)
+    columns, work, track, passed = carried.columns, carried.work, carried.track, carried.passed
     count = nodes.shape[0]
     asked = 0
     first, last, _edge = edges_at(nodes[0, 0], train)
@@ -197,7 +171,7 @@ def flow(
         while due < marks.size and (marks[due] < t_end or (final and ended and marks[due] == t_end)):
             factor = carry(marks[due], node, after, columns, work, setting)
             scale_or_note(factor, renormalise, columns, scales, grown)
-            note_mark(states, seen, growth, track, node, initial, columns, work, hammer)
+            note_mark(node, initial, hammer, carried)
             due += 1
         if due in (0, marks.size) or final:
             continue

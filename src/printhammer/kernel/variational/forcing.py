@@ -26,24 +26,7 @@ from printhammer.kernel.model.layout import (
 )
 from printhammer.kernel.model.modes import BACKSTOP, LOADING, RELOADING, UNLOADING
 from printhammer.kernel.model.pulses import LIVE_WIDTH
-from printhammer.kernel.variational.layout import (
-    BACKSTOP_LOSS,
-    BACKSTOP_MOVES,
-    COIL,
-    DELAYED,
-    DRIVE,
-    ENERGY,
-    FIELD_MOVES,
-    FIRST_COLUMN,
-    MIDDLE,
-    PACK_LOSS,
-    PACK_MOVES,
-    PEAK,
-    SPACING,
-    STATE,
-    TIME,
-    VARIED,
-)
+from printhammer.kernel.variational import layout as V
 from printhammer.kernel.variational.slopes import BACKWARD, CENTRAL, FORWARD, OFFSETS, POINTS, WEIGHTS
 
 if TYPE_CHECKING:
@@ -83,7 +66,7 @@ def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> Non
             live_moves[k, j] = fire_moves[k, p] + piece_moves[k, piece, 0]
             for i in range(4):
                 live_moves[k, j + 1 + i] = piece_moves[k, piece, 2 + i]
-            j += DELAYED
+            j += V.DELAYED
 
 
 @inlined
@@ -96,7 +79,7 @@ def drive_change(t: float, drive: Drive, delayed: Any) -> float:
         total += piece_change(drive, i + 2, s, delayed, j + 1)
         total -= piece_rate(drive, i + 2, s) * delayed[j]
         i += LIVE_WIDTH
-        j += DELAYED
+        j += V.DELAYED
     return total
 
 
@@ -131,14 +114,14 @@ def field_changes(
     pulse = with_value * drive_change(t, drive, live_moves[k]) if drive[0] > 0.0 else 0.0
     total, coil = 0.0, 0.0
     current = 0.0 if FORCE_DRIVE else value
-    if of_hammer[k] & FIELD_MOVES:
+    if of_hammer[k] & V.FIELD_MOVES:
         for i in range(POINTS[CENTRAL]):
-            other = varied[k, MIDDLE + int(OFFSETS[CENTRAL, i])]
+            other = varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])]
             magnet = magnet_force(other[MAGNET:], x, current)
             total += WEIGHTS[CENTRAL, i] * (magnet + spring_force(other[SPRING:PACK], x))
             if current != 0.0:
                 coil += WEIGHTS[CENTRAL, i] * (magnet - magnet_force(other[MAGNET:], x, 0.0))
-    total, coil = total / SPACING + pulse, coil / SPACING
+    total, coil = total / V.SPACING + pulse, coil / V.SPACING
     return (total, coil, pulse) if FORCE_DRIVE else (total, coil + pulse, 0.0)
 
 
@@ -147,9 +130,9 @@ def note_changed_memories(peak: float, forcing: Forcing) -> None:
     """Keep what the unloading branch needs of `peak` [m], at a fixed depth."""
     varied, moves, of_hammer, memories = forcing.varied, forcing.moves, forcing.of_hammer, forcing.memories
     for k in range(of_hammer.size):
-        if of_hammer[k] & PACK_MOVES:
-            for j in range(VARIED):
-                at = peak + (j - MIDDLE) * SPACING * moves[k, FRONT]
+        if of_hammer[k] & V.PACK_MOVES:
+            for j in range(V.VARIED):
+                at = peak + (j - V.MIDDLE) * V.SPACING * moves[k, FRONT]
                 memories[k, j] = pack_memory(varied[k, j][PACK:BACKSTOP_PART], at)
 
 
@@ -157,43 +140,43 @@ def note_changed_memories(peak: float, forcing: Forcing) -> None:
 def pack_change(x: float, v: float, mode: int, k: int, forcing: Forcing) -> float:
     """Return the change [N] of the force of the pack at a fixed depth."""
     varied, moves, of_hammer, memories = forcing.varied, forcing.moves, forcing.of_hammer, forcing.memories
-    if not of_hammer[k] & PACK_MOVES:
+    if not of_hammer[k] & V.PACK_MOVES:
         return 0.0
     front = moves[k, FRONT]
     side = CENTRAL
     if not PACK_PULLS and mode == LOADING:
-        ahead, behind = varied[k, MIDDLE + 2], varied[k, MIDDLE - 2]
-        if pack_switch(ahead[PACK:BACKSTOP_PART], x + 2.0 * SPACING * front, v) <= 0.0:
+        ahead, behind = varied[k, V.MIDDLE + 2], varied[k, V.MIDDLE - 2]
+        if pack_switch(ahead[PACK:BACKSTOP_PART], x + 2.0 * V.SPACING * front, v) <= 0.0:
             side = BACKWARD
-        elif pack_switch(behind[PACK:BACKSTOP_PART], x - 2.0 * SPACING * front, v) <= 0.0:
+        elif pack_switch(behind[PACK:BACKSTOP_PART], x - 2.0 * V.SPACING * front, v) <= 0.0:
             side = FORWARD
     total = 0.0
     for i in range(POINTS[side]):
         away = OFFSETS[side, i]
-        j = MIDDLE + int(away)
-        at = x + away * SPACING * front
+        j = V.MIDDLE + int(away)
+        at = x + away * V.SPACING * front
         total += WEIGHTS[side, i] * pack_force(at, v, mode, memories[k, j], varied[k, j])
-    return float(total / SPACING)
+    return float(total / V.SPACING)
 
 
 @inlined
 def contact_changes(w: float, v: float, k: int, forcing: Forcing) -> tuple[float, float]:
     """Return the changes [N] of the force of the backstop and of its viscous part, at a fixed compression."""
     varied, of_hammer = forcing.varied, forcing.of_hammer
-    if not of_hammer[k] & BACKSTOP_MOVES:
+    if not of_hammer[k] & V.BACKSTOP_MOVES:
         return 0.0, 0.0
     side = CENTRAL
     if not BACKSTOP_PULLS:
-        if backstop_switch(varied[k, MIDDLE + 2][BACKSTOP_PART:MAGNET], w, v) <= 0.0:
+        if backstop_switch(varied[k, V.MIDDLE + 2][BACKSTOP_PART:MAGNET], w, v) <= 0.0:
             side = BACKWARD
-        elif backstop_switch(varied[k, MIDDLE - 2][BACKSTOP_PART:MAGNET], w, v) <= 0.0:
+        elif backstop_switch(varied[k, V.MIDDLE - 2][BACKSTOP_PART:MAGNET], w, v) <= 0.0:
             side = FORWARD
     elastic, viscous = 0.0, 0.0
     for i in range(POINTS[side]):
-        c = varied[k, MIDDLE + int(OFFSETS[side, i])][BACKSTOP_PART:MAGNET]
+        c = varied[k, V.MIDDLE + int(OFFSETS[side, i])][BACKSTOP_PART:MAGNET]
         elastic += WEIGHTS[side, i] * backstop_elastic(c, w)
         viscous += WEIGHTS[side, i] * backstop_viscous(c, w, v)
-    return (elastic + viscous) / SPACING, viscous / SPACING
+    return (elastic + viscous) / V.SPACING, viscous / V.SPACING
 
 
 @compiled
@@ -201,11 +184,11 @@ def rebound_change(v_in: float, k: int, forcing: Forcing) -> float:
     """Return the change [m/s] of the velocity after an impact on a rigid backstop."""
     varied, of_hammer = forcing.varied, forcing.of_hammer
     change = 0.0
-    if of_hammer[k] & BACKSTOP_MOVES:
+    if of_hammer[k] & V.BACKSTOP_MOVES:
         for i in range(POINTS[CENTRAL]):
-            c = varied[k, MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
+            c = varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
             change += WEIGHTS[CENTRAL, i] * backstop_rebound(c, v_in)
-    return float(change / SPACING)
+    return float(change / V.SPACING)
 
 
 @compiled
@@ -214,10 +197,10 @@ def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing)
     varied, moves, of_hammer = forcing.varied, forcing.moves, forcing.of_hammer
     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
     change = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) * (moves[k, POSITION] - dx)
-    if of_hammer[k] & BACKSTOP_MOVES:
+    if of_hammer[k] & V.BACKSTOP_MOVES:
         for i in range(POINTS[CENTRAL]):
-            c = varied[k, MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
-            change += WEIGHTS[CENTRAL, i] * backstop_energy(c, w) / SPACING
+            c = varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
+            change += WEIGHTS[CENTRAL, i] * backstop_energy(c, w) / V.SPACING
     return float(change)
 
 
@@ -232,7 +215,7 @@ def add_forcing(
     scales, bounds, hammer, drive, forcing = setting
     moves = forcing.moves
     field_x, push_x, _push_v, push_peak, loss_x, loss_v = slopes
-    v, t, pace = y[1], y[TIME], rates[TIME]
+    v, t, pace = y[1], y[V.TIME], rates[V.TIME]
     compressed = HAS_BACKSTOP and mode == BACKSTOP
     indented = HAS_PACK and mode in (LOADING, UNLOADING, RELOADING)
     w = y[0] if compressed else 0.0
@@ -249,7 +232,7 @@ def add_forcing(
     elif indented:
         loss = pack_force(x, v, mode, memory, hammer)
     for k in range(columns.shape[1]):
-        j = FIRST_COLUMN + CHANGING * k
+        j = V.FIRST_COLUMN + CHANGING * k
         dx, dv = y[j], y[j + 1]
         change, coil_change, drive_part = field_changes(t, x, value, with_value, k, drive, forcing)
         surface, push, lost = 0.0, 0.0, 0.0
@@ -265,10 +248,10 @@ def add_forcing(
         rates[j + 1] += change * hammer[INVERSE_MASS]
         rates[j + 1] += rates[1] * moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
         lost = pace * (lost + loss_v * dv) + loss_x * (dx - surface)
-        lost += push_peak * (columns[PEAK, k] - surface)
-        e = j + STATE - ENERGY
-        rates[e + COIL] = pace * ((coil_change + coil_x * dx) * v + coil * dv)
-        rates[e + DRIVE] = pace * (drive_part * v + value * dv) if FORCE_DRIVE else 0.0
+        lost += push_peak * (columns[V.PEAK, k] - surface)
+        e = j + V.STATE - V.ENERGY
+        rates[e + V.COIL] = pace * ((coil_change + coil_x * dx) * v + coil * dv)
+        rates[e + V.DRIVE] = pace * (drive_part * v + value * dv) if FORCE_DRIVE else 0.0
         power = -lost * v - pace * loss * dv
-        rates[e + PACK_LOSS] = power if indented else 0.0
-        rates[e + BACKSTOP_LOSS] = power if compressed else 0.0
+        rates[e + V.PACK_LOSS] = power if indented else 0.0
+        rates[e + V.BACKSTOP_LOSS] = power if compressed else 0.0

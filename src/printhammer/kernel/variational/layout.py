@@ -75,6 +75,37 @@ class Forcing(NamedTuple):
     value_spacing: float
 
 
+class Carried(NamedTuple):
+    """Columns on their way along a run, and what is noted of them at marks and wanted nodes.
+
+    Without forcing a column has r = 3 rows, with it 7.
+
+    Attributes
+    ----------
+    columns : float64 array, shape (r, n)
+        Those at the end of the stretch or at the last mark.
+    work : float64 array, shape (15, `work_width`)
+        Working space.
+    track : float64 array, shape (2 + n,)
+        Zeros, but one at place 1, before the first stretch; what is needed to go on afterwards, at place 1
+        whether the motion is differentiable so far.
+    states : float64 array, shape (m, 4)
+        Displacement, velocity, mode and latest local maximum at the marks.
+    changes, growth : float64 array, shapes (m, r, n) and (m, n)
+        The columns at the marks, and the logarithms of their growth since the mark before.
+    passed : float64 array, shape (q, 2, r, n)
+        The columns at the wanted nodes before the switch there and after it.
+    """
+
+    columns: Any
+    work: Any
+    track: Any
+    states: Any
+    changes: Any
+    growth: Any
+    passed: Any
+
+
 class Setting(NamedTuple):
     """What stays the same along a run."""
 

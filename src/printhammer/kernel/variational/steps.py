@@ -6,20 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import FRONT, INVERSE_MASS, POSITION
-from printhammer.kernel.model.modes import (
-    ANY_SCALES,
-    BACKSTOP,
-    BACKSTOP_RELEASED,
-    FREE,
-    HELD,
-    HELD_LOADING,
-    HELD_UNLOADING,
-    LOADING,
-    RELOADING,
-    RESTING,
-    UNLOADING,
-)
 from printhammer.kernel.variational.layout import BACKSTOP_LOSS, MEMORIES, PEAK, START, TIME
 
 if TYPE_CHECKING:
@@ -48,7 +36,7 @@ GRADING = 1.0 / 64.0
 @compiled
 def begin_step(node: Any, work: Any) -> None:
     """Put the state at a node in row START of `work`."""
-    work[START, 0] = node[4] if int(node[3]) == BACKSTOP else node[1]
+    work[START, 0] = node[4] if int(node[3]) == M.BACKSTOP else node[1]
     work[START, 1] = node[2]
     work[START, TIME] = node[0]
 
@@ -71,7 +59,7 @@ def length_in_contact(
         at_the_end = leaves and number > 0 and v1 > 0.0
         change = w1 / v1 if at_the_end else length_of(t - t1, w1, v1, kv1)
         s += change
-        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, ANY_SCALES)
+        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, M.ANY_SCALES)
     return s
 
 
@@ -80,18 +68,18 @@ def place_of_rest(t: float, node: Any, k: int, setting: Setting) -> float:
     """Return by how much a constant moves the place where the armature rests [m]."""
     scales, bounds, hammer, drive, forcing = setting
     x, mode, moves = node[1], int(node[3]), forcing.moves
-    if mode == RESTING:
+    if mode == M.RESTING:
         return float(moves[k, POSITION])
     value = drive_value(t, drive)
     with_value = force_with_value(x, value, hammer, drive, forcing)
     change, _coil, _drive = field_changes(t, x, value, with_value, k, drive, forcing)
-    if mode == HELD:
+    if mode == M.HELD:
         w = node[4]
         with_x = -contact_slopes(w, 0.0, scales, hammer)[0] / (2.0 * w)
         change += contact_changes(w, 0.0, k, forcing)[0] - with_x * moves[k, POSITION]
     else:
-        with_x = pack_slopes(x, 0.0, LOADING, 0.0, x, scales, hammer)[0]
-        change += pack_change(x, 0.0, LOADING, k, forcing) - with_x * moves[k, FRONT]
+        with_x = pack_slopes(x, 0.0, M.LOADING, 0.0, x, scales, hammer)[0]
+        change += pack_change(x, 0.0, M.LOADING, k, forcing) - with_x * moves[k, FRONT]
     return float(-change / (with_x + field_slope(x, value, scales, bounds, hammer)))
 
 
@@ -132,13 +120,13 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
     Returns the logarithm of a factor taken out of the columns.
     """
     grown = 0.0
-    if int(node[3]) != HELD:
+    if int(node[3]) != M.HELD:
         for k in range(columns.shape[1]):
             place = 0.0
             if FORCED:
                 place = place_of_rest(t_to, node, k, setting)
             columns[0, k], columns[1, k] = place, 0.0
-            columns[PEAK, k] = 0.0 if int(node[3]) == RESTING else place
+            columns[PEAK, k] = 0.0 if int(node[3]) == M.RESTING else place
         return grown
     if FORCED:
         for k in range(columns.shape[1]):
@@ -164,7 +152,7 @@ def set_in(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> 
             value = drive_value(t, drive)
             with_value = force_with_value(x, value, hammer, drive, forcing)
             change = field_changes(t, x, value, with_value, k, drive, forcing)[0] * hammer[INVERSE_MASS]
-            a = acceleration(t, x, 0.0, FREE, 0.0, hammer, drive)
+            a = acceleration(t, x, 0.0, M.FREE, 0.0, hammer, drive)
             change += a * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
             columns[1, k] += pause * change
 
@@ -187,26 +175,26 @@ def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: 
     if t_to <= t:
         return 0.0
     mode, kept = int(node[3]), node[4]
-    if mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING):
+    if mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING):
         work[START, TIME] = t_to
         return rest(t, t_to, node, columns, setting)
-    if HAS_BACKSTOP and mode == BACKSTOP and work[START, 0] == 0.0 and work[START, 1] == 0.0:
+    if HAS_BACKSTOP and mode == M.BACKSTOP and work[START, 0] == 0.0 and work[START, 1] == 0.0:
         work[START, TIME] = t_to
         set_in(t, t_to, node, columns, setting)
         return 0.0
     # What a backstop that has let go still stores is lost as it creeps back.
-    if FORCED and HAS_BACKSTOP and mode == BACKSTOP_RELEASED:
+    if FORCED and HAS_BACKSTOP and mode == M.BACKSTOP_RELEASED:
         add_stored(1.0, columns, work, hammer, forcing)
     take_in(work, columns)
-    if HAS_BACKSTOP and mode == BACKSTOP:
-        leaves = t_to == after[0] and int(after[3]) == FREE
+    if HAS_BACKSTOP and mode == M.BACKSTOP:
+        leaves = t_to == after[0] and int(after[3]) == M.FREE
         length = length_in_contact(t_to, leaves, t, work[START, 0], work[START, 1], hammer, drive)
         count = 1 + int(length / longest_step(mode, 0.0, 0.0, work, setting))
         for _ in range(count):
             column_step(length / count, columns, work, mode, 0.0, 0.0, setting)
     else:
         memory = memory_of(mode, kept, hammer)
-        if HAS_PACK and MEMORY and mode in (UNLOADING, RELOADING):
+        if HAS_PACK and MEMORY and mode in (M.UNLOADING, M.RELOADING):
             note_memories(work[MEMORIES], kept, hammer)
             if FORCED:
                 note_changed_memories(kept, forcing)
@@ -214,13 +202,13 @@ def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: 
         left = t_to - t
         while left > 0.0:
             length = min(left, longest)
-            if HAS_PACK and mode == LOADING and work[START, 1] > 0.0:
+            if HAS_PACK and mode == M.LOADING and work[START, 1] > 0.0:
                 since = (work[START, 0] - hammer[FRONT]) / work[START, 1]
                 length = min(length, max(since, GRADING * (t_to - t)))
             column_step(length, columns, work, mode, memory, kept, setting)
             left = 0.0 if length == left else t_to - work[START, TIME]
     work[START, TIME] = t_to
     bring_back(work, columns)
-    if FORCED and HAS_BACKSTOP and mode == BACKSTOP_RELEASED:
+    if FORCED and HAS_BACKSTOP and mode == M.BACKSTOP_RELEASED:
         add_stored(-1.0, columns, work, hammer, forcing)
     return 0.0

@@ -9,18 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import BACKSTOP_PART, END, FRONT, INVERSE_MASS, MAGNET, POSITION, Train
-from printhammer.kernel.model.modes import (
-    BACKSTOP,
-    FREE,
-    HELD,
-    HELD_LOADING,
-    HELD_UNLOADING,
-    LOADING,
-    RELOADING,
-    RESTING,
-    UNLOADING,
-)
 from printhammer.kernel.model.transitions import AT_FRONT, AT_PEAK, JUMPS, NO_JUMP, TURN
 from printhammer.kernel.variational.layout import BACKSTOP_LOSS, COIL, DRIVE, ENERGIES, ENERGY, PEAK
 
@@ -43,7 +33,7 @@ NEAR = 1e-9
 @compiled
 def acceleration_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer, drive: Drive) -> float:
     """Return the acceleration [m/s^2] at a node under the law of `mode`."""
-    if mode == BACKSTOP:
+    if mode == M.BACKSTOP:
         return backstop_acceleration(node[0], 0.0, v, hammer, drive)
     return acceleration(node[0], node[1], v, mode, memory_of(mode, kept, hammer), hammer, drive)
 
@@ -64,7 +54,7 @@ def add_energies(columns: Any, k: int, later: float, before: Any, behind: Any) -
 @compiled
 def is_rebound(node: Any, after: Any) -> bool:
     """Tell whether two nodes are the two sides of an impact on a rigid backstop."""
-    return RIGID and node[0] == after[0] and int(node[3]) == FREE and node[2] < 0.0 and after[2] >= 0.0
+    return RIGID and node[0] == after[0] and int(node[3]) == M.FREE and node[2] < 0.0 and after[2] >= 0.0
 
 
 @compiled
@@ -78,14 +68,14 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
         8.0 * (backstop_rebound(c, v_in + spacing) - backstop_rebound(c, v_in - spacing))
         - (backstop_rebound(c, v_in + 2.0 * spacing) - backstop_rebound(c, v_in - 2.0 * spacing))
     ) / (12.0 * spacing)
-    a = acceleration(node[0], node[1], v_in, FREE, 0.0, hammer, drive)
+    a = acceleration(node[0], node[1], v_in, M.FREE, 0.0, hammer, drive)
     for k in range(columns.shape[1]):
         if FORCED:
             columns[0, k] -= forcing.moves[k, POSITION]
         earlier = columns[0, k] / v_in
         if FORCED:
-            before = powers_at(node, FREE, 0.0, v_in, hammer, drive)
-            behind = powers_at(node, FREE, 0.0, v_out, hammer, drive)
+            before = powers_at(node, M.FREE, 0.0, v_in, hammer, drive)
+            behind = powers_at(node, M.FREE, 0.0, v_out, hammer, drive)
             add_energies(columns, k, -earlier, before, behind)
             columns[BACKSTOP_LOSS, k] += v_in * (columns[1, k] - a * earlier) / hammer[INVERSE_MASS]
         columns[0, k] = earlier * v_out
@@ -109,14 +99,14 @@ def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any
     before = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
     behind = acceleration_at(after, following, after[4], 0.0, hammer, drive)
     # Along the unloading curve: the old maximum is met without velocity.
-    if before == 0.0 or (mode == RELOADING and node[4] - after[1] <= NEAR * (node[4] - hammer[FRONT])):
+    if before == 0.0 or (mode == M.RELOADING and node[4] - after[1] <= NEAR * (node[4] - hammer[FRONT])):
         return False
-    new_peak = following == UNLOADING and (mode == LOADING or after[4] != node[4])
+    new_peak = following == M.UNLOADING and (mode == M.LOADING or after[4] != node[4])
     for k in range(columns.shape[1]):
         columns[1, k] *= behind / before
         if new_peak:
             columns[PEAK, k] = columns[0, k]
-        elif following == LOADING:
+        elif following == M.LOADING:
             columns[PEAK, k] = 0.0
     return True
 
@@ -177,7 +167,7 @@ def pass_edge(
     hammer, forcing = setting.hammer, setting.forcing
     new = value + change
     mode = int(node[3])
-    if change == 0.0 or mode in (RESTING, HELD, HELD_LOADING, HELD_UNLOADING):
+    if change == 0.0 or mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING):
         return new
     x, v = node[1], node[2]
     force = field_at(x, new, hammer) - field_at(x, value, hammer) + (change if FORCE_DRIVE else 0.0)

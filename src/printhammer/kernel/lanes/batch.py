@@ -1,0 +1,98 @@
+"""Many members as arrays: hammers, drives, starts and ends, and what is kept of each run."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from printhammer.kernel.compile.compiling import inlined
+from printhammer.kernel.model.layout import Control, Train
+
+
+class Batch(NamedTuple):
+    """M members.
+
+    Attributes
+    ----------
+    hammer_of, waveform_of : int64 array, shape (M,)
+        Row of `hammers`, `controls` and `bounds`, and set of waveforms, of each member.
+    hammers, controls, bounds : float64 array, shape (H, any), (H, 4), (H, 4)
+        As `hammer`, `control` and `bounds` in :func:`printhammer.kernel.single.run.run`.
+    piece_starts, pieces
+        Pieces of all sets of waveforms one after the other, and the first of each set.
+    rates : float64 array, shape (W, 3)
+        Rates of the two exponentials and angular frequency of the sine in the waveforms of each set; for
+        lanes.
+    firing_starts, firings, begins
+        Firing times [s] and first pieces of all members one after the other, and the first of each; pieces
+        are counted within the member's set.
+    replace : bool
+        Whether a firing cuts off the pulses before it.
+    states : float64 array, shape (M, 5)
+        Time, displacement, velocity, mode (negative: as follows from the state), memory at the start.
+    ends : float64 array, shape (M,)
+        Ends of the runs [s].
+    """
+
+    hammer_of: Any
+    hammers: Any
+    controls: Any
+    bounds: Any
+    waveform_of: Any
+    piece_starts: Any
+    pieces: Any
+    rates: Any
+    firing_starts: Any
+    firings: Any
+    begins: Any
+    replace: bool
+    states: Any
+    ends: Any
+
+
+class Kept(NamedTuple):
+    """What to keep of M members, and the arrays that it goes to; NaN where a run did not get.
+
+    Attributes
+    ----------
+    strobe_starts, strobe_times
+        Ascending times [s] of all members one after the other, and the first of each.
+    grid : float64 array, shape (T,)
+        Times of the pictures, ascending [s]; may be empty.
+    want_dots : bool
+        Whether to fill `dots`.
+    status, reached, steps : array, shape (M,)
+        Status code (int64), time reached [s], number of steps (int64).
+    dots : float64 array, shape (firings, 6)
+        See :mod:`printhammer.kernel.single.stretch`; rows as in `Batch.firings`.
+    strobes : float64 array, shape (strobe times, 4)
+        See :mod:`printhammer.kernel.single.stretch`.
+    x : float32 array, shape (M, T)
+        Displacement [m].
+    """
+
+    strobe_starts: Any
+    strobe_times: Any
+    grid: Any
+    want_dots: bool
+    status: Any
+    reached: Any
+    steps: Any
+    dots: Any
+    strobes: Any
+    x: Any
+
+
+@inlined
+def control_of(batch: Batch, row: int) -> Control:
+    """Return the `control` of the hammer in a row."""
+    controls = batch.controls
+    return controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3]
+
+
+@inlined
+def train_of(batch: Batch, m: int, under_way: Any, live: Any) -> Train:
+    """Return the drive of a member, with working space."""
+    begin, end = batch.firing_starts[m], batch.firing_starts[m + 1]
+    wave = batch.waveform_of[m]
+    pieces = batch.pieces[batch.piece_starts[wave] : batch.piece_starts[wave + 1]]
+    return Train(batch.firings[begin:end], batch.begins[begin:end], pieces, batch.replace, under_way, live)
