@@ -6,8 +6,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
+    from printhammer.support.arrays import FloatArray
 
 
 class Units(StrEnum):
@@ -54,7 +53,7 @@ def with_unit(value: float | None, kind: str, units: Units) -> str:
     return "–" if value is None else f"{shown(value, kind, units)} {unit(kind, units)}"
 
 
-def range_with_unit(values: npt.NDArray[np.float64], kind: str, units: Units) -> str | None:
+def range_with_unit(values: FloatArray, kind: str, units: Units) -> str | None:
     """Return the least and the largest of quantities in SI as text with units; None if there are none."""
     if not values.size:
         return None

@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.drive.waveforms.base import QuantityName
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
-    IntArray = npt.NDArray[np.int64]
 
 Overlap = Literal["add", "replace"]
 OVERLAPS: Final = get_args(Overlap)

@@ -19,8 +19,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from printhammer.drive.base import IntArray
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 __all__ = ["PulseSequence"]
 

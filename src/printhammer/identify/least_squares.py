@@ -23,9 +23,7 @@ import numpy as np
 from printhammer.identify.residuals import robust_scale
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 _FALSE_OUTLIERS: Final = 0.01
 """How many rows of good data with normal noise are left out, on average, in one fit."""
@@ -67,7 +65,7 @@ class Solution:
     """At `p`, shape (m, n)."""
     variance: FloatArray
     """Of the noise in each row; all 1 where the data are exact. Shape (m,)."""
-    outliers: npt.NDArray[np.bool_]
+    outliers: BoolArray
     """Rows left out, shape (m,)."""
     degrees_of_freedom: int
     """Rows used less parameters."""
@@ -81,7 +79,7 @@ class Solution:
     """Whether the residuals are no more than rounding."""
 
     @property
-    def used(self) -> npt.NDArray[np.bool_]:
+    def used(self) -> BoolArray:
         """Rows that were not left out."""
         return ~self.outliers
 
@@ -145,7 +143,7 @@ def _solution(
     data: FloatArray,
     p: FloatArray,
     variance: FloatArray,
-    used: npt.NDArray[np.bool_],
+    used: BoolArray,
     *,
     exact: bool,
 ) -> Solution:
@@ -225,7 +223,7 @@ def _least_squares(
     law: Law,
     data: FloatArray,
     variance: FloatArray,
-    used: npt.NDArray[np.bool_],
+    used: BoolArray,
     start: FloatArray,
     loss: Any = "linear",
 ) -> FloatArray:
@@ -261,7 +259,7 @@ def _is_exact(data: FloatArray, residuals: FloatArray) -> bool:
 def variance_of(
     spread: FloatArray,
     residuals: FloatArray,
-    used: npt.NDArray[np.bool_],
+    used: BoolArray,
     parameters: int,
     *,
     clipped: bool = False,
@@ -300,9 +298,7 @@ def variance_of(
     return variance
 
 
-def _inside(
-    jacobian: FloatArray, residuals: FloatArray, variance: FloatArray, used: npt.NDArray[np.bool_]
-) -> npt.NDArray[np.bool_]:
+def _inside(jacobian: FloatArray, residuals: FloatArray, variance: FloatArray, used: BoolArray) -> BoolArray:
     """Return which rows lie as far off as noise can put them."""
     from scipy.stats import norm
 

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 _MAD: Final = 1.482602218505602
 """Standard deviation of a normal distribution over its median absolute deviation."""
@@ -42,14 +40,14 @@ def running_median(values: FloatArray, width: int) -> FloatArray:
     return np.concatenate([np.full(half, first), np.median(windows, axis=1), np.full(half, last)])
 
 
-def spikes_of(values: FloatArray, noise: float) -> npt.NDArray[np.bool_]:
+def spikes_of(values: FloatArray, noise: float) -> BoolArray:
     """Return which samples of a record stand out of their neighbours, more than noise and slope explain."""
     middle = running_median(values, 5)
     padded = np.pad(middle, 2, mode="edge")
     return np.abs(values - middle) > _SPIKE * noise + np.abs(padded[4:] - padded[:-4])
 
 
-def outliers_of(residuals: FloatArray, floor: float) -> npt.NDArray[np.bool_]:
+def outliers_of(residuals: FloatArray, floor: float) -> BoolArray:
     """Return which residuals of mostly good data are larger than normal noise, or the floor, has them."""
     return np.abs(residuals) > _FAR * max(robust_scale(residuals), floor)
 

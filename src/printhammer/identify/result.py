@@ -14,11 +14,9 @@ from printhammer.results import Column, Result, column, coordinate, part, scalar
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 CONFIDENCE: Final = 0.95
 """Probability with which an interval is meant to contain the constant."""
@@ -140,17 +138,17 @@ class Fit(Result):
     weights: FloatArray = column(
         "1", "weight, proportional to 1 / variance", "datum", more="the largest is 1"
     )
-    outliers: npt.NDArray[np.bool_] = column("1", "whether it was left out as too far off", "datum")
+    outliers: BoolArray = column("1", "whether it was left out as too far off", "datum")
     condition_number: float = scalar(
         "1",
         "condition number of the Jacobian with columns of unit length",
         more="large where constants cannot be told apart",
     )
-    series: npt.NDArray[np.int64] = column(
+    series: IntArray = column(
         "1", "place among the series", "datum", more="a current, a branch or a file of `series_names`"
     )
     series_names: tuple[str, ...] = scalar("", "names of the series, for the legend")
-    lines: npt.NDArray[np.int64] = part("line of the file of each datum", more="empty where data are no rows")
+    lines: IntArray = part("line of the file of each datum", more="empty where data are no rows")
     given: Mapping[str, str] = scalar(
         "",
         "what was taken as known",

@@ -22,9 +22,7 @@ from printhammer.units import describe, to_si
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
@@ -51,7 +49,7 @@ class Readings:
     path: Path
     values: dict[str, FloatArray]
     words: dict[str, list[str]]
-    lines: npt.NDArray[np.int64]
+    lines: IntArray
     comments: dict[str, str]
 
     def __len__(self) -> int:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 _FIRED: Final = ("rate", "firing")
 
@@ -104,7 +104,7 @@ def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
     }
 
 
-def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
     """Return the rows of two maps that have the same rate, up to a part in 10^9."""
     here, there = chart["rate"].values, other["rate"].values
     nearest = np.abs(here[:, np.newaxis] - there).argmin(axis=1)

@@ -25,9 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 _SI: Final = {"rate": "Hz", "time": "s", "displacement": "m"}
 _HEADINGS: Final = (
@@ -54,7 +52,7 @@ class Cells:
 
     what: str
     heading: list[str]
-    lines: npt.NDArray[np.int64]
+    lines: IntArray
     rows: list[list[str]]
 
     def column(self, index: int, si: str, unit: str, *, gaps: bool = False) -> FloatArray:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import Laws
     from printhammer.results.result import Entries
     from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
 
 __all__ = ["DISPLAY_TOLERANCE", "MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
@@ -49,11 +49,9 @@ _TIMES: Final = "member strobe"
 class DotTable(Result):
     """What the firings did, up to the most firings of any member; nan where there is nothing to tell."""
 
-    fired: npt.NDArray[np.bool_] = column(
-        "1", "whether there was such a firing, and the run came so far", _FIRINGS
-    )
+    fired: BoolArray = column("1", "whether there was such a firing, and the run came so far", _FIRINGS)
     fired_at: FloatArray = column("s", "time of the firing", _FIRINGS)
-    struck: npt.NDArray[np.bool_] = column("1", "whether it made a dot", _FIRINGS)
+    struck: BoolArray = column("1", "whether it made a dot", _FIRINGS)
     flight_time: FloatArray = column("s", "time from firing to touch", _FIRINGS)
     impact_speed: FloatArray = column("m/s", "velocity at touch", _FIRINGS)
     peak_force: FloatArray = column("N", "largest pack force", _FIRINGS)
@@ -61,9 +59,7 @@ class DotTable(Result):
     contact_time: FloatArray = column(
         "s", "time from touch to leaving", _FIRINGS, more="nan also while the contact is open"
     )
-    extra_contacts: npt.NDArray[np.int64] = column(
-        "1", "further pack contacts before the next firing", _FIRINGS
-    )
+    extra_contacts: IntArray = column("1", "further pack contacts before the next firing", _FIRINGS)
 
 
 class Strobes(Result):
@@ -72,7 +68,7 @@ class Strobes(Result):
     t: FloatArray = column("s", "time", _TIMES)
     x: FloatArray = column("m", "displacement", _TIMES)
     v: FloatArray = column("m/s", "velocity", _TIMES)
-    branch: npt.NDArray[np.int64] = column(
+    branch: IntArray = column(
         "1", "mode of motion", _TIMES, more="-1 where a run did not get", codes=MODE_NAMES
     )
     memory: FloatArray = column(
@@ -83,11 +79,9 @@ class Strobes(Result):
 class EnsembleResult(Result):
     """What is kept of the runs of an ensemble."""
 
-    status: npt.NDArray[np.int64] = column(
-        "1", "how the run ended", "member", more="0 is ok", codes=STATUS_NAMES
-    )
+    status: IntArray = column("1", "how the run ended", "member", more="0 is ok", codes=STATUS_NAMES)
     reached: FloatArray = column("s", "time at which the run ended", "member")
-    steps: npt.NDArray[np.int64] = column("1", "steps of the integrator", "member")
+    steps: IntArray = column("1", "steps of the integrator", "member")
     dots: DotTable | None = part("what the firings did", more="if asked for", default=None)
     strobes: Strobes | None = part("states at the times asked for", default=None)
     x: npt.NDArray[np.float32] | None = column(
@@ -113,7 +107,7 @@ class EnsembleResult(Result):
         return entries if self.dots is None else entries | self.dots.entries()
 
     @property
-    def ok(self) -> npt.NDArray[np.bool_]:
+    def ok(self) -> BoolArray:
         """Which runs went as asked."""
         return np.equal(self.status, OK)
 
@@ -340,7 +334,7 @@ class Ensemble:
             whole[group.members] = gathered
         return whole
 
-    def _spread(self, tables: Sequence[FloatArray], starts: Sequence[npt.NDArray[np.int64]]) -> FloatArray:
+    def _spread(self, tables: Sequence[FloatArray], starts: Sequence[IntArray]) -> FloatArray:
         """Return ragged rows of the results as one array (members, rows, columns), filled up with NaN."""
         most = max((int(np.diff(start).max(initial=0)) for start in starts), default=0)
         whole = np.full((self.size, most, tables[0].shape[1] if tables else MOST_COLUMNS), np.nan)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.compile.lanes import LaneKinds
     from printhammer.kernel.compile.specialise import Kernel
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 _NODES: Final = 2048
 _CONTACTS: Final = 256
@@ -33,7 +33,7 @@ _PIECE: Final = 4 * lane_layout.LANES
 """Members in one piece of work for lanes."""
 
 
-def starts_of(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.int64]:
+def starts_of(arrays: Sequence[npt.NDArray[Any]]) -> IntArray:
     """Return where each of some arrays begins when they are put one after the other, and the end of all."""
     return np.concatenate([[0], np.cumsum([len(array) for array in arrays])]).astype(np.int64)
 
@@ -68,7 +68,7 @@ class Group:
 
     def __init__(
         self,
-        members: npt.NDArray[np.int64],
+        members: IntArray,
         hammers: Sequence[Hammer],
         drives: Sequence[Drive],
         states: FloatArray,
@@ -269,7 +269,7 @@ class Job:
         )
         self._one_by_one(left_over[:left])
 
-    def _one_by_one(self, which: npt.NDArray[np.int64], prepare: bool = False) -> None:
+    def _one_by_one(self, which: IntArray, prepare: bool = False) -> None:
         group = self.group
         nodes, contacts = _NODES, _CONTACTS
         under_way = np.zeros((2, group.most_firings), np.int64)

@@ -11,11 +11,9 @@ import numpy as np
 from printhammer.run.problem import scales_of
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 PAPER_X: Final = (38.1e-6, 88.9e-6)
 """Displacements of the window of Fig. 11 of Hendriks (1983), m: 0.0015 to 0.0035 in."""
@@ -50,7 +48,7 @@ class Window:
         """Half-widths, m and m/s, shape (2,)."""
         return 0.5 * np.array([self.x[1] - self.x[0], self.v[1] - self.v[0]])
 
-    def inside(self, x: FloatArray, v: FloatArray) -> npt.NDArray[np.bool_]:
+    def inside(self, x: FloatArray, v: FloatArray) -> BoolArray:
         """Whether states lie inside, shape (n,)."""
         return (self.x[0] <= x) & (x <= self.x[1]) & (self.v[0] <= v) & (v <= self.v[1])
 

@@ -14,11 +14,9 @@ from printhammer.chaos.strobe.train import exponents_onward
 from printhammer.chaos.strobe.verdict import is_positive
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.chaos.bifurcation.columns import Columns
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MATCH: Final = 1e-2
 """Distance, in half-widths of the window, up to which periodic orbits count as the same attractor."""
@@ -75,7 +73,7 @@ class Attractors:
         self._trees: dict[int, tuple[cKDTree, float]] = {}
         self._attempts = 0
 
-    def judge(self, columns: Columns) -> npt.NDArray[np.int64]:
+    def judge(self, columns: Columns) -> IntArray:
         """Return to which attractor trains have come: its place in `found`, -1 where that is not known."""
         cycles, _ = self._cycles(columns)
         places = np.full(len(columns), -1, np.int64)
@@ -86,7 +84,7 @@ class Attractors:
         self._strange(columns, np.flatnonzero((cycles == 0) & (columns.status == OK)), places)
         return places
 
-    def _cycles(self, columns: Columns) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    def _cycles(self, columns: Columns) -> tuple[IntArray, FloatArray]:
         front = math.inf if self.regime.hammer.front is None else self.regime.hammer.front
         count = len(columns)
         return cycles_of(columns, np.full(count, front), np.tile(self.scales, (count, 1)))
@@ -94,7 +92,7 @@ class Attractors:
     def _scaled(self, x: FloatArray, v: FloatArray) -> FloatArray:
         return np.stack([x, v], axis=-1) / self.scales[:2]
 
-    def _periodic(self, orbits: FloatArray) -> npt.NDArray[np.int64]:
+    def _periodic(self, orbits: FloatArray) -> IntArray:
         """Return the places of orbits of one period, shape (n, q, 2); those that are new are added."""
         q = orbits.shape[1]
         places = np.full(len(orbits), -1, np.int64)
@@ -109,7 +107,7 @@ class Attractors:
             self.found.append(Attractor(f"period-{q}", q, states))
         return places
 
-    def _strange(self, columns: Columns, rows: npt.NDArray[np.int64], places: npt.NDArray[np.int64]) -> None:
+    def _strange(self, columns: Columns, rows: IntArray, places: IntArray) -> None:
         """Find trains without a period on strange attractors; new ones are looked for where they begin."""
         points = self._scaled(columns.x, columns.v)
         left = rows
@@ -127,9 +125,7 @@ class Attractors:
             if followed in self._trees:
                 left = self._within(points, left, followed, places)
 
-    def _within(
-        self, points: FloatArray, rows: npt.NDArray[np.int64], place: int, places: npt.NDArray[np.int64]
-    ) -> npt.NDArray[np.int64]:
+    def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:
         """Label the trains that lie on a strange attractor; return the others."""
         if not rows.size:
             return rows
@@ -166,7 +162,7 @@ class Attractors:
         return len(self.found) - 1
 
 
-def _agree(orbits: FloatArray, known: FloatArray) -> npt.NDArray[np.bool_]:
+def _agree(orbits: FloatArray, known: FloatArray) -> BoolArray:
     """Tell which of some orbits, shape (n, q, 2), are a known one, shape (q, 2), whatever their phase."""
     count = len(known)
     # The point nearest to the first one tells the shift.

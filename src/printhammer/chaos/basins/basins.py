@@ -28,13 +28,12 @@ from printhammer.run.regime import Regime
 from printhammer.support.threads import shifted
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     import pandas as pd
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.declare import Kind
     from printhammer.run.regime import Firing
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray, TextArray
     from printhammer.support.threads import Progress
 
 FIRINGS: Final = 200
@@ -68,7 +67,7 @@ class Basins(Result, rows="v x"):
     regime: Regime = part("hammer and periodic drive")
     x: FloatArray = coordinate("m", "displacement at the first firing", "x")
     v: FloatArray = coordinate("m/s", "velocity at the first firing", "v")
-    labels: npt.NDArray[np.int64] = column(
+    labels: IntArray = column(
         "1",
         "attractor",
         "v x",
@@ -79,10 +78,8 @@ class Basins(Result, rows="v x"):
     attractors: tuple[Attractor, ...] = part(
         "in the order of their numbers: by period, strange ones last, then by their least displacement"
     )
-    firings: npt.NDArray[np.int64] = column(
-        "1", "firings until it was decided", "v x", more="or given up", dtype=np.int32
-    )
-    status: npt.NDArray[np.str_] = column("", "how the run ended", "v x", more='or "no state"')
+    firings: IntArray = column("1", "firings until it was decided", "v x", more="or given up", dtype=np.int32)
+    status: TextArray = column("", "how the run ended", "v x", more='or "no state"')
     tolerance: float = part("tolerance of the integration")
 
     @property
@@ -241,7 +238,7 @@ def _decided(
     counts: tuple[int, int, float],
     threads: int | None,
     progress: Progress | None,
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.str_], list[Attractor]]:
+) -> tuple[IntArray, IntArray, TextArray, list[Attractor]]:
     """Return places of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings, statuses, attractors."""
     firings, most, tolerance = counts
     (scales,) = scales_of_columns([regime])

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.basins.basins import Range
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, TextArray
     from printhammer.support.threads import Progress
 
 TAIL: Final = 1e-3
@@ -55,7 +55,7 @@ class QuenchMap(Result):
     waveform: Waveform = part("the first pulse; the second has another width")
     gaps: FloatArray = coordinate("s", "time between the two firings", "gap", name="gap")
     widths: FloatArray = coordinate("s", "width of the second pulse", "width", name="width")
-    struck: npt.NDArray[np.bool_] = column(
+    struck: BoolArray = column(
         "1", "whether the second firing made a dot", "gap width", more="False for a lost one"
     )
     peak: FloatArray = column(
@@ -73,7 +73,7 @@ class QuenchMap(Result):
         "gap width",
         more="from firing to touch, nan likewise",
     )
-    status: npt.NDArray[np.str_] = column("", "how the run ended", "gap width")
+    status: TextArray = column("", "how the run ended", "gap width")
     single_force: float = scalar(
         "N", "largest pack force of the first pulse alone", more="nan where it makes no dot"
     )
@@ -92,7 +92,7 @@ class QuenchMap(Result):
         return provenance(hammer=self.hammer, waveform=self.waveform, overlap="add", tolerance=self.tolerance)
 
     @property
-    def lost(self) -> npt.NDArray[np.bool_]:
+    def lost(self) -> BoolArray:
         """Where the second dot is lost; False where the run ended early."""
         return np.asarray(~self.struck & (self.status == "ok"))
 

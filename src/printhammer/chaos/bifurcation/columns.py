@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray, TextArray
     from printhammer.support.threads import Progress
 
 State = tuple[float, float, float, float]
@@ -64,7 +64,7 @@ class Columns:
     memory: FloatArray
     """Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0. Shape (M,
     P)."""
-    status: npt.NDArray[np.str_]
+    status: TextArray
     """How the runs ended; `NOT_RUN` before. Shape (M,)."""
     last: FloatArray
     """Displacement, velocity, branch of the pack or -1, and memory at the firing after all that are asked
@@ -92,7 +92,7 @@ def blank_columns(count: int, points: int) -> Columns:
     )
 
 
-def put(columns: Columns, rows: Sequence[int] | npt.NDArray[np.int64], others: Columns) -> None:
+def put(columns: Columns, rows: Sequence[int] | IntArray, others: Columns) -> None:
     """Write the states of other trains into rows of columns."""
     where = np.asarray(rows, dtype=np.int64)
     for name, values in vars(others).items():
@@ -240,9 +240,7 @@ def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
     return np.array(rows)
 
 
-def cycles_of(
-    columns: Columns, fronts: FloatArray, scales: FloatArray
-) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple[IntArray, FloatArray]:
     """Return the periods of trains, in firings, by the rule of `printhammer.chaos.strobe.verdict`.
 
     A period is the smallest q, at most 64 and half of the points, whose states q firings apart agree, 0 where

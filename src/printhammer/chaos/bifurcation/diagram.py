@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
 
 
 class Bifurcation(Result, rows="direction column"):
@@ -36,7 +36,7 @@ class Bifurcation(Result, rows="direction column"):
         "", "how the state was carried", "direction", more='"from rest", "up" or "down"', name="direction"
     )
     values: FloatArray = coordinate("SI", "value of the parameter", "column", more="ascending", name="value")
-    firing: npt.NDArray[np.int64] = coordinate(
+    firing: IntArray = coordinate(
         "1", "number of the firing", "firing", more="the first of a train is number 1", dtype=np.int32
     )
     x: FloatArray = column("m", "displacement", "direction column firing", more="nan where a run did not get")
@@ -48,7 +48,7 @@ class Bifurcation(Result, rows="direction column"):
         more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where a run did not get",
         codes=MODE_NAMES,
     )
-    cycles: npt.NDArray[np.int64] = column(
+    cycles: IntArray = column(
         "1",
         "firings after which states repeat, 0 for none",
         "direction column",
@@ -78,8 +78,8 @@ class Bifurcation(Result, rows="direction column"):
         name="standard_error",
         head="standard error",
     )
-    status: npt.NDArray[np.str_] = column("", "how the run ended", "direction column")
-    levels: npt.NDArray[np.int64] = column(
+    status: TextArray = column("", "how the run ended", "direction column")
+    levels: IntArray = column(
         "1",
         "refinement, 0 for a given value",
         "column",
@@ -105,7 +105,7 @@ class Bifurcation(Result, rows="direction column"):
 
     @property
     @derived("", "verdict", "direction column", name="verdict")
-    def verdicts(self) -> npt.NDArray[np.str_]:
+    def verdicts(self) -> TextArray:
         """Verdicts, shape (D, C): "period-q", "strange" or "undecided": `printhammer.chaos.strobe.verdict`.
 
         Undecided are trains without a period whose exponent was not computed, or is not positive by three
@@ -201,7 +201,7 @@ class Bifurcation(Result, rows="direction column"):
         return is_positive(exponent)
 
 
-def hysteresis(diagram: Bifurcation) -> npt.NDArray[np.bool_]:
+def hysteresis(diagram: Bifurcation) -> BoolArray:
     """Return at which values the directions of a diagram lead to different attractors, shape (C,).
 
     Periodic ones are different if their periods are, or if their orbits lie further apart than

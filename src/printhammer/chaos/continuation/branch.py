@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.events import BranchEvent
     from printhammer.chaos.orbits.orbit import Orbit
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 1000
 """Number of steps in either direction unless told otherwise."""
@@ -57,16 +57,12 @@ class Branch(Result):
     multipliers: npt.NDArray[np.complex128] = part(
         "Floquet multipliers of the orbits, the larger absolute value first", more="shape (N, 2)", repr=False
     )
-    backstop_contacts: npt.NDArray[np.int64] = column(
+    backstop_contacts: IntArray = column(
         "1", "backstop contacts in a period of the orbit", "orbit", dtype=np.int32
     )
-    pack_contacts: npt.NDArray[np.int64] = column(
-        "1", "pack contacts in a period of the orbit", "orbit", dtype=np.int32
-    )
-    printed: npt.NDArray[np.int64] = column(
-        "1", "firings of a period that make a dot", "orbit", dtype=np.int32
-    )
-    lost: npt.NDArray[np.int64] = column("1", "firings of a period that make no dot", "orbit", dtype=np.int32)
+    pack_contacts: IntArray = column("1", "pack contacts in a period of the orbit", "orbit", dtype=np.int32)
+    printed: IntArray = column("1", "firings of a period that make a dot", "orbit", dtype=np.int32)
+    lost: IntArray = column("1", "firings of a period that make no dot", "orbit", dtype=np.int32)
     flight_time: FloatArray = column(
         "s", "from the firing to the touch of the pack", "orbit firing", more="nan for a lost dot"
     )
@@ -115,7 +111,7 @@ class Branch(Result):
 
     @property
     @derived("1", "whether all small changes of the state die out", "orbit", dtype=np.int32)
-    def stable(self) -> npt.NDArray[np.bool_]:
+    def stable(self) -> BoolArray:
         """Whether all small changes of the state die out, shape (N,).
 
         Where the branch is born in a period doubling, as of the orbit beside it: a multiplier is 1 there.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.continuation.branch_points import BranchPoint
     from printhammer.chaos.continuation.family import Surface, Touch
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 EventKind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "grazing"]
 KINDS: Final[tuple[str, ...]] = get_args(EventKind)
@@ -129,7 +129,7 @@ def _parted(touches: list[Touch], length: float) -> bool:
 
 
 def stable_ranges(
-    along: FloatArray, stable: npt.NDArray[np.bool_], events: Sequence[BranchEvent]
+    along: FloatArray, stable: BoolArray, events: Sequence[BranchEvent]
 ) -> list[tuple[float, float]]:
     """Return the ranges of the constant over which the orbits of a branch are stable, ascending."""
     limits = [event for event in events if event.kind != "grazing"]

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.fixed_points import Node
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing, Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
 
 MOST: Final = 200
@@ -89,7 +89,7 @@ class LossCurve:
     second: FloatArray
     state: FloatArray
     multipliers: npt.NDArray[np.complex128]
-    limits: npt.NDArray[np.bool_]
+    limits: BoolArray
     stops: tuple[Stop, Stop]
 
 
@@ -105,7 +105,7 @@ class StabilityChart(Result):
     grid: tuple[FloatArray, FloatArray] = part(
         "values of the two constants, shapes (m,) and (n,), at which trains from rest were judged", repr=False
     )
-    settled: npt.NDArray[np.int64] = column(
+    settled: IntArray = column(
         "1",
         "firings after which the train from rest repeats",
         "value main",
@@ -371,7 +371,7 @@ class _Chart:
 
 def _grid(
     branch: Branch, second: str, bounds: tuple[float, float], grid: tuple[int, int], threads: int | None
-) -> tuple[tuple[FloatArray, FloatArray], npt.NDArray[np.int64]]:
+) -> tuple[tuple[FloatArray, FloatArray], IntArray]:
     """Return the values of both constants, and after how many firings trains from rest repeat there."""
     axes = (np.linspace(*branch.bounds, grid[0]), np.linspace(*bounds, grid[1]))
     settled = np.zeros((grid[1], grid[0]), dtype=np.int64)

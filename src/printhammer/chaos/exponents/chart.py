@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
     from printhammer.support.threads import Progress
 
 
@@ -54,9 +54,7 @@ class LyapunovChart(Result, rows="period"):
     growth: tuple[str, ...] = column("", "what the largest exponent alone says", "period")
     zero_one: tuple[str, ...] = column("", "verdict of the 0-1 test", "period")
     status: tuple[str, ...] = column("", "how the run ended", "period")
-    smooth: npt.NDArray[np.bool_] = column(
-        "1", "whether the motion has a derivative", "period", dtype=np.int8
-    )
+    smooth: BoolArray = column("1", "whether the motion has a derivative", "period", dtype=np.int8)
 
     @property
     def title(self) -> str:

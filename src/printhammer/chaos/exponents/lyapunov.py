@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from printhammer.derivatives.states import Exponent
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 FIRINGS: Final = 1000
 """Number of firings over which growth counts unless told otherwise."""
@@ -145,9 +145,7 @@ class Lyapunov(Result, rows="firing exponent"):
         other = "undecided" if self.zero_one is None else self.zero_one.verdict
         return None if "undecided" in (self.growth, other) else self.growth == other
 
-    def running(
-        self, counts: npt.ArrayLike | None = None
-    ) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]:
+    def running(self, counts: npt.ArrayLike | None = None) -> tuple[IntArray, FloatArray, FloatArray]:
         """Return the estimates from the first firings only, to see whether they have settled.
 
         Parameters

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 4096
 """Largest number of states; a matrix of so many squared has 16 million points."""
@@ -40,7 +40,7 @@ _ROWS: Final = 256
 class Recurrence(Result):
     """A recurrence plot and what is counted in it."""
 
-    matrix: npt.NDArray[np.bool_] = column(
+    matrix: BoolArray = column(
         "1", "whether two states lie within the threshold of each other", "i j", name="recurs", dtype=np.int8
     )
     threshold: float = scalar(
@@ -145,7 +145,7 @@ def recurrence(
     return counted(distances <= threshold, float(threshold), apart, least)
 
 
-def counted(matrix: npt.NDArray[np.bool_], threshold: float, theiler: int, shortest: int) -> Recurrence:
+def counted(matrix: BoolArray, threshold: float, theiler: int, shortest: int) -> Recurrence:
     """Count the lines of a recurrence matrix: symmetric, true on the main diagonal."""
     count = len(matrix)
     # The matrix is symmetric: one half of it has all diagonal lines.
@@ -173,7 +173,7 @@ def counted(matrix: npt.NDArray[np.bool_], threshold: float, theiler: int, short
     )
 
 
-def run_lengths(points: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+def run_lengths(points: BoolArray) -> IntArray:
     """Return the lengths of the unbroken rows of true values, in order."""
     steps = np.diff(np.concatenate([[0], points.astype(np.int8), [0]]))
     return np.asarray(np.flatnonzero(steps == -1) - np.flatnonzero(steps == 1), dtype=np.int64)

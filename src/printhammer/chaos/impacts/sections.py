@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress
 
 Surface = Literal["pack", "backstop"]
@@ -58,7 +58,7 @@ class Section(Result):
     last: int = scalar("1", "last of them")
     t: FloatArray = column("s", "time of touch", "touch")
     v: FloatArray = column("m/s", "velocity at touch", "touch")
-    firing: npt.NDArray[np.int64] = column(
+    firing: IntArray = column(
         "1", "number of the latest firing", "touch", more="at or before the touch", dtype=np.int32
     )
     since: FloatArray = column("s", "time since the last firing", "touch")
@@ -81,7 +81,7 @@ class Section(Result):
 
     @property
     @derived("1", "number of the touch", "touch", kind="coordinate", dtype=np.int32)
-    def touch(self) -> npt.NDArray[np.int64]:
+    def touch(self) -> IntArray:
         """Numbers of the touches, from 1 on."""
         return np.arange(1, len(self.t) + 1)
 

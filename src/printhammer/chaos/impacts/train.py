@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.run.regime import Firing
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 BINS: Final = 60
 """Number of bins of the histogram unless told otherwise."""
@@ -50,7 +50,7 @@ class ImpactTrain(Result):
         more="0 for a clock, 1 for a Poisson process",
     )
     edges: FloatArray = part("edges of the bins of the histogram, s", more="one more than bins", repr=False)
-    counts: npt.NDArray[np.int64] = column("1", "intervals in the bin", "bin", name="count", dtype=np.int32)
+    counts: IntArray = column("1", "intervals in the bin", "bin", name="count", dtype=np.int32)
     autocorrelation: FloatArray = column(
         "1",
         "autocorrelation of the intervals",

@@ -22,10 +22,8 @@ from printhammer.run.problem import TOLERANCE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 PHASES: Final = (0.0, 0.5)
 """Sections at which orbits are looked for; the second one where the first falls into the pack."""
@@ -50,7 +48,7 @@ class Records:
 
     states: FloatArray
     """Displacement, m, and velocity, m/s; NaN where a run did not get. Shape (M, n, 2)."""
-    usable: npt.NDArray[np.bool_]
+    usable: BoolArray
     """Whether that is the whole state, shape (M, n)."""
 
 

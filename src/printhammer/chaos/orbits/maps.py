@@ -24,10 +24,8 @@ from printhammer.run.ensemble import Ensemble
 from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 _SPACING: Final = 1e-5
 """Distance of neighbours, in half-widths of the window."""
@@ -42,7 +40,7 @@ class ExactMaps:
         self.regime, self.tolerance = regime, tolerance
         self.threads = thread_count(threads)
 
-    def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
+    def __call__(self, states: FloatArray, firings: IntArray) -> Images:
         """Return the images of states, each after its own number of firings."""
 
         def image(i: int) -> Image:
@@ -64,7 +62,7 @@ class FastMaps:
         self.moments = regime.moments(self.drive, longest)
         self.scales = regime.window.half_widths
 
-    def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
+    def __call__(self, states: FloatArray, firings: IntArray) -> Images:
         """Return the images of states, each after its own number of firings."""
         images = Images.empty(len(states))
         step, hammer = _SPACING * self.scales, self.regime.hammer

@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
 
 CLOSED: Final = ""
 """What is told of an orbit that closes; of others it is the reason why it does not."""
@@ -36,8 +34,8 @@ class Images:
 
     states: FloatArray
     jacobians: FloatArray
-    smooth: npt.NDArray[np.bool_]
-    reasons: npt.NDArray[np.str_]
+    smooth: BoolArray
+    reasons: TextArray
 
     @classmethod
     def empty(cls, count: int) -> Images:
@@ -53,7 +51,7 @@ class Images:
 class StrobeMaps(Protocol):
     """Makes the images of states, shape (n, 2), each after its own number of firings, shape (n,)."""
 
-    def __call__(self, states: FloatArray, firings: npt.NDArray[np.int64]) -> Images:
+    def __call__(self, states: FloatArray, firings: IntArray) -> Images:
         """Return the images."""
 
 
@@ -63,7 +61,7 @@ class Guess:
 
     states: FloatArray
     """States at the starts of the segments, shape (m, 2)."""
-    firings: npt.NDArray[np.int64]
+    firings: IntArray
     """Number of firings in each segment, shape (m,)."""
 
 
@@ -89,7 +87,7 @@ class Closing(Guess):
 def close_orbits(
     maps: StrobeMaps,
     guesses: FloatArray,
-    firings: npt.NDArray[np.int64],
+    firings: IntArray,
     scales: FloatArray,
     *,
     goal: float,
@@ -114,9 +112,7 @@ def close_orbits(
 class _Search:
     """The state of Newton's method for many guesses; all distances in half-widths."""
 
-    def __init__(
-        self, maps: StrobeMaps, guesses: FloatArray, firings: npt.NDArray[np.int64], scales: FloatArray
-    ) -> None:
+    def __init__(self, maps: StrobeMaps, guesses: FloatArray, firings: IntArray, scales: FloatArray) -> None:
         count, self.segments = guesses.shape[:2]
         self.maps, self.firings, self.scales = maps, firings, scales
         self.z = guesses / scales
@@ -132,7 +128,7 @@ class _Search:
         self._take(every, *self._evaluate(self.z, every))
         self.open &= np.isfinite(self.residual)
 
-    def step(self, goal: float, enough: float) -> npt.NDArray[np.int64]:
+    def step(self, goal: float, enough: float) -> IntArray:
         """Try one step of every orbit that is open; return which those were."""
         self._end(self.open & (self.residual <= goal), CLOSED)
         rows = np.flatnonzero(self.open)
@@ -170,13 +166,11 @@ class _Search:
             for i in range(len(self.z))
         ]
 
-    def _end(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_], reason: str) -> None:
+    def _end(self, rows: IntArray | BoolArray, reason: str) -> None:
         self.reasons[rows] = reason
         self.open[rows] = False
 
-    def _evaluate(
-        self, z: FloatArray, rows: npt.NDArray[np.int64]
-    ) -> tuple[Images, FloatArray, FloatArray, npt.NDArray[np.str_]]:
+    def _evaluate(self, z: FloatArray, rows: IntArray) -> tuple[Images, FloatArray, FloatArray, TextArray]:
         """Return the images of all starts, the gaps to the starts that follow, their size, and reasons."""
         images = self.maps((z * self.scales).reshape(-1, 2), self.firings[rows].reshape(-1))
         ends = images.states.reshape(z.shape) / self.scales
@@ -189,12 +183,12 @@ class _Search:
 
     def _take(
         self,
-        rows: npt.NDArray[np.int64],
+        rows: IntArray,
         images: Images,
         defects: FloatArray,
         residual: FloatArray,
-        reasons: npt.NDArray[np.str_],
-        which: npt.NDArray[np.bool_] | None = None,
+        reasons: TextArray,
+        which: BoolArray | None = None,
     ) -> None:
         """Keep what was found at the new places, and find out where to go next."""
         chosen = np.ones(len(residual), np.bool_) if which is None else which
@@ -208,7 +202,7 @@ class _Search:
         self.reasons[rows[bad]] = reasons[chosen][bad]
         self._aim(rows[~bad])
 
-    def _aim(self, rows: npt.NDArray[np.int64]) -> None:
+    def _aim(self, rows: IntArray) -> None:
         """Solve the linear equations of the full step, and shorten it to the longest allowed."""
         m = self.segments
         matrix = np.zeros((len(rows), 2 * m, 2 * m))

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from printhammer.run.contacts import Contact, Dot
     from printhammer.run.ledger import Ledger
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 STABLE: Final = "stable"
 SADDLE: Final = "saddle"
@@ -72,7 +72,7 @@ class Orbit(Result):
     )
     x: FloatArray = column("m", "displacement at the firing", "firing")
     v: FloatArray = column("m/s", "velocity at the firing", "firing")
-    branch: npt.NDArray[np.int64] = column(
+    branch: IntArray = column(
         "1",
         "mode of motion at the firing",
         "firing",

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.run.regime import Firing
     from printhammer.run.window import Window
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress
 
 POINTS = 200
@@ -51,13 +51,13 @@ class Strobe(Result):
     drive: Drive = part("the drive")
     period: float = scalar("s", "time between firings")
     phase: float = scalar("1", "part of the period between a firing and its point")
-    firing: npt.NDArray[np.int64] = coordinate(
+    firing: IntArray = coordinate(
         "1", "number of the firing", "firing", more="the very first one is number 1", dtype=np.int32
     )
     t: FloatArray = column("s", "time", "firing")
     x: FloatArray = column("m", "displacement", "firing", more="nan where the run did not get")
     v: FloatArray = column("m/s", "velocity", "firing", more="nan where the run did not get")
-    branch: npt.NDArray[np.int64] = column(
+    branch: IntArray = column(
         "1",
         "mode of motion",
         "firing",
@@ -240,7 +240,7 @@ def points_of(series: Any, firing: Firing) -> Any:
 
 
 def strobe_of(
-    train: Train, firing: npt.NDArray[np.int64], states: States, tolerance: float, judged: Verdict | None
+    train: Train, firing: IntArray, states: States, tolerance: float, judged: Verdict | None
 ) -> Strobe:
     """Return the strobe points of a train, given its states at some firings and the verdict on it."""
     return Strobe(

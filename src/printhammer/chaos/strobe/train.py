@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress
 
 HELD_BRANCHES: Final = {
@@ -65,7 +65,7 @@ class Train:
         """Time between firings, s."""
         return self.regime.period
 
-    def times(self, firings: npt.NDArray[np.int64]) -> FloatArray:
+    def times(self, firings: IntArray) -> FloatArray:
         """Return the times of firings, s, the very first one being number 1."""
         if len(self.drive.times) > 1:
             return np.asarray(self.drive.times[firings - 1], dtype=np.float64)
@@ -79,7 +79,7 @@ class States:
     t: FloatArray
     x: FloatArray
     v: FloatArray
-    branch: npt.NDArray[np.int64]
+    branch: IntArray
     memory: FloatArray
     status: str
 
@@ -94,9 +94,7 @@ class States:
         )
 
 
-def pack_branches(
-    x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray
-) -> npt.NDArray[np.int64]:
+def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray) -> IntArray:
     """Return the branches of the pack on which states lie, 0 outside of it."""
     branches = np.where(x > front, branch, 0).astype(np.int64)
     for held, part_of in HELD_BRANCHES.items():
@@ -106,7 +104,7 @@ def pack_branches(
 
 def run_trains(
     trains: Sequence[Train],
-    chosen: npt.NDArray[np.int64],
+    chosen: IntArray,
     tolerance: float,
     judged: tuple[int, int] | None,
     *,

@@ -14,10 +14,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.derivatives.states import Exponent
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 LARGEST_PERIOD: Final = 64
 """Largest period that is looked for, in firings."""
@@ -137,7 +135,7 @@ def _finite(number: float) -> float | None:
 
 
 def repeats(
-    states: FloatArray, branches: npt.NDArray[np.int64], scales: FloatArray, longest: int = LARGEST_PERIOD
+    states: FloatArray, branches: IntArray, scales: FloatArray, longest: int = LARGEST_PERIOD
 ) -> FloatArray:
     """Return how far states q apart are from each other at most, for q from 1 on, shape (longest,).
 

@@ -15,14 +15,13 @@ from printhammer.figures.elements.style import BLUE, FAINT, HAIR, MUTED, TINY, n
 from printhammer.figures.paper.total_force import rigid_remark
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from printhammer.figures.elements.scales import Scale
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 _INSERTS: Final = ((0.52, 0.46), (0.44, 0.4), (0.36, 0.32), (0.3, 0.26))
 """Widths and heights that the insert may have, of the axes."""
@@ -68,7 +67,7 @@ def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 def _annotate(
     ax: Axes,
     motion: Motion,
-    late: npt.NDArray[np.bool_],
+    late: BoolArray,
     x: FloatArray,
     total: FloatArray,
     way: Scale,

@@ -29,11 +29,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 KINDS: Final = tuple(BENCHES)
 """What can be measured."""
@@ -83,7 +81,7 @@ class Measurement(Result):
     true: dict[str, FloatArray] = part(
         "what noise, resolution, offset and wrong readings have been added to, SI"
     )
-    outliers: npt.NDArray[np.int64] = part("rows with a wrong reading")
+    outliers: IntArray = part("rows with a wrong reading")
     hammer: Hammer = part("what was measured")
 
     @property

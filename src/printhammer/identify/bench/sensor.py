@@ -20,9 +20,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 FULL_SCALE: Final = "of full scale"
 READING: Final = "of reading"
@@ -158,9 +156,7 @@ def full_scale(true: FloatArray) -> float:
     return float(np.abs(true).max()) if true.size else 0.0
 
 
-def wrong_rows(
-    share: float, true: FloatArray, rng: np.random.Generator
-) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def wrong_rows(share: float, true: FloatArray, rng: np.random.Generator) -> tuple[IntArray, FloatArray]:
     """Draw which readings, a share of all, are wrong, ascending, and by how much.
 
     Errors are normal, a tenth of the full scale of what is there, SI.

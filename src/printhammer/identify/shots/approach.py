@@ -14,10 +14,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.identify.shots.shooting import Chain, Shooting
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _WIDE: Final = 10.0
 """Price of gaps at first: those of so many times the largest gap cost as much as all data together."""
@@ -35,7 +33,7 @@ _TRIES: Final = 2
 class Prior:
     """What is known of the parameters beside the records: normal, (p - mean) with a covariance."""
 
-    which: npt.NDArray[np.int64]
+    which: IntArray
     """Numbers of the parameters, shape (k,)."""
     mean: FloatArray
     """SI, shape (k,)."""
@@ -83,7 +81,7 @@ class Approach:
         self,
         shooting: Shooting,
         priors: Priors,
-        spikes: Sequence[npt.NDArray[np.bool_]],
+        spikes: Sequence[BoolArray],
     ) -> None:
         self.shooting = shooting
         self.priors = priors

@@ -22,10 +22,8 @@ from printhammer.identify.shots.identifiable import singular
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.identify.shots.shooting import Chain, Shooting
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 _MOST_STEPS: Final = 40
 _FULL: Final = 0.4
@@ -63,7 +61,7 @@ class Solution:
     by_parameter: list[FloatArray]
     """The model of each record, m, and its derivatives with respect to the parameters in their scales. Shape
     (n,) and (n, p)."""
-    outliers: list[npt.NDArray[np.bool_]]
+    outliers: list[BoolArray]
     """Samples left out."""
     scales: FloatArray
     memories: FloatArray
@@ -107,7 +105,7 @@ class GaussNewton:
         self,
         values: FloatArray,
         states: Sequence[FloatArray],
-        held: npt.NDArray[np.bool_] | None = None,
+        held: BoolArray | None = None,
         noise: Solution | None = None,
     ) -> Solution:
         """Find the parameters from values, SI, and states at the joints of each shot, each shape (j, 2).
@@ -275,7 +273,7 @@ class _Weighted:
 
     design: FloatArray
     residuals: FloatArray
-    outliers: list[npt.NDArray[np.bool_]]
+    outliers: list[BoolArray]
     scales: FloatArray
     memories: FloatArray
 

@@ -24,12 +24,10 @@ from printhammer.run.ensemble import Ensemble
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.shots.pulse import Pulse
     from printhammer.identify.shots.shot import Shot
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 _STEP: Final = 1e-7
 """Change for a difference quotient: relative of a constant, of a state in strokes and typical speeds."""
@@ -81,8 +79,8 @@ class _Plan:
     """Times of a shot: the grid, the rows of the samples in it, and the rows at which stretches begin."""
 
     grid: FloatArray
-    samples: npt.NDArray[np.int64]
-    begins: npt.NDArray[np.int64]
+    samples: IntArray
+    begins: IntArray
     tau: float
 
 

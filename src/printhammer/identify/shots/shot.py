@@ -21,11 +21,9 @@ from printhammer.units import from_si
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.tables import Readings
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 Surface = Literal["pack", "backstop"]
 
@@ -64,7 +62,7 @@ class Shot:
     """Times of the samples, s, ascending, 0 at the firing, and displacements, m. Shape (n,)."""
     current: FloatArray | None
     """Current, A, shape (n,), or None."""
-    lines: npt.NDArray[np.int64]
+    lines: IntArray
     """Line of the file of each sample, shape (n,)."""
     bandwidth: float | None
     """Of the sensor, Hz; None for one without delay."""
@@ -72,7 +70,7 @@ class Shot:
     """Of the displacement, m, from the differences of the samples."""
     touches: list[Touch]
     """Contacts in order; the first is the rest at the backstop, if there is one."""
-    joints: npt.NDArray[np.int64]
+    joints: IntArray
     """Rows at which the record is cut, shape (j,)."""
     states: FloatArray
     """Displacement, m, and velocity, m/s, there, as the record shows them. Shape (j, 2)."""

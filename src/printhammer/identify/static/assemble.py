@@ -16,10 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    import numpy.typing as npt
-
     from printhammer.identify.least_squares import Law, Solution
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 _WEAK: Final = 0.1
 """Relative standard error from which on a constant gets a profile."""
@@ -39,11 +37,11 @@ class Data:
     """SI, shape (m,)."""
     axes: tuple[tuple[str, str], tuple[str, str]]
     """Names and SI units."""
-    series: npt.NDArray[np.int64]
+    series: IntArray
     """Place in `series_names`, shape (m,)."""
     series_names: tuple[str, ...]
     """For the legend."""
-    lines: npt.NDArray[np.int64]
+    lines: IntArray
     """Lines of the files, shape (m,)."""
 
 

@@ -12,10 +12,8 @@ from printhammer.identify.least_squares import sandwich
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import numpy.typing as npt
-
     from printhammer.identify.least_squares import Solution
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 LEVEL: Final = 0.01
 """A law is said to be rejected where its data have less than this probability."""
@@ -29,7 +27,7 @@ _HARD_TO_TELL: Final = 30.0
 
 
 def judge(
-    solution: Solution, terms: Mapping[str, FloatArray], abscissa: FloatArray, series: npt.NDArray[np.int64]
+    solution: Solution, terms: Mapping[str, FloatArray], abscissa: FloatArray, series: IntArray
 ) -> tuple[float, str]:
     """Test a law against ones with one more term each, and its residuals for runs.
 

@@ -24,11 +24,9 @@ from printhammer.identify.tables import read_table
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy.typing as npt
-
     from printhammer.identify.result import Fit
     from printhammer.identify.tables import Readings
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
 
 _SPARE: Final = 4
 """Rows more than parameters, for the errors and the test of the law."""
@@ -205,7 +203,7 @@ def clusters(values: FloatArray) -> int:
     return groups if groups > 1 else 0
 
 
-def group_of(values: FloatArray) -> npt.NDArray[np.int64]:
+def group_of(values: FloatArray) -> IntArray:
     """Return to which of these groups each value belongs, from 0 for the least."""
     order = np.argsort(values, kind="stable")
     apart = np.diff(values[order]) > 0.05 * float(np.ptp(values))

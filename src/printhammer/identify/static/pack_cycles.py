@@ -12,10 +12,8 @@ from printhammer.identify.residuals import robust_scale
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.identify.tables import Readings
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _TURN: Final = 0.05
 """Part of the largest indentation by which it has to turn back before the sense counts as changed."""
@@ -28,11 +26,11 @@ _FALL: Final = 0.05
 class Cycles:
     """Branch and load cycle of each row."""
 
-    unloading: npt.NDArray[np.bool_]
+    unloading: BoolArray
     """Whether a row is on the unloading branch, shape (m,)."""
-    cycle: npt.NDArray[np.int64]
+    cycle: IntArray
     """Number of the load cycle, from 0, shape (m,)."""
-    unloaded: npt.NDArray[np.int64]
+    unloaded: IntArray
     """Cycles with rows of unloading inside the pack, ascending."""
 
 
@@ -55,7 +53,7 @@ def cycles_of(table: Readings) -> Cycles:
     return Cycles(unloading, cycle, np.unique(cycle[unloading & (depth > 0.0)]))
 
 
-def _by_sense(depth: FloatArray) -> npt.NDArray[np.bool_]:
+def _by_sense(depth: FloatArray) -> BoolArray:
     """Return which rows come after a largest indentation and before the next smallest one."""
     unloading = np.zeros(len(depth), dtype=bool)
     least = _TURN * float(np.ptp(depth))

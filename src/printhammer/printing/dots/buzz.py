@@ -27,11 +27,10 @@ from printhammer.run.simulate import simulate
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy.typing as npt
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.ensemble import DotTable
     from printhammer.run.motion import Motion
+    from printhammer.support.arrays import BoolArray
 
 MAX_CURRENT: Final = 2.0
 """Largest coil current of a train, A: the range of the paper's Fig. 2."""
@@ -229,7 +228,7 @@ def delayed_trains(
     pulses: int,
     *,
     states: Sequence[tuple[float, float]] | None = None,
-    hopeless: Callable[[DotTable, list[int]], npt.NDArray[np.bool_]] | None = None,
+    hopeless: Callable[[DotTable, list[int]], BoolArray] | None = None,
     **options: Any,
 ) -> list[tuple[float, ...]]:
     """Return the trains of many hammers and delays, built side by side; see `delayed_train`.

@@ -17,8 +17,6 @@ from printhammer.reconstruction.search.space import CURRENT, PRINT_FORCE
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    import numpy.typing as npt
-
     from printhammer.support.arrays import FloatArray
 
 APART: Final = 0.1
@@ -109,7 +107,7 @@ def choose(
         Numbers of the chosen, the first candidate that is accepted first; the same for the same tables.
     """
     total = len(tables[0]) if tables else 0
-    nearest: npt.NDArray[np.float64] = np.full(total, np.inf)
+    nearest: FloatArray = np.full(total, np.inf)
     open_ = np.ones(total, dtype=np.bool_)
     chosen: list[int] = []
     while len(chosen) < count:

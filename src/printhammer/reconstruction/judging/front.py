@@ -14,20 +14,20 @@ from printhammer.results import Result, column, coordinate, scalar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
+    from printhammer.support.arrays import BoolArray, IntArray
 
 
 class Front(Result):
     """Judged hammers by panels of Fig. 11 and other claims that hold: the Pareto front and the rest."""
 
-    candidate: npt.NDArray[np.int64] = coordinate(
+    candidate: IntArray = coordinate(
         "1", "number of the judged hammer", "hammer", more="in the order of the logs, the first is number 1"
     )
-    panels: npt.NDArray[np.int64] = column("1", "verdicts of Fig. 11 as printed, of twelve", "hammer")
-    others: npt.NDArray[np.int64] = column("1", "other claims that hold", "hammer")
-    stated: npt.NDArray[np.bool_] = column("1", "whether all other stated claims hold", "hammer")
-    buzzes: npt.NDArray[np.bool_] = column("1", "whether it buzz-prints", "hammer")
-    on_front: npt.NDArray[np.bool_] = column(
+    panels: IntArray = column("1", "verdicts of Fig. 11 as printed, of twelve", "hammer")
+    others: IntArray = column("1", "other claims that hold", "hammer")
+    stated: BoolArray = column("1", "whether all other stated claims hold", "hammer")
+    buzzes: BoolArray = column("1", "whether it buzz-prints", "hammer")
+    on_front: BoolArray = column(
         "1", "whether no other hammer has as many panels and as many other claims, and more of one", "hammer"
     )
     core_time: float = scalar("s", "time of one core that the searches took")
