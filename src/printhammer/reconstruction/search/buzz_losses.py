@@ -20,10 +20,12 @@ from printhammer.reconstruction.search.space import geometry
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy.typing as npt
+
     from printhammer.reconstruction.search.candidates import Candidate
     from printhammer.reconstruction.search.losses import Score
     from printhammer.run.ensemble import DotTable
-    from printhammer.support.arrays import BoolArray, FloatArray
+    from printhammer.support.arrays import FloatArray
 
 DELAYS: Final = np.arange(0.0, 240e-6, 6e-6)
 """Delays tried, s."""
@@ -63,7 +65,9 @@ def buzz(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
         forces = np.array([score.measured["force"] for score in own])[rows]
         patience = PATIENCE * np.array([score.measured["leaving"] for score in own])[rows]
 
-        def hopeless(dots: DotTable, numbers: list[int], forces: FloatArray = forces) -> BoolArray:
+        def hopeless(
+            dots: DotTable, numbers: list[int], forces: FloatArray = forces
+        ) -> npt.NDArray[np.bool_]:
             """Tell which trains have too many dots outside the limits for six in a row to be left."""
             relative = dots.peak_force / forces[numbers][:, np.newaxis]
             inside = (relative >= low) & (relative <= high)
@@ -96,7 +100,7 @@ def _judged(
     patience: FloatArray,
     forces: FloatArray,
     limits: tuple[float, float],
-) -> tuple[FloatArray, BoolArray]:
+) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """Return what each dot of each train counts, and whether the backstop is touched before it."""
     drives = [
         PulseTrain(some[row // len(DELAYS)].waveform, at=list(times)) for row, times in enumerate(trains)
@@ -122,7 +126,7 @@ def _judged(
     return counts, touched
 
 
-def _longest(inside: BoolArray) -> int:
+def _longest(inside: npt.NDArray[np.bool_]) -> int:
     """Return the length of the longest run of truth."""
     best = run = 0
     for each in inside.tolist():
@@ -131,7 +135,7 @@ def _longest(inside: BoolArray) -> int:
     return best
 
 
-def _best(counts: FloatArray, touched: BoolArray, fewest: int) -> float:
+def _best(counts: FloatArray, touched: npt.NDArray[np.bool_], fewest: int) -> float:
     """Return the most that so many dots in a row count, touches between them taken off."""
     sums = [
         float(counts[first : first + fewest].sum() - _TOUCH * touched[first + 1 : first + fewest].sum())

@@ -24,8 +24,10 @@ from printhammer.run.ensemble import Ensemble
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy.typing as npt
+
     from printhammer.reconstruction.search.candidates import Candidate
-    from printhammer.support.arrays import FloatArray, IntArray
+    from printhammer.support.arrays import FloatArray
 
 FIRINGS: Final = 360
 """Firings of each panel in the search; the claims themselves are about more."""
@@ -139,7 +141,7 @@ def _share(states: FloatArray) -> float:
     return float(((x >= left) & (x <= right) & (v >= low) & (v <= high)).mean())
 
 
-def _panel(states: FloatArray, branch: IntArray, printed: str) -> tuple[float, str, int]:
+def _panel(states: FloatArray, branch: npt.NDArray[np.int64], printed: str) -> tuple[float, str, int]:
     """Return loss and name of the verdict that a short train suggests, and the period of an orbit to seek.
 
     The last is 0 unless the loss is to be that of an orbit which the train does not settle on.
