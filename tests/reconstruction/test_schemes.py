@@ -15,7 +15,7 @@ from printhammer.reconstruction.results import Schemes, shipped_results
 def test_changes_are_counted_with_panels_of_a_hammer_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     names = {0: ["period-1"] * 12, 1: ["strange"] * 12}
     other = {0: ["period-1"] * 6 + ["strange"] * 6, 1: ["strange"] * 12}
-    monkeypatch.setattr(module, "draw", lambda count, seed: list(range(count)))
+    monkeypatch.setattr(module, "drawn_workable", lambda count, seed: list(range(count)))
     monkeypatch.setattr(module, "hammer_of", lambda number: number)
     monkeypatch.setattr(
         module, "panel_verdicts", lambda which, way: (names if way == EXACT else other)[which]

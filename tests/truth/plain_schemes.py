@@ -91,6 +91,8 @@ def strobed(
         if small and short == 0 and reading == "grid":
             short = 10
         h = 1e-6 if small else 20e-6 if late else 10e-6
+        if reading == "firings":
+            h = min(h, (math.floor(t / period + 1e-9) + 1) * period - t)
         x1, v1 = step(f, t, x, v, h, peak)
         if h > 1e-6 and not inside and x1 < b and reading != "inside":
             h = 1e-6

@@ -44,7 +44,7 @@ def test_the_first_firings(hammer: ph.Hammer, scheme: Scheme, reading: Reading) 
 def test_the_verdict_on_a_panel(period: float, scheme: Scheme) -> None:
     hammer, firings = ph.load("hendriks-1983"), (401, 500)
     (mine,) = scheme_strobes(hammer, [period], scheme, points=500, firings=firings)
-    states = plain(hammer, period, firings[1], scheme)[firings[0] - 1 :]
+    states = plain(hammer, period, firings[1], scheme, "firings")[firings[0] - 1 :]
     assert mine.verdict is not None
     assert mine.verdict.period is not None
     width, speed = mine.window.half_widths

@@ -30,12 +30,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Scheme = Literal["trapezoid", "runge-kutta-4"]
-Reading = Literal["look-ahead", "inside", "grid", "no-late-step"]
+Reading = Literal["look-ahead", "inside", "grid", "no-late-step", "firings"]
 READINGS: Final[tuple[Reading, ...]] = get_args(Reading)
 """When the short step is taken. "look-ahead": where x < b, or where the next free step would end there.
 "inside": only where x < b, so that the first step into the backstop is a long one. "grid": a free step that
 begins or would end there is made of ten short ones, so that free steps always begin on a grid of 10 us.
-"no-late-step": as the first, with short steps late in the settle-out too."""
+"no-late-step": as the first, with short steps late in the settle-out too. "firings": as the first, and a step
+ends at each firing, where the state of Fig. 11 is read."""
 
 FREE_STEP = 10e-6
 """Step off the backstop, s."""
@@ -327,6 +328,8 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
             if reading == 2 and h == steps[1] and short == 0:
                 short = 10
             h = min(h, t_end - time)
+            if reading == 4 and fired[0] < firings.size:
+                h = min(h, firings[fired[0]] - time)
             new_place, new_speed, solved = step(time, place, speed, h, peak, model)
             ends_inside = not (solved and new_place >= position)
             if reading != 1 and not inside and h > steps[1] and ends_inside:

@@ -40,7 +40,7 @@ def scheme_strobes(
     periods: Sequence[float | str],
     scheme: Scheme,
     *,
-    reading: Reading = "look-ahead",
+    reading: Reading = "firings",
     points: int = POINTS,
     firings: tuple[int, int] = (FIRST, LAST),
     progress: Progress | None = None,

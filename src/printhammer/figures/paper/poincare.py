@@ -42,7 +42,7 @@ def poincare(
     points: int = POINTS,
     printed: Mapping[float, str] | None = None,
     scheme: Scheme | None = None,
-    reading: Reading = "look-ahead",
+    reading: Reading = "firings",
 ) -> Figure:
     """Draw Fig. 11: the states at the first firings of trains, a panel for each strobe time.
 

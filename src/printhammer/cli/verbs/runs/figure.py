@@ -27,9 +27,9 @@ def figure(
         default="exact",
     ),
     reading: str = opt.choice(
-        "look-ahead|inside|grid|no-late-step",
+        "firings|look-ahead|inside|grid|no-late-step",
         "With that: when its short step is taken, into and out of the backstop.",
-        default="look-ahead",
+        default="firings",
     ),
 ) -> Answer:
     """Draw a figure of the paper as SVG, PNG and PDF."""
@@ -39,7 +39,7 @@ def figure(
     entry = FIGURES.get(opt.read_whole(number, "figure"))
     if entry is None:
         raise InputError(f"figure = {number}: expected one of {', '.join(map(str, FIGURES))}")
-    if scheme == "exact" and reading != "look-ahead":
+    if scheme == "exact" and reading != "firings":
         raise InputError(
             f"--reading = {reading}, expected it with --scheme, since the exact motion has no step"
         )
