@@ -20,7 +20,7 @@ from printhammer.results import Result, column, part
 from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job, kernel_of
 from printhammer.run.problem import TOLERANCE, check_tolerance, laws_of
 from printhammer.run.start import check_branch, initial_state
-from printhammer.support.threads import PIECES_A_THREAD, in_threads, thread_count
+from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, thread_count
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-    from printhammer.support.threads import Progress
 
 __all__ = ["DISPLAY_TOLERANCE", "MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
 

@@ -18,12 +18,11 @@ from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, column, derived, part, provenance, scalar
-from printhammer.run.regime import Regime
+from printhammer.run.regime import Firing, Regime
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray, IntArray
 
 BINS: Final = 60
