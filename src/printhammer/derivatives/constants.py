@@ -7,70 +7,52 @@ tangent flow of the state (`printhammer.derivatives.states`). docs/tangent.md ha
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.derivatives.flow import carry_columns, forcing_of
-from printhammer.derivatives.parameters import as_arrays, parameters, rest_changes
+from printhammer.derivatives.flow import Flow, carry_columns, forcing_of
+from printhammer.derivatives.parameters import Parameter, as_arrays, parameters, rest_changes
 from printhammer.derivatives.states import components, problem_between, state_of
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION
 from printhammer.kernel.variational.layout import SPACING
-from printhammer.run.problem import TOLERANCE
+from printhammer.results import Declared, part, scalar
+from printhammer.run.problem import TOLERANCE, Problem, Record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.derivatives.flow import Flow
-    from printhammer.derivatives.parameters import Parameter
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.problem import Problem, Record
     from printhammer.support.arrays import FloatArray
 
 
-@dataclass(frozen=True)
-class ConstantMap:
+class ConstantMap(Declared):
     """The derivative of the state at one time with respect to constants.
 
-    Attributes
-    ----------
-    matrix : array, shape (2 or 3, n)
-        d(state at the end) / d(constant), SI, the state at the start staying as it is; NaN if the run did
-        not get to the end. The state is displacement, m, velocity, m/s, and on the unloading branch of a
-        pack with memory the displacement of the latest local maximum, m.
-    constants : tuple of str
-        Names of the constants, in the order of the columns.
-    values : array, shape (n,)
-        Their values, SI.
-    start, end : float
-        Times, s.
-    state_at_start, state_at_end : tuple of float
-        Displacement, m, velocity, m/s, and latest local maximum, m (0 where it is not part of the state).
-    rate_at_start, rate_at_end : array, shape (2 or 3,)
-        Rates of the state in time, just after any switch there.
-    smooth : bool
-        False where the motion in between passes a touch without velocity.
-    status : str
-        How the run ended.
+    The state is that of `printhammer.derivatives.states.TangentMap`.
     """
 
-    matrix: FloatArray
-    constants: tuple[str, ...]
-    values: FloatArray
-    start: float
-    end: float
-    state_at_start: tuple[float, float, float]
-    state_at_end: tuple[float, float, float]
-    rate_at_start: FloatArray = field(repr=False)
-    rate_at_end: FloatArray = field(repr=False)
-    smooth: bool
-    status: str
+    matrix: FloatArray = part(
+        "derivative d(state at the end) / d(constant), SI, the state at the start held, shape (2 or 3, n)",
+        more="NaN if the run did not get to the end",
+    )
+    constants: tuple[str, ...] = part("names of the constants, in the order of the columns")
+    values: FloatArray = part("their values, SI, shape (n,)")
+    start: float = scalar("s", "time at the start")
+    end: float = scalar("s", "time at the end")
+    state_at_start: tuple[float, float, float] = part("the state there, as of a tangent map")
+    state_at_end: tuple[float, float, float] = part("the state there, as of a tangent map")
+    rate_at_start: FloatArray = part(
+        "rates of the state in time, just after any switch there, shape (2 or 3,)", repr=False
+    )
+    rate_at_end: FloatArray = part("the same at the end", repr=False)
+    smooth: bool = part("False where the motion in between passes a touch without velocity")
+    status: str = part("how the run ended")
 
     @property
     def ok(self) -> bool:
@@ -168,25 +150,9 @@ def flow(
     initial: FloatArray,
     nodes: Sequence[int] = (),
 ) -> Flow:
-    """Carry the columns of constants along a recorded run.
+    """Carry the columns of constants along a recorded run; arguments as for `carry_columns`.
 
-    Parameters
-    ----------
-    problem, record : Problem, Record
-        The run.
-    wanted : sequence of Parameter
-        The constants.
-    marks : array, shape (m,)
-        Ascending times, s; the columns begin at the first.
-    initial : array, shape (3, n)
-        Changes of displacement, m, velocity, m/s, and latest local maximum, m, at the first mark.
-    nodes : sequence of int, optional
-        Ascending numbers of nodes of the record at which to look as well.
-
-    Returns
-    -------
-    Flow
-        NaN where the run did not get; changes per ``value / scale`` of each constant.
+    The changes are those with ``value / scale`` of each constant.
     """
     forcing = forcing_of(problem, as_arrays(wanted))
     return carry_columns(problem, [record], marks, initial, forcing, nodes=nodes)
@@ -222,16 +188,8 @@ def pack_push_changes(
 ) -> FloatArray:
     """Return the changes [N] of the push of the pack on the armature, shape (n,).
 
-    Parameters
-    ----------
-    problem : Problem
-        A hammer with a pack.
-    wanted : sequence of Parameter
-        The constants.
-    state : array, shape (4,)
-        Displacement, m, velocity, m/s, mode inside the pack, latest local maximum, m.
-    changes : array, shape (3 or more, n)
-        Changes of displacement, velocity and latest local maximum.
+    At a state inside the pack, a row of `Flow.states`, from the changes there of displacement, velocity and
+    latest local maximum, shape (3 or more, n).
     """
     moves = as_arrays(wanted)["hammer"]
     return np.array(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.derivatives.constants import flow, pack_push_changes, pack_push_rate, surface_moves
+from printhammer.results import Declared, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,19 +53,14 @@ _SAMPLES: Final = 65
 _NEAR: Final = 1e-6
 
 
-@dataclass(frozen=True)
-class Struck:
+class Struck(Declared):
     """One dot that was struck: its contacts, by their rows, and the instants at which to look."""
 
-    index: int
-    """Number of the firing."""
-    touch: int
-    """Row of the contact with the pack."""
-    back: int | None
-    """Row of the first touch of the backstop after it."""
-    t_peak: float
-    t_force: float
-    """Times of the largest indentation and of the largest force, s."""
+    index: int = part("number of the firing")
+    touch: int = part("row of the contact with the pack")
+    back: int | None = part("row of the first touch of the backstop after it")
+    t_peak: float = scalar("s", "time of the largest indentation")
+    t_force: float = scalar("s", "time of the largest force")
 
 
 def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck]:
@@ -175,33 +171,20 @@ def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
     return (math.fsum(forces.values()) + drive) / problem.hammer.mass
 
 
-@dataclass(frozen=True)
-class Changes:
+class Changes(Declared):
     """Changes with ``value / scale`` of each constant."""
 
-    dots: FloatArray
-    """Of `DOT_QUANTITIES`; NaN where a dot is lost or a quantity is not known. Shape (dots, quantities,
-    n)."""
-    run: FloatArray
-    """Of `RUN_QUANTITIES`, shape (4, n)."""
-    smooth: bool
-    """Whether the motion is differentiable throughout."""
+    dots: FloatArray = part(
+        "of `DOT_QUANTITIES`, shape (dots, quantities, n)", more="NaN where a dot is lost or one is not known"
+    )
+    run: FloatArray = part("of `RUN_QUANTITIES`, shape (4, n)")
+    smooth: bool = part("whether the motion is differentiable throughout")
 
 
 def changes_of(
     motion: Motion, problem: Problem, record: Record, wanted: Sequence[Parameter], initial: FloatArray
 ) -> Changes:
-    """Return the changes of all quantities of a run.
-
-    Parameters
-    ----------
-    motion, problem, record
-        The run.
-    wanted : sequence of Parameter
-        The constants.
-    initial : array, shape (3, n)
-        Changes of the state at time 0.
-    """
+    """Return the changes of all quantities of a run from those of its state at time 0, shape (3, n)."""
     struck = struck_dots(motion, problem, record)
     times = record.nodes[:, 0]
     end = float(times[-1])

@@ -5,7 +5,6 @@ In a second pass over the record of a run, so that runs which do not ask for der
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -14,6 +13,7 @@ from printhammer.kernel.compile.variational import variational
 from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, SPRING
 from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
 from printhammer.kernel.variational import layout as V
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -25,27 +25,26 @@ _VALUE_SPACING: Final = 1e-3
 """Share of the largest pulse by which a drive is moved to see what it does to the force."""
 
 
-@dataclass(frozen=True)
-class Flow:
+class Flow(Declared):
     """Columns along a run, at times that are called marks."""
 
-    states: FloatArray
-    """Displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks. Shape (m, 4)."""
-    changes: FloatArray
-    """Changes at the marks: displacement, m; velocity, m/s; latest local maximum, m; with constants also work
-    of coil and of a drive force, loss in pack and backstop, J, since the first mark. Shape (m, 3 or 7, n)."""
-    growth: FloatArray
-    """Logarithms of the growth of columns that were kept orthonormal, each since the mark before. Shape (m,
-    n)."""
-    passed: FloatArray
-    """The changes at chosen nodes of the record, before and after the switch there. Shape (q, 2, 3 or 7,
-    n)."""
-    columns: FloatArray
-    """The changes at the last mark, shape (3 or 7, n)."""
-    smooth: bool
-    """Whether the motion is differentiable from the first mark to the last."""
-    status: int
-    """Code of how the run ended."""
+    states: FloatArray = part(
+        "displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks, shape (m, 4)"
+    )
+    changes: FloatArray = part(
+        "changes at the marks, shape (m, 3 or 7, n): displacement, m; velocity, m/s; latest local maximum, m;"
+        " with constants also work of coil and of a drive force, loss in pack and backstop, J, since the"
+        " first mark"
+    )
+    growth: FloatArray = part(
+        "logarithms of the growth of columns kept orthonormal, each since the mark before, shape (m, n)"
+    )
+    passed: FloatArray = part(
+        "changes at chosen nodes of the record, before and after the switch there, shape (q, 2, 3 or 7, n)"
+    )
+    columns: FloatArray = part("the changes at the last mark, shape (3 or 7, n)")
+    smooth: bool = part("whether the motion is differentiable from the first mark to the last")
+    status: int = part("code of how the run ended")
 
     @property
     def status_name(self) -> str:
@@ -63,14 +62,12 @@ def carry_columns(
     nodes: Sequence[int] = (),
     renormalise: bool = False,
 ) -> Flow:
-    """Carry columns along a run, from the first mark to the last.
+    """Carry columns along a run, from the first mark to the last; NaN where the run did not get.
 
     Parameters
     ----------
-    problem : Problem
-        The run.
-    stretches : iterable of Stretch or Record
-        Its record.
+    problem, stretches
+        The run, and its record.
     marks : array, shape (m,)
         Ascending times, s.
     initial : array, shape (3, n)
@@ -81,11 +78,6 @@ def carry_columns(
         Ascending numbers of nodes at which to look as well, of a record in one piece.
     renormalise : bool, optional
         Whether to keep the columns orthonormal and to note their growth.
-
-    Returns
-    -------
-    Flow
-        NaN where the run did not get.
     """
     forced, count = forcing is not None, initial.shape[1]
     rows = V.ROWS if forced else V.ENERGY

@@ -12,15 +12,15 @@ of its range. A part need not know of them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.drive.waveforms.shapes import Sine
+from printhammer.drive.waveforms.shapes import Sine, Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.names import PERIOD, TIMING, quantities_of, unknown
+from printhammer.results import Declared, part
 from printhammer.run.problem import constants_of, scales_of
 from printhammer.support.constants import quantities
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
@@ -44,27 +43,22 @@ _MOST_SINGLE: Final = 20
 """Largest number of uneven firings whose times are listed one by one."""
 
 
-@dataclass(frozen=True)
-class Parameter:
+class Parameter(Declared):
     """A constant of a hammer under a drive, and the changes that it makes."""
 
-    name: str
-    """Such as "pack.stiffness", "waveform.width", "period", "firing.1"."""
-    value: float
-    """In SI."""
-    scale: float
-    """Unit in which it is changed, SI: its absolute value, or what is typical of its dimension for the motion
-    where that is zero."""
-    unit: str
-    """SI unit."""
-    meaning: str
-    """One phrase."""
-    hammer: FloatArray = field(repr=False)
-    """Change of the packed constants with ``value / scale``, shape (h,)."""
-    firings: FloatArray = field(repr=False)
-    """Change of the firing times [s], shape (f,)."""
-    pieces: FloatArray = field(repr=False)
-    """Change of the tables of the waveforms, see `Drive.kernel_arrays`. Shape (m, 6)."""
+    name: str = part('such as "pack.stiffness", "waveform.width", "period", "firing.1"')
+    value: float = part("in SI")
+    scale: float = part(
+        "unit in which it is changed, SI: its absolute value, or what is typical of its dimension for the"
+        " motion where that is zero"
+    )
+    unit: str = part("SI unit")
+    meaning: str = part("one phrase")
+    hammer: FloatArray = part("change of the packed constants with ``value / scale``, shape (h,)", repr=False)
+    firings: FloatArray = part("change of the firing times [s], shape (f,)", repr=False)
+    pieces: FloatArray = part(
+        "change of the tables of the waveforms, see `Drive.kernel_arrays`, shape (m, 6)", repr=False
+    )
 
 
 def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
@@ -87,17 +81,7 @@ def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
 def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Parameter]:
     """Return constants by name, with the changes that they make.
 
-    Parameters
-    ----------
-    hammer, drive : Hammer, Drive
-        Whose constants they are.
-    names : sequence of str
-        Such as `parameter_names` lists, or "rate".
-
-    Returns
-    -------
-    list of Parameter
-        One for each name.
+    Names are such as `parameter_names` lists, or "rate".
 
     Raises
     ------

@@ -13,7 +13,7 @@ import numpy as np
 
 from printhammer.derivatives.constants import rest_columns
 from printhammer.derivatives.dots import DOT_QUANTITIES, RUN_QUANTITIES, changes_of, dot_values
-from printhammer.derivatives.parameters import parameter_names, parameters
+from printhammer.derivatives.parameters import Parameter, parameter_names, parameters
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.hammer.names import unknown
@@ -26,7 +26,6 @@ from printhammer.run.start import initial_state
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from printhammer.derivatives.parameters import Parameter
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
@@ -273,16 +272,11 @@ def sensitivities(
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
-    drive : Drive
-        The drive.
+    hammer, drive, duration
+        As for `printhammer.simulate`.
     constants : sequence of str, optional
         Names such as "pack.stiffness", "waveform.width", "period", "rate" or "firing.1" (the second firing;
         they are counted from 0); by default all of the hammer, of the pulse and of the firing times.
-    duration : float or str, optional
-        End of the run, s, or text with a unit; by default 4 ms after the last firing, and required for a
-        drive that does not end.
     state : tuple of float, optional
         Displacement, m, and velocity, m/s, at time 0, which then do not change with the constants; by
         default the rest state, which does.

@@ -8,7 +8,6 @@ for it pay nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -18,9 +17,10 @@ from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.modes import HELD_UNLOADING, OK, RELOADING, STATUS_NAMES, UNLOADING
+from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.start import initial_state
-from printhammer.support.threads import in_threads, thread_count
+from printhammer.support.threads import Progress, in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Progress
 
 _NODES: Final = 4096
 _WARM_UP: Final = 100
@@ -38,38 +37,28 @@ _FEWEST: Final = 8
 """Growths below which their scatter says nothing."""
 
 
-@dataclass(frozen=True)
-class TangentMap:
+class TangentMap(Declared):
     """The derivative of the state at one time with respect to the state at an earlier one.
 
     The state is displacement, m, and velocity, m/s; on the unloading branch of a pack with memory also the
-    displacement of the latest local maximum, m.
-
-    Attributes
-    ----------
-    matrix : array, shape (2 or 3, 2 or 3)
-        d(state at the end) / d(state at the start); NaN if the run did not get to the end.
-    start, end : float
-        Times, s.
-    state_at_start, state_at_end : tuple of float
-        Displacement, m, velocity, m/s, and latest local maximum, m (0 where it is not part of the state).
-    branch_at_start, branch_at_end : int
-        Codes of the modes, see `printhammer.kernel.model.modes`; -1 where the run did not get.
-    smooth : bool
-        False where the motion in between passes a touch without velocity, where the state has no derivative.
-    status : str
-        How the run ended.
+    displacement of the latest local maximum, m (0 in `state_at_start` and `state_at_end` where it is not part
+    of the state).
     """
 
-    matrix: FloatArray
-    start: float
-    end: float
-    state_at_start: tuple[float, float, float]
-    state_at_end: tuple[float, float, float]
-    branch_at_start: int
-    branch_at_end: int
-    smooth: bool
-    status: str
+    matrix: FloatArray = part(
+        "derivative d(state at the end) / d(state at the start), shape (2 or 3, 2 or 3)",
+        more="NaN if the run did not get to the end",
+    )
+    start: float = scalar("s", "time at the start")
+    end: float = scalar("s", "time at the end")
+    state_at_start: tuple[float, float, float] = part("the state there")
+    state_at_end: tuple[float, float, float] = part("the state there")
+    branch_at_start: int = part("code of the mode, see `printhammer.kernel.model.modes`")
+    branch_at_end: int = part("the same at the end", more="-1 where the run did not get")
+    smooth: bool = part(
+        "False where the motion in between passes a touch without velocity, where the state has no derivative"
+    )
+    status: str = part("how the run ended")
 
     @property
     def ok(self) -> bool:
@@ -93,44 +82,34 @@ class TangentMap:
         return float(np.linalg.det(self.matrix))
 
 
-@dataclass(frozen=True)
-class Exponent:
-    """Exponents of a strobe map: mean logarithms of the growth of small changes from firing to firing.
+class Exponent(Declared):
+    """Exponents of a strobe map: mean logarithms of the growth of small changes from firing to firing."""
 
-    Attributes
-    ----------
-    value : float
-        The largest exponent, per firing; minus infinity where the motion forgets its past altogether, NaN if
-        the run did not get through.
-    standard_error : float
-        Of the value, from the scatter of overlapping batch means; infinite for fewer than eight firings.
-    second : float
-        The other exponent of the plane of displacement and velocity, per firing. A third one, that of the
-        memory of the pack, is minus infinity: every contact meets fresh paper.
-    period : float
-        Time between firings, s.
-    factors : array
-        Logarithm of the growth from each firing to the next.
-    smooth : bool
-        False where the motion passes a touch without velocity, where it has no derivative.
-    status : str
-        How the run ended.
-    second_factors : array
-        As `factors`, for the second exponent.
-    states : array, shape (number of factors + 1, 4)
-        Displacement, m, velocity, m/s, mode, and displacement of the latest local maximum, m, at the firings;
-        NaN where the run did not get.
-    """
-
-    value: float
-    standard_error: float
-    second: float
-    period: float
-    factors: FloatArray
-    smooth: bool
-    status: str
-    second_factors: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
-    states: FloatArray = field(default_factory=lambda: np.zeros((0, 4)), repr=False)
+    value: float = part(
+        "the largest exponent, per firing",
+        more="minus infinity where the motion forgets its past, NaN if the run did not get through",
+    )
+    standard_error: float = part(
+        "of the value, from the scatter of overlapping batch means; infinite for fewer than eight firings"
+    )
+    second: float = part(
+        "the other exponent of the plane of displacement and velocity, per firing",
+        more="a third, that of the memory of the pack, is minus infinity: every contact meets fresh paper",
+    )
+    period: float = scalar("s", "time between firings")
+    factors: FloatArray = part("logarithm of the growth from each firing to the next")
+    smooth: bool = part("False where the motion passes a touch without velocity, where it has no derivative")
+    status: str = part("how the run ended")
+    second_factors: FloatArray = part(
+        "as `factors`, for the second exponent", repr=False, default_factory=lambda: np.zeros(0)
+    )
+    states: FloatArray = part(
+        "displacement, m, velocity, m/s, mode, and latest local maximum, m, at the firings, shape"
+        " (number of factors + 1, 4)",
+        more="NaN where the run did not get",
+        repr=False,
+        default_factory=lambda: np.zeros((0, 4)),
+    )
 
     @property
     def ok(self) -> bool:
@@ -245,8 +224,8 @@ def strobe_exponent(
 
     Parameters
     ----------
-    hammer : Hammer
-        The hammer.
+    hammer, state, tolerance
+        As for `tangent_map`.
     waveform_or_drive : Waveform or Drive
         What is fired every `period`; or a drive, whose firings are taken if it has several, and else the
         multiples of the period after its first.
@@ -254,10 +233,6 @@ def strobe_exponent(
         Time between firings, s; for a drive by default its own.
     first, last : int
         Numbers of the firings between which growth counts, the very first firing being 1.
-    state : tuple of float, optional
-        Displacement, m, and velocity, m/s, at time 0; by default the rest state.
-    tolerance : float, optional
-        Error allowed in one step of the run.
 
     Returns
     -------
@@ -316,10 +291,8 @@ def strobe_exponents(
         What every firing does.
     periods : array
         Times between firings, s.
-    first, last : int
+    first, last, tolerance
         As for `strobe_exponent`.
-    tolerance : float, optional
-        Error allowed in one step of a run.
     threads : int, optional
         Number of threads; by default that of the cores.
     progress : callable, optional
@@ -333,7 +306,7 @@ def strobe_exponents(
     Raises
     ------
     InputError
-        An argument is not what is described above.
+        As for `strobe_exponent`, or numbers of hammers and periods that do not fit together.
     """
     spacings = np.atleast_1d(np.asarray(periods, dtype=np.float64))
     many = [hammers] * len(spacings) if isinstance(hammers, Hammer) else list(hammers)

@@ -84,6 +84,14 @@ def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
     return count
 
 
+def read_array(values: npt.ArrayLike, name: str, what: str = "numbers") -> FloatArray:
+    """Read numbers, of any shape, as a new array; InputError where they are none."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {values!r}, expected {what}") from None
+
+
 def even_times(
     rate: float | str | None, period: float | str | None, count: int
 ) -> tuple[FloatArray, tuple[str, float], float]:

@@ -17,6 +17,7 @@ from printhammer.errors import InputError
 from printhammer.maps.layout import hammer_attributes, map_dataset, matching, on_times
 from printhammer.results.provenance import provenance
 from printhammer.run.problem import TOLERANCE
+from printhammer.run.regime import waveform_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -102,9 +103,7 @@ def frequency_map(
     """
     from printhammer.run.ensemble import Ensemble
 
-    fired = hammer.waveform if waveform is None else waveform
-    if fired is None:
-        raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+    fired = waveform_of(hammer, waveform)
     grid = _rates(rates)
     count = read_count(pulses, "pulses")
     moments = _times(times, (count - 1) / float(grid[0]) + TAIL)

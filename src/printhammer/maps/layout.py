@@ -50,20 +50,10 @@ def map_dataset(
     attributes: Mapping[str, Any],
     notes: Mapping[str, Mapping[str, str]] | None = None,
 ) -> xr.Dataset:
-    """Return a map as a Dataset.
+    """Return a map as a Dataset over rates, Hz, and times from the first firing, s.
 
-    Parameters
-    ----------
-    rates : array, shape (R,)
-        Firing rates, Hz.
-    times : array, shape (T,)
-        Times from the first firing, s.
-    variables : mapping
-        Arrays by name, SI, of the dimensions in `LAYOUT`; `displacement` among them.
-    attributes : mapping
-        Attributes of the set: texts and numbers.
-    notes : mapping, optional
-        Further attributes of single variables, by name.
+    The variables are arrays by name, SI, of the dimensions in `LAYOUT`, `displacement` among them; the
+    attributes those of the set, the notes further ones of single variables, by name.
     """
     more = notes or {}
     values: dict[str, Any] = {"rate": rates, "time": times, **variables}
@@ -120,19 +110,7 @@ def on_times(chart: xr.Dataset, row: int, times: FloatArray) -> FloatArray:
 def interpolated(at: npt.ArrayLike, values: npt.ArrayLike, times: FloatArray) -> FloatArray:
     """Join samples by straight lines; NaN outside, and between a sample that is NaN and its neighbours.
 
-    Parameters
-    ----------
-    at : array, shape (n,)
-        Times of the samples, s, ascending.
-    values : array, shape (n,)
-        Samples, NaN for a gap.
-    times : array, shape (m,)
-        Times, s, at which the value is wanted.
-
-    Returns
-    -------
-    array, shape (m,)
-        The values; where a time is that of a sample, the sample itself.
+    The samples lie `at` ascending times, s. At the time of a sample the value is the sample itself.
     """
     known, samples = np.asarray(at, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if known.size == 0:

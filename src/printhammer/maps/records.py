@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
+from printhammer.results import Declared, column, scalar
 from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import parse, to_si
 
@@ -34,16 +35,12 @@ _HEADINGS: Final = (
 _GAPS: Final = ("", "nan", "na")
 
 
-@dataclass(frozen=True)
-class RateRecord:
+class RateRecord(Declared):
     """Samples at one rate."""
 
-    rate: float
-    """Firing rate, Hz."""
-    times: FloatArray
-    """Times from the first firing, s, ascending, shape (n,)."""
-    displacement: FloatArray
-    """Displacement, m; NaN for a gap. Shape (n,)."""
+    rate: float = scalar("Hz", "firing rate")
+    times: FloatArray = column("s", "times from the first firing, ascending", "sample")
+    displacement: FloatArray = column("m", "displacement", "sample", more="NaN for a gap")
 
 
 @dataclass(frozen=True)
@@ -64,10 +61,8 @@ class Cells:
             The unit is of another dimension, or a cell is no finite number, nor an allowed gap.
         """
         name = self.heading[index]
-        try:
+        with located(f"{self.what}: column {name!r}"):
             factor = to_si(1.0, unit, si)
-        except InputError as error:
-            raise InputError(f"{self.what}: column {name!r}: {error}") from None
         values = np.empty(len(self.rows))
         for k, row in enumerate(self.rows):
             text = row[index].strip()
@@ -107,18 +102,9 @@ def read_records(path: Path) -> list[RateRecord]:
 def checked(
     what: str, rate: float, times: FloatArray, displacement: FloatArray, places: Sequence[str]
 ) -> RateRecord:
-    """Return a record with its samples in order of time.
+    """Return a record, of samples in SI in any order, with its samples in order of time.
 
-    Parameters
-    ----------
-    what : str
-        Name of the file, for messages.
-    rate : float
-        Firing rate, Hz.
-    times, displacement : array
-        Samples, SI, in any order.
-    places : sequence of str
-        Where each sample stands, for messages.
+    Messages name the file, `what`, and where each sample stands, its entry in `places`.
 
     Raises
     ------

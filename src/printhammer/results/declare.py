@@ -223,7 +223,7 @@ class Declared:
     if TYPE_CHECKING:
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
-    def __init_subclass__(cls, **options: Any) -> None:
+    def __init_subclass__(cls, *, eq: bool = True, **options: Any) -> None:
         super().__init_subclass__(**options)
-        dataclass(frozen=True)(cls)
+        dataclass(frozen=True, eq=eq)(cls)
         cls.__doc__ = with_attributes(cls.__doc__ or "", cls, columns_of(cls))

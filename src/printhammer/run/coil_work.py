@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.hammer.static_force import StaticForce
+from printhammer.results import Declared, scalar
 
 if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
@@ -22,26 +22,17 @@ _HALVINGS: Final = 12
 _HEAT_ERROR: Final = 1e-13
 
 
-@dataclass(frozen=True)
-class CoilWork:
-    """Work of the coil over one run; its power is (Fm(x, I) - Fm(x, 0)) v.
+class CoilWork(Declared):
+    """Work of the coil over one run; its power is (Fm(x, I) - Fm(x, 0)) v."""
 
-    Attributes
-    ----------
-    net : float
-        Integral of the power, J: `coil_work` of the energy ledger.
-    positive : float
-        Integral of the power where it is positive, J: what a supply gives that takes nothing back.
-    squared_current : float
-        Integral of the squared current, A^2 s.
-    heat : float or None
-        Resistance of the coil times that, J; None for a hammer without `coil.resistance`.
-    """
-
-    net: float
-    positive: float
-    squared_current: float
-    heat: float | None
+    net: float = scalar("J", "integral of the power", more="`coil_work` of the energy ledger")
+    positive: float = scalar(
+        "J", "integral of the power where it is positive", more="what a supply gives that takes nothing back"
+    )
+    squared_current: float = scalar("A^2 s", "integral of the squared current")
+    heat: float | None = scalar(
+        "J", "resistance of the coil times that", more="None for a hammer without `coil.resistance`"
+    )
 
     @property
     def given_back(self) -> float:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from printhammer.kernel.model.modes import PACK_SURFACE
+from printhammer.results import Declared, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,92 +17,55 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 
-@dataclass(frozen=True)
-class Contact:
-    """One touch of the pack or the backstop.
+class Contact(Declared):
+    """One touch of the pack or the backstop."""
 
-    Attributes
-    ----------
-    surface : str
-        "pack" or "backstop".
-    t_in, v_in : float
-        Time, s, and velocity, m/s, at touch; of the start of the run where it was open already.
-    t_out, v_out : float or None
-        Time, s, and velocity, m/s, at leaving; None while it is open.
-    t_peak, depth : float
-        Time, s, and amount, m, of the largest indentation or compression.
-    peak_force : float or None
-        Largest contact force, N; None on a rigid backstop, where it is not finite.
-    loss : float
-        Energy that the contact took from the armature for good, J: minus the work of the whole pack force,
-        or of the viscous force of the backstop. Of an open pack contact: so far, what it stores included.
-    firing : int or None
-        Number of the latest firing at or before the touch.
-    extra : bool
-        A pack contact that is not the first one after its firing.
-    initial : bool
-        Whether it was open at the start of the run.
-    """
-
-    surface: Literal["pack", "backstop"]
-    t_in: float
-    v_in: float
-    t_out: float | None
-    v_out: float | None
-    t_peak: float
-    depth: float
-    peak_force: float | None
-    loss: float
-    firing: int | None
-    extra: bool
-    initial: bool
+    surface: Literal["pack", "backstop"] = part("what is touched")
+    t_in: float = scalar("s", "time of touch", more="of the start of the run where it was open already")
+    v_in: float = scalar("m/s", "velocity at touch", more="likewise")
+    t_out: float | None = scalar("s", "time of leaving", more="None while it is open")
+    v_out: float | None = scalar("m/s", "velocity at leaving", more="None while it is open")
+    t_peak: float = scalar("s", "time of the largest indentation or compression")
+    depth: float = scalar("m", "largest indentation or compression")
+    peak_force: float | None = scalar(
+        "N", "largest contact force", more="None on a rigid backstop, where it is not finite"
+    )
+    loss: float = scalar(
+        "J",
+        "energy that the contact took from the armature for good",
+        more="minus the work of the whole pack force, or of the viscous force of the backstop; of an open"
+        " pack contact: so far, what it stores included",
+    )
+    firing: int | None = part("number of the latest firing at or before the touch")
+    extra: bool = part("a pack contact that is not the first one after its firing")
+    initial: bool = part("whether it was open at the start of the run")
 
 
-@dataclass(frozen=True)
-class Dot:
+class Dot(Declared):
     """What one firing did on the paper.
 
     A pack contact belongs to the latest firing at or before its touch. The first one in an interval makes
     the dot, later ones are extra contacts, one already open at a firing belongs to the dot before. A firing
     without a first one is a lost dot.
-
-    Attributes
-    ----------
-    index : int
-        Number of the firing, from 0.
-    fired_at : float
-        Time of the firing, s.
-    struck : bool
-        False for a lost dot; all that follows is then None, but for the number of extra contacts, 0.
-    flight_time : float or None
-        From firing to touch, s.
-    impact_speed : float or None
-        At touch, m/s.
-    peak_force : float or None
-        Largest pack force, N.
-    indentation : float or None
-        Largest indentation, m.
-    contact_time : float or None
-        From touch to leaving, s; None also while the contact is open.
-    loading_work : float or None
-        Work done on the pack up to its largest indentation, J.
-    net_loss : float or None
-        Energy that the pack kept, J.
-    extra_contacts : int
-        Further pack contacts before the next firing.
     """
 
-    index: int
-    fired_at: float
-    struck: bool
-    flight_time: float | None = None
-    impact_speed: float | None = None
-    peak_force: float | None = None
-    indentation: float | None = None
-    contact_time: float | None = None
-    loading_work: float | None = None
-    net_loss: float | None = None
-    extra_contacts: int = 0
+    index: int = part("number of the firing, from 0")
+    fired_at: float = scalar("s", "time of the firing")
+    struck: bool = part(
+        "False for a lost dot", more="all that follows is then None, but for the number of extra contacts, 0"
+    )
+    flight_time: float | None = scalar("s", "from firing to touch", default=None)
+    impact_speed: float | None = scalar("m/s", "at touch", default=None)
+    peak_force: float | None = scalar("N", "largest pack force", default=None)
+    indentation: float | None = scalar("m", "largest indentation", default=None)
+    contact_time: float | None = scalar(
+        "s", "from touch to leaving", more="None also while the contact is open", default=None
+    )
+    loading_work: float | None = scalar(
+        "J", "work done on the pack up to its largest indentation", default=None
+    )
+    net_loss: float | None = scalar("J", "energy that the pack kept", default=None)
+    extra_contacts: int = part("further pack contacts before the next firing", default=0)
 
 
 def step_range(record: Record, row: int) -> tuple[int, int]:
@@ -130,14 +93,7 @@ def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]
 def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid: bool) -> list[Contact]:
     """Put the recorded contacts together with their peaks and losses.
 
-    Parameters
-    ----------
-    problem, record
-        The run.
-    increments : array, shape (steps, 4)
-        Integrals of power over all steps [J].
-    rigid : bool
-        Whether the backstop is rigid.
+    The increments are those of `printhammer.run.ledger.increments_of`; `rigid` tells whether the backstop is.
     """
     if len(record.contacts) == 0:
         return []

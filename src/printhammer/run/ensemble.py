@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
+from printhammer.drive.input import read_array
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
@@ -20,7 +21,7 @@ from printhammer.results import Result, column, part
 from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job, kernel_of
 from printhammer.run.problem import TOLERANCE, check_tolerance, laws_of
 from printhammer.run.start import check_branch, initial_state
-from printhammer.support.threads import PIECES_A_THREAD, in_threads, thread_count
+from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, thread_count
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-    from printhammer.support.threads import Progress
 
 __all__ = ["DISPLAY_TOLERANCE", "MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
 
@@ -161,7 +161,7 @@ class Ensemble:
         many_hammers = [hammers] if isinstance(hammers, Hammer) else list(hammers)
         many_drives: list[Drive] = list(drives) if isinstance(drives, list | tuple) else [drives]  # type: ignore[list-item]
         moments, begun = _each(ends, "ends"), _each(starts, "starts")
-        rows = None if states is None else _numbers(states, "states")
+        rows = None if states is None else read_array(states, "states")
         counts = {
             "hammers": 1 if one_hammer else len(many_hammers),
             "drives": 1 if one_drive else len(many_drives),
@@ -412,21 +412,14 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
 
 
 def _each(values: npt.ArrayLike, name: str) -> FloatArray:
-    values_of = _numbers(values, name)
+    values_of = read_array(values, name)
     if values_of.ndim > 1:
         raise InputError(f"{name}: an array of shape {values_of.shape}, expected one number for each member")
     return np.atleast_1d(values_of)
 
 
-def _numbers(values: npt.ArrayLike, name: str) -> FloatArray:
-    try:
-        return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} = {values!r}, expected numbers") from None
-
-
 def _ascending(times: npt.ArrayLike, name: str) -> FloatArray:
-    moments = _numbers(times, name).reshape(-1)
+    moments = read_array(times, name).reshape(-1)
     if not np.isfinite(moments).all() or (np.diff(moments) < 0.0).any() or (moments < 0.0).any():
         raise InputError(f"{name}: expected ascending numbers, not negative")
     return moments

@@ -50,20 +50,9 @@ def kernel_of(drive: Drive, known: dict[bytes, LaneKinds | None]) -> Hashable:
 class Group:
     """Members with the same laws, overlap rule and kinds of pieces in their waveforms, started alike.
 
-    All this is decided for each member, so that one kernel serves it in whatever company.
-
-    Parameters
-    ----------
-    members : int array
-        Their numbers in the ensemble.
-    hammers, drives : sequence
-        One for each of them.
-    states : array, shape (n, 5)
-        Time, displacement, velocity, mode, memory at the start.
-    ends : array, shape (n,)
-        Ends of the runs, s.
-    tolerance : float
-        Error allowed in one step.
+    All this is decided for each member, so that one kernel serves it in whatever company. `members` are their
+    numbers in the ensemble; there is a hammer, a drive, a row of `states` (time, displacement, velocity, mode
+    and memory at the start) and an end, s, for each of them.
     """
 
     def __init__(
@@ -182,18 +171,9 @@ def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
 class Job:
     """One integration of a group: what to keep, and the arrays that it goes to.
 
-    Parameters
-    ----------
-    group : Group
-        The members.
-    want_dots : bool
-        Whether to keep what each firing did.
-    moments : sequence of arrays
-        Times of the strobes, s, for each member of the ensemble.
-    grid : array
-        Common times of the displacements, s.
-    x : float32 array
-        Displacements of the whole ensemble; used as it is where the group is the whole.
+    Kept are what each firing did, if wanted; the states at the `moments`, times in s for each member of the
+    ensemble; and the displacements at the times of the `grid`, s, in `x`, which is that of the whole ensemble
+    and used as it is where the group is the whole.
     """
 
     def __init__(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from printhammer.parts import absent
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
@@ -17,38 +17,22 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 
-@dataclass(frozen=True)
-class Ledger:
-    """Energies of one run, J.
+class Ledger(Declared):
+    """Energies of one run, J."""
 
-    Attributes
-    ----------
-    coil_work : float
-        Integral of (Fm(x, I) - Fm(x, 0)) v dt.
-    drive_work : float
-        Work of a drive that is a force.
-    pack_loss : float
-        Minus the integral of Fp v dt.
-    backstop_loss : float
-        Minus the integral of Fe v dt, and what impacts on a rigid backstop take.
-    kinetic, stored : float
-        Change of kinetic energy and of stored energy (magnet at zero current, spring, Hertz) from start to
-        end.
-    throughput : float
-        Sum of the integrals of the absolute power of coil, drive force, pack and backstop.
-    residual : float
-        Work minus losses minus changes: 0 but for numerical errors, since each term has a quadrature of its
-        own.
-    """
-
-    coil_work: float
-    drive_work: float
-    pack_loss: float
-    backstop_loss: float
-    kinetic: float
-    stored: float
-    throughput: float
-    residual: float
+    coil_work: float = part("integral of (Fm(x, I) - Fm(x, 0)) v dt")
+    drive_work: float = part("work of a drive that is a force")
+    pack_loss: float = part("minus the integral of Fp v dt")
+    backstop_loss: float = part("minus the integral of Fe v dt, and what impacts on a rigid backstop take")
+    kinetic: float = part("change of kinetic energy from start to end")
+    stored: float = part("change of stored energy likewise", more="magnet at zero current, spring, Hertz")
+    throughput: float = part(
+        "sum of the integrals of the absolute power of coil, drive force, pack and backstop"
+    )
+    residual: float = part(
+        "work minus losses minus changes",
+        more="0 but for numerical errors, since each term has a quadrature of its own",
+    )
 
 
 def increments_of(problem: Problem, record: Record) -> FloatArray:
@@ -61,9 +45,9 @@ def stored_energy(hammer: Hammer, x: float) -> float:
     """Return the energy stored in magnet (at zero current), spring and backstop at `x` [m], J."""
     origin = hammer.origin
     total = 0.0
-    for part, name in ((hammer.magnet, "magnet_energy"), (hammer.spring, "spring_energy")):
-        if part is not None:
-            total += _function(part, name)(np.array(part.packed(origin)), x)
+    for source, name in ((hammer.magnet, "magnet_energy"), (hammer.spring, "spring_energy")):
+        if source is not None:
+            total += _function(source, name)(np.array(source.packed(origin)), x)
     if hammer.backstop is not None and x < hammer.backstop.position:
         constants = np.array(hammer.backstop.packed(origin))
         total += _function(hammer.backstop, "backstop_energy")(
@@ -77,15 +61,7 @@ def _function(part: Any, name: str) -> Any:
 
 
 def ledger_of(problem: Problem, record: Record, increments: FloatArray) -> Ledger:
-    """Add up a run.
-
-    Parameters
-    ----------
-    problem, record
-        The run.
-    increments : array, shape (steps, 4)
-        From `increments_of`.
-    """
+    """Add up a run, given what `increments_of` returns for it."""
     coil, force, pack, backstop = (float(math.fsum(column)) for column in increments.T)
     start, end = record.nodes[0], record.nodes[-1]
     hammer = problem.hammer

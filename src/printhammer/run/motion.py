@@ -12,10 +12,10 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, derived, provenance
 from printhammer.results.files import write_csv, write_parquet
-from printhammer.run.coil_work import coil_work_of
-from printhammer.run.contacts import contacts_of, dots_of, loading_works
-from printhammer.run.ledger import increments_of, ledger_of
-from printhammer.run.problem import message_of
+from printhammer.run.coil_work import CoilWork, coil_work_of
+from printhammer.run.contacts import Contact, Dot, contacts_of, dots_of, loading_works
+from printhammer.run.ledger import Ledger, increments_of, ledger_of
+from printhammer.run.problem import Problem, Record, message_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,10 +28,6 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.run.coil_work import CoilWork
-    from printhammer.run.contacts import Contact, Dot
-    from printhammer.run.ledger import Ledger
-    from printhammer.run.problem import Problem, Record
     from printhammer.support.arrays import FloatArray
 
 FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drive", "total")

@@ -6,7 +6,6 @@ The only place that turns the objects of the public face into what the kernel wo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -17,6 +16,7 @@ from printhammer.kernel.model import layout
 from printhammer.kernel.model.laws import Laws
 from printhammer.kernel.model.modes import OK, PAUSED, STATUS_NAMES, STEP_LIMIT
 from printhammer.kernel.single import carry
+from printhammer.results import Declared, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -45,18 +45,17 @@ _NODES_A_FLIGHT: Final = 40
 _MOST_FLIGHTS: Final = 1e6
 
 
-@dataclass(frozen=True)
-class Record:
+class Record(Declared):
     """What the kernel recorded of one run; see `printhammer.kernel.single.record`."""
 
-    status: int
-    """Code of the status."""
-    nodes: FloatArray
-    """Time, displacement, velocity, mode and memory at the ends of all steps. Shape (n, 5)."""
-    contacts: FloatArray
-    """Surface, time and velocity in and out, first node, whether open at the start. Shape (m, 7)."""
-    steps: int
-    """Number of steps."""
+    status: int = part("code of the status")
+    nodes: FloatArray = part(
+        "time, displacement, velocity, mode and memory at the ends of all steps, shape (n, 5)"
+    )
+    contacts: FloatArray = part(
+        "surface, time and velocity in and out, first node, whether open at the start, shape (m, 7)"
+    )
+    steps: int = part("number of steps")
 
     @property
     def status_name(self) -> str:
@@ -64,18 +63,15 @@ class Record:
         return STATUS_NAMES[self.status]
 
 
-@dataclass(frozen=True)
-class Stretch:
+class Stretch(Declared):
     """Part of a record, up to a pause or the end; its arrays are overwritten by the next one."""
 
-    status: int
-    """Code of the status, PAUSED but for the last."""
-    nodes: FloatArray
-    contacts: FloatArray
-    """As in `Record`; the first node is the last one of the stretch before, a contact that is open at a pause
-    the first one of the stretch after it."""
-    reached: float
-    """Time that the run got to, s."""
+    status: int = part("code of the status, PAUSED but for the last")
+    nodes: FloatArray = part("as in `Record`", more="the first one is the last of the stretch before")
+    contacts: FloatArray = part(
+        "as in `Record`", more="one that is open at a pause is the first of the stretch after it"
+    )
+    reached: float = scalar("s", "time that the run got to")
 
 
 class _TooLong(Exception):
@@ -175,18 +171,8 @@ def scales_of(hammer: Hammer, drive: Drive, state: tuple[float, float]) -> tuple
 class Problem:
     """One hammer under one drive, ready to be integrated.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    drive : Drive
-        The drive.
-    state : tuple of float
-        Displacement, m, and velocity, m/s, at the start.
-    start : float
-        Time of the initial state, s.
-    tolerance : float
-        Error allowed in one step, in units of the stroke and of a typical speed.
+    The state, displacement, m, and velocity, m/s, is that at the time `start`, s. The tolerance is the error
+    allowed in one step, in units of the stroke and of a typical speed.
     """
 
     max_steps: int | None = None
@@ -271,20 +257,9 @@ class Problem:
     def in_stretches(self, end: float, capacity: int, take: Callable[[Iterator[Stretch]], T]) -> T:
         """Integrate to time `end`, s, and have the record taken in stretches: memory does not grow with it.
 
-        Parameters
-        ----------
-        end : float
-            End of the run, s.
-        capacity : int
-            Nodes that are kept at a time.
-        take : callable
-            Gets the stretches one after the other and need not take all; where one contact alone has more
-            nodes than fit, it is called again with longer ones.
-
-        Returns
-        -------
-        object
-            What `take` returns.
+        `take` gets the stretches, of `capacity` nodes at most, one after the other and need not take all;
+        where one contact alone has more nodes than fit, it is called again with longer ones. Returns what it
+        returns.
         """
         while True:
             try:

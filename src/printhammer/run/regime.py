@@ -6,13 +6,13 @@ The k-th firing of a train is at k times its period; a rate is its period said i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Self, TypedDict
 
 import numpy as np
 
 from printhammer.drive.input import period_of_rate, read_number, read_positive
-from printhammer.drive.trains import PulseTrain, SineForce
+from printhammer.drive.trains import Drive, PulseTrain, SineForce
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import (
@@ -25,7 +25,8 @@ from printhammer.hammer.names import (
     quantities_of,
     unknown,
 )
-from printhammer.run.window import window_of
+from printhammer.results import Declared, part, scalar
+from printhammer.run.window import Window, window_of
 from printhammer.support.constants import Quantity, quantities
 
 if TYPE_CHECKING:
@@ -34,9 +35,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.run.window import Window
     from printhammer.support.arrays import FloatArray
 
 _FORCE: Final = ("amplitude", "phase")
@@ -53,32 +52,23 @@ class Firing(TypedDict, total=False):
     phase: float | None
 
 
-@dataclass(frozen=True)
-class Regime:
-    """A hammer and its periodic drive: a waveform fired every `period`, or an endless force.
+class Regime(Declared):
+    """A hammer and its periodic drive: a waveform fired every `period`, or an endless force."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    period : float
-        Time between firings, or period of the force, s.
-    waveform : Waveform or None
-        What every firing does; None for the hammer's own, and under an endless force.
-    drive : Drive or None
-        An endless force such as `printhammer.SineForce`; None for a train of pulses.
-    overlap : str
-        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
-    phase : float
-        Part of the period between a firing and the section at which states are looked at.
-    """
-
-    hammer: Hammer
-    period: float
-    waveform: Waveform | None = None
-    drive: Drive | None = None
-    overlap: Overlap = "add"
-    phase: float = 0.0
+    hammer: Hammer = part("the hammer")
+    period: float = scalar("s", "time between firings, or period of the force")
+    waveform: Waveform | None = part(
+        "what every firing does", more="None for the hammer's own, and under an endless force", default=None
+    )
+    drive: Drive | None = part(
+        "an endless force such as `printhammer.SineForce`", more="None for a train of pulses", default=None
+    )
+    overlap: Overlap = part(
+        '"add": overlapping pulses add up; "replace": each firing cuts off the pulse before', default="add"
+    )
+    phase: float = part(
+        "part of the period between a firing and the section at which states are looked at", default=0.0
+    )
 
     @classmethod
     def of(
@@ -133,8 +123,7 @@ class Regime:
             return cls(hammer, float(drive.period), None, drive, overlap, part)
         if (period is None) == (rate is None):
             raise InputError("period and rate: expected one of them, the time between firings or its inverse")
-        if waveform is None and hammer.waveform is None:
-            raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+        waveform_of(hammer, waveform)
         time = period_of_rate(rate) if rate is not None else read_positive(period or 0.0, "s", "period")
         regime = cls(hammer, time, waveform, None, overlap, part)
         # Refuses what no train can fire: an endless waveform, an unknown rule for overlapping pulses.
@@ -146,12 +135,7 @@ class Regime:
         """What every firing does, or the endless force."""
         if self.drive is not None:
             return self.drive.waveform
-        waveform = self.waveform if self.waveform is not None else self.hammer.waveform
-        if waveform is None:
-            raise InputError(
-                f"the hammer {self.hammer.name!r} has no waveform to fire, expected a [waveform]"
-            )
-        return waveform
+        return waveform_of(self.hammer, self.waveform)
 
     @property
     def rate(self) -> float:
@@ -312,6 +296,14 @@ class Regime:
     def _of_waveform(self, name: str) -> str:
         field = name.removeprefix(WAVEFORM)
         return field if self.waveform is not None and field in quantities(type(self.waveform)) else ""
+
+
+def waveform_of(hammer: Hammer, waveform: Waveform | None) -> Waveform:
+    """Return a waveform to fire, by default that of a hammer; InputError where it has none."""
+    fired = hammer.waveform if waveform is None else waveform
+    if fired is None:
+        raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+    return fired
 
 
 def read_phase(phase: float) -> float:

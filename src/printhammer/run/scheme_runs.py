@@ -30,21 +30,9 @@ _GAUSS = np.polynomial.legendre.leggauss(4)
 class SchemeProblem(Problem):
     """One hammer under one drive, to be integrated with a scheme of 1983.
 
-    Parameters
-    ----------
-    hammer, drive, state, tolerance
-        As for `Problem`; the tolerance is not used.
-    scheme : str
-        "trapezoid" or "runge-kutta-4".
-    scale : float
-        Factor on all steps of the paper's schedule.
-    reading : str
-        When its short steps begin and end, one of `printhammer.kernel.schemes_1983.READINGS`.
-
-    Raises
-    ------
-    InputError
-        The factor is not positive.
+    Arguments as for `Problem`, the tolerance of no use; `scale` is a factor on all steps of the paper's
+    schedule, and `reading`, one of `printhammer.kernel.schemes_1983.READINGS`, says when its short steps
+    begin and end. InputError where the factor is not positive.
     """
 
     def __init__(

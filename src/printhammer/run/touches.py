@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
 from printhammer.kernel.model.modes import BACKSTOP_SURFACE, PACK_SURFACE, PAUSED, STATUS_NAMES
+from printhammer.results import Declared, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,39 +23,21 @@ _SURFACE, _IN, _OUT, _INITIAL = 0, 1, 3, 6
 """Columns of a contact."""
 
 
-@dataclass(frozen=True)
-class Touches:
+class Touches(Declared):
     """Touches of one surface."""
 
-    rows: FloatArray
-    """Time, s, and velocity, m/s, at touch and at leaving; NaN for a contact that is open at the end. Shape
-    (n, 4)."""
-    status: str
-    """How the run ended; "ok" also where it was ended because there were touches enough."""
-    reached: float
-    """Time that the run got to, s."""
+    rows: FloatArray = part(
+        "time, s, and velocity, m/s, at touch and at leaving, shape (n, 4)",
+        more="NaN for a contact that is open at the end",
+    )
+    status: str = part("how the run ended", more='"ok" also where it was ended because of touches enough')
+    reached: float = scalar("s", "time that the run got to")
 
 
 def touches_of(problem: Problem, surface: Surface, after: float, end: float, most: int) -> Touches:
-    """Return the touches of a surface in a run; a contact that was open at its start is none.
+    """Return the first touches of a surface in a run, `most` at most, after which it ends.
 
-    Parameters
-    ----------
-    problem : Problem
-        The run.
-    surface : str
-        "pack" or "backstop".
-    after : float
-        Time from which on touches count, s.
-    end : float
-        End of the run, s.
-    most : int
-        Number of touches after which it ends earlier.
-
-    Returns
-    -------
-    Touches
-        The first of them, at most that many.
+    They count from the time `after`, s, up to the `end` of the run, s; a contact open at its start is none.
     """
 
     def take(stretches: Iterator[Stretch]) -> Touches:

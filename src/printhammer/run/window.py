@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.results import Declared, scalar
 from printhammer.run.problem import scales_of
 
 if TYPE_CHECKING:
@@ -28,20 +28,11 @@ _SAME: Final = 1e-3
 _PART: Final = 1.0 / 6.0
 
 
-@dataclass(frozen=True)
-class Window:
-    """A rectangle in the plane of displacement and velocity.
+class Window(Declared):
+    """A rectangle in the plane of displacement and velocity."""
 
-    Attributes
-    ----------
-    x : tuple of float
-        Least and largest displacement, m.
-    v : tuple of float
-        Least and largest velocity, m/s.
-    """
-
-    x: tuple[float, float]
-    v: tuple[float, float]
+    x: tuple[float, float] = scalar("m", "least and largest displacement")
+    v: tuple[float, float] = scalar("m/s", "least and largest velocity")
 
     @property
     def half_widths(self) -> FloatArray:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from printhammer.chaos.bifurcation.columns import OK, cycles_of, run_columns
+from printhammer.chaos.bifurcation.columns import OK, Columns, cycles_of, run_columns
 from printhammer.chaos.strobe.train import exponents_onward
 from printhammer.chaos.strobe.verdict import is_positive
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
-    from printhammer.chaos.bifurcation.columns import Columns
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -37,28 +36,19 @@ ATTEMPTS: Final = 12
 """Trains without a period that are followed for long, at most, to find strange attractors."""
 
 
-@dataclass(frozen=True)
-class Attractor:
-    """What trains lead to.
+class Attractor(Declared):
+    """What trains lead to."""
 
-    Attributes
-    ----------
-    name : str
-        "period-q" or "strange".
-    period : int or None
-        q; None for a strange one.
-    states : array, shape (q, 2) or (n, 2)
-        Displacements, m, and velocities, m/s, at successive firings: the orbit from its least displacement
-        on, or points of a strange attractor.
-    exponent, standard_error : float
-        Largest exponent of the strobe map, per firing, of a strange one; else NaN.
-    """
-
-    name: str
-    period: int | None
-    states: FloatArray
-    exponent: float = math.nan
-    standard_error: float = math.nan
+    name: str = part('"period-q" or "strange"')
+    period: int | None = part("number q; None for a strange one")
+    states: FloatArray = part(
+        "displacements, m, and velocities, m/s, at successive firings: the orbit from its least displacement"
+        " on, or points of a strange attractor, shape (q, 2) or (n, 2)"
+    )
+    exponent: float = part(
+        "largest exponent of the strobe map, per firing, of a strange one; else NaN", default=math.nan
+    )
+    standard_error: float = part("of the exponent", default=math.nan)
 
 
 class Attractors:

@@ -24,17 +24,15 @@ from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, coordinate, part
 from printhammer.run.problem import check_tolerance
-from printhammer.run.regime import Regime
-from printhammer.support.threads import shifted
+from printhammer.run.regime import Firing, Regime
+from printhammer.support.threads import Progress, shifted
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.declare import Kind
-    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray, IntArray, TextArray
-    from printhammer.support.threads import Progress
 
 FIRINGS: Final = 200
 """Firings of a round unless told otherwise."""

@@ -7,51 +7,37 @@ analyze uncertainty in dynamical systems, Scientific Reports 6 (2016) 31416.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, SupportsIndex
 
 import numpy as np
 
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
-    from typing import SupportsIndex
-
     import numpy.typing as npt
 
 BOX: Final = 4
 """Cells along the side of a box unless told otherwise."""
 
 
-@dataclass(frozen=True)
-class BasinEntropy:
-    """Basin entropy, natural logarithms.
+class BasinEntropy(Declared):
+    """Basin entropy, natural logarithms."""
 
-    Attributes
-    ----------
-    box : int
-        Cells along the side of a box.
-    boxes : int
-        Number N of whole boxes with at least one decided cell.
-    boundary_boxes : int
-        Number Nb of those in which cells lead to more than one attractor.
-    entropy : float
-        S / N, with S the sum over the boxes of -sum p ln p, p being the shares of the attractors in the
-        decided cells of the box; NaN without boxes.
-    boundary_entropy : float
-        S / Nb; NaN where no box has more than one attractor. More than ln 2 shows that the boundary is
-        fractal; less shows nothing.
-    left_out : int
-        Cells that are in no whole box, or not decided.
-    """
-
-    box: int
-    boxes: int
-    boundary_boxes: int
-    entropy: float
-    boundary_entropy: float
-    left_out: int
+    box: int = part("cells along the side of a box")
+    boxes: int = part("number N of whole boxes with at least one decided cell")
+    boundary_boxes: int = part("number Nb of those in which cells lead to more than one attractor")
+    entropy: float = part(
+        "S / N, with S the sum over the boxes of -sum p ln p, p being the shares of the attractors in the"
+        " decided cells of the box",
+        more="NaN without boxes",
+    )
+    boundary_entropy: float = part(
+        "S / Nb; NaN where no box has more than one attractor",
+        more="more than ln 2 shows that the boundary is fractal; less shows nothing",
+    )
+    left_out: int = part("cells that are in no whole box, or not decided")
 
     @property
     def fractal(self) -> bool:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
 import numpy as np
 
-from printhammer.chaos.basins.basins import check_cells, read_axis
+from printhammer.chaos.basins.basins import Range, check_cells, read_axis
 from printhammer.drive.input import read_positive
 from printhammer.drive.segments import table
 from printhammer.drive.trains import Drive, PulseTrain
@@ -27,18 +27,17 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.results import Result, column, coordinate, derived, part, provenance, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.run.regime import waveform_of
 from printhammer.run.simulate import simulate
-from printhammer.support.threads import shifted
+from printhammer.support.threads import Progress, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.chaos.basins.basins import Range
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import BoolArray, FloatArray, TextArray
-    from printhammer.support.threads import Progress
 
 TAIL: Final = 1e-3
 """Time after the second firing, s, within which a second dot is waited for unless told otherwise."""
@@ -214,9 +213,7 @@ def quench_map(
         An argument is not what is described above; a hammer without a pack or a rest state; a waveform
         without a width.
     """
-    pulse = hammer.waveform if waveform is None else waveform
-    if pulse is None:
-        raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+    pulse = waveform_of(hammer, waveform)
     width = getattr(pulse, "width", None)
     if not isinstance(width, float):
         raise InputError(f"waveform: a {pulse.shape} has no width, expected a pulse that has one")

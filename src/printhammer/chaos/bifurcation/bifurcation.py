@@ -19,13 +19,12 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import PERIOD, RATE
 from printhammer.run.problem import check_tolerance
-from printhammer.run.regime import Regime
+from printhammer.run.regime import Firing, Regime
 from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -11,10 +10,11 @@ import numpy as np
 from printhammer.chaos.strobe.train import HELD_BRANCHES, pack_branches
 from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
 from printhammer.errors import InputError
+from printhammer.results import Declared, column, part
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.start import check_branch, initial_state
 from printhammer.run.window import window_of
-from printhammer.support.threads import shifted
+from printhammer.support.threads import Progress, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray, IntArray, TextArray
-    from printhammer.support.threads import Progress
 
 State = tuple[float, float, float, float]
 """Displacement, m, velocity, m/s, branch of the pack or -1, and memory of the pack, m."""
@@ -51,24 +50,25 @@ _PACK_BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "un
 _PACK_RELEASED: Final = MODE_NAMES.index("pack released")
 
 
-@dataclass(frozen=True)
-class Columns:
+class Columns(Declared):
     """States of many trains at successive sections."""
 
-    x: FloatArray
-    v: FloatArray
-    """Displacement, m, and velocity, m/s; NaN where a run did not get. Shape (M, P)."""
-    branch: npt.NDArray[np.int8]
-    """Code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`; -1 where a run did not get. Shape
-    (M, P)."""
-    memory: FloatArray
-    """Displacement of the latest local maximum, m, on the unloading branch inside the pack; else 0. Shape (M,
-    P)."""
-    status: TextArray
-    """How the runs ended; `NOT_RUN` before. Shape (M,)."""
-    last: FloatArray
-    """Displacement, velocity, branch of the pack or -1, and memory at the firing after all that are asked
-    for, where the next train can go on; `FROM_REST` where it cannot. Shape (M, 4)."""
+    x: FloatArray = column("m", "displacement", "train point", more="NaN where a run did not get")
+    v: FloatArray = column("m/s", "velocity", "train point", more="likewise")
+    branch: npt.NDArray[np.int8] = column(
+        "1",
+        "code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`",
+        "train point",
+        more="-1 where a run did not get",
+    )
+    memory: FloatArray = column(
+        "m", "latest local maximum on the unloading branch inside the pack", "train point", more="else 0"
+    )
+    status: TextArray = column("", "how the runs ended; `NOT_RUN` before", "train")
+    last: FloatArray = part(
+        "displacement, velocity, branch of the pack or -1, and memory at the firing after all that are asked"
+        " for, where the next train can go on; `FROM_REST` where it cannot, shape (M, 4)"
+    )
 
     def __len__(self) -> int:
         """Return the number of trains."""

@@ -7,10 +7,11 @@ Between two neighbours there may be more than a diagram shows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
+
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,53 +25,31 @@ MOST_UNDECIDED: Final = 32
 """Trains without a period that are not strange, on a route, after which it is not followed further."""
 
 
-@dataclass(frozen=True)
-class Window:
-    """Neighbouring values of the parameter with the same verdict.
+class Window(Declared):
+    """Neighbouring values of the parameter with the same verdict; values and width in SI."""
 
-    Attributes
-    ----------
-    verdict : str
-        "period-q", "strange" or "undecided".
-    period : int
-        q; 0 where there is none.
-    low, high : float
-        Least and largest value, SI.
-    width : float
-        Width of the window up to half-way to the neighbours, SI.
-    columns : int
-        Number of values.
-    """
-
-    verdict: str
-    period: int
-    low: float
-    high: float
-    width: float
-    columns: int
+    verdict: str = part('"period-q", "strange" or "undecided"')
+    period: int = part("number q; 0 where there is none")
+    low: float = part("least value")
+    high: float = part("largest value")
+    width: float = part("width of the window up to half-way to the neighbours")
+    columns: int = part("number of values")
 
 
-@dataclass(frozen=True)
-class Route:
-    """What one meets on the way to the first strange train.
+class Route(Declared):
+    """What one meets on the way to the first strange train."""
 
-    Attributes
-    ----------
-    way : str
-        "rising" or "falling" values of the parameter.
-    before : tuple of Window
-        The windows before the first strange train, in this order; all of them if there is none.
-    first : float or None
-        Value of the first strange train, SI; None if there is none, or it was not come to.
-    complete : bool
-        False where `MOST_UNDECIDED` trains without a period came first that are not strange, and the way was
-        not followed further.
-    """
-
-    way: Literal["rising", "falling"]
-    before: tuple[Window, ...]
-    first: float | None
-    complete: bool
+    way: Literal["rising", "falling"] = part("sense of the values of the parameter")
+    before: tuple[Window, ...] = part(
+        "the windows before the first strange train, in this order; all of them if there is none"
+    )
+    first: float | None = part(
+        "value of the first strange train, SI", more="None if there is none, or it was not come to"
+    )
+    complete: bool = part(
+        "False where `MOST_UNDECIDED` trains without a period came first that are not strange, and the way"
+        " was not followed further"
+    )
 
     @property
     def periods(self) -> list[int]:

@@ -19,13 +19,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
 from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, Node
 from printhammer.errors import InputError
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -41,31 +42,28 @@ _SAME: Final = 1e-6
 """Scaled distance below which two points are one."""
 
 
-@dataclass(frozen=True)
-class Stop:
+class Stop(Declared):
     """Where a curve ends, and why."""
 
-    reason: str
-    """"bound"; "closed"; "no value": the map has none beyond; "lost": Newton's method does not converge
-    beyond; "length": the number of steps is used up; "not asked"; or what the caller's watch says."""
-    parameter: float
-    """Where."""
-    state: FloatArray
-    """Where."""
-    sentence: str
-    """The same in words."""
-    node: Node | None = field(default=None, repr=False)
-    """Where the caller's watch stops between two nodes: the last node of the curve."""
+    reason: str = part(
+        '"bound"; "closed"; "no value": the map has none beyond; "lost": Newton\'s method does not converge'
+        ' beyond; "length": the number of steps is used up; "not asked"; or what the caller\'s watch says'
+    )
+    parameter: float = part("the parameter there")
+    state: FloatArray = part("the state there")
+    sentence: str = part("the same in words")
+    node: Node | None = part(
+        "where the caller's watch stops between two nodes: the last node of the curve",
+        default=None,
+        repr=False,
+    )
 
 
-@dataclass(frozen=True)
-class Curve:
+class Curve(Declared):
     """A curve of fixed points."""
 
-    nodes: list[Node]
-    """In order along the curve; `arc` increases."""
-    stops: tuple[Stop, Stop]
-    """What ended it before the first and after the last."""
+    nodes: list[Node] = part("in order along the curve; `arc` increases")
+    stops: tuple[Stop, Stop] = part("what ended it before the first and after the last")
 
     @property
     def closed(self) -> bool:
@@ -73,18 +71,16 @@ class Curve:
         return self.stops[1].reason == "closed"
 
 
-@dataclass(frozen=True)
-class Steps:
+class Steps(Declared):
     """How a curve is followed; lengths in scaled variables."""
 
-    first: float = 0.02
-    smallest: float = 1e-7
-    largest: float = 0.1
-    """Lengths of the steps."""
-    most: int = 1000
-    """Number of steps in either direction."""
-    precision: float = 1e-11
-    """Scaled correction of Newton's method below which a point is on the curve."""
+    first: float = part("length of the first step", default=0.02)
+    smallest: float = part("least length", default=1e-7)
+    largest: float = part("largest length", default=0.1)
+    most: int = part("number of steps in either direction", default=1000)
+    precision: float = part(
+        "scaled correction of Newton's method below which a point is on the curve", default=1e-11
+    )
 
     def __post_init__(self) -> None:
         if not 0.0 < self.smallest <= self.first <= self.largest < math.inf:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 import numpy as np
 
 from printhammer.chaos.continuation.branch_points import BIRTH
-from printhammer.chaos.continuation.events import KINDS, stable_ranges
+from printhammer.chaos.continuation.events import KINDS, BranchEvent, stable_ranges
 from printhammer.chaos.orbits.search import orbit
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from printhammer.chaos.continuation.arclength import Curve, Stop
-    from printhammer.chaos.continuation.events import BranchEvent
     from printhammer.chaos.orbits.orbit import Orbit
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray

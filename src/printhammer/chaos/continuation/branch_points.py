@@ -21,21 +21,20 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.continuation.arclength import Stop, follow
-from printhammer.chaos.continuation.fixed_points import Corrector, MapValue, between
+from printhammer.chaos.continuation.arclength import Curve, Steps, Stop, Watch, follow
+from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, MapValue, Node, between
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
     import numpy.typing as npt
 
-    from printhammer.chaos.continuation.arclength import Curve, Steps, Watch
-    from printhammer.chaos.continuation.fixed_points import MapFamily, Node
     from printhammer.support.arrays import FloatArray
 
 Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change"]
@@ -64,22 +63,21 @@ _HALF_DOUBLES: Final = 0.5
 """Distance of a multiplier of that one from -1 within which it may be about to double."""
 
 
-@dataclass(frozen=True)
-class BranchPoint:
+class BranchPoint(Declared):
     """A point at which something happens to a curve of fixed points."""
 
-    kind: Kind
-    """"fold", "period doubling", "Neimark-Sacker", "branching" or "change"."""
-    node: Node
-    """The fixed point there."""
-    after: int
-    """Number of the node of the curve that it follows."""
-    labels: tuple[Hashable, Hashable]
-    """Labels of the motion before and after it."""
-    sharp: bool = True
-    """False where it could not be located to the precision of the curve; it is then between two nodes."""
-    sides: tuple[Node, Node] | None = None
-    """Of a change: fixed points close before and behind it."""
+    kind: Kind = part('"fold", "period doubling", "Neimark-Sacker", "branching" or "change"')
+    node: Node = part("the fixed point there")
+    after: int = part("number of the node of the curve that it follows")
+    labels: tuple[Hashable, Hashable] = part("labels of the motion before and after it")
+    sharp: bool = part(
+        "False where it could not be located to the precision of the curve",
+        more="it is then between two nodes",
+        default=True,
+    )
+    sides: tuple[Node, Node] | None = part(
+        "of a change: fixed points close before and behind it", default=None
+    )
 
     @property
     def parameter(self) -> float:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, SupportsIndex, Unpack
 import numpy as np
 
 from printhammer.chaos.continuation.arclength import Steps
-from printhammer.chaos.continuation.branch import MOST
+from printhammer.chaos.continuation.branch import MOST, Branch
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbits
@@ -23,12 +23,10 @@ from printhammer.chaos.strobe.points import strobes
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.run.problem import check_tolerance
-from printhammer.run.regime import Regime
+from printhammer.run.regime import Firing, Regime
 
 if TYPE_CHECKING:
-    from printhammer.chaos.continuation.branch import Branch
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 
-from printhammer.chaos.continuation.family import Passage
+from printhammer.chaos.continuation.family import Passage, Surface, Touch
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.chaos.continuation.branch_points import BranchPoint
-    from printhammer.chaos.continuation.family import Surface, Touch
     from printhammer.support.arrays import BoolArray, FloatArray
 
 EventKind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "grazing"]
@@ -25,45 +24,26 @@ KINDS: Final[tuple[str, ...]] = get_args(EventKind)
 Change = Literal["", "appears", "vanishes", "splits", "merges", "several"]
 
 
-@dataclass(frozen=True, eq=False)
-class BranchEvent:
-    """A point of a branch at which something happens.
+class BranchEvent(Declared, eq=False):
+    """A point of a branch at which something happens."""
 
-    Attributes
-    ----------
-    kind : str
-        "fold": the branch turns back; "period doubling": a multiplier is -1, orbits of twice the period are
-        born; "Neimark-Sacker": a complex pair of multipliers crosses the unit circle, a torus is born;
-        "branching": two branches cross; "grazing": a contact appears or vanishes.
-    value : float
-        Of the constant, SI.
-    state : array, shape (2,)
-        Displacement, m, and velocity, m/s, at the section.
-    multipliers : complex array, shape (2,)
-        There.
-    surface : str
-        Of a grazing: "pack", "backstop" or, where several contacts change at once, "".
-    change : str
-        Of a grazing, as the constant grows: a contact "appears", "vanishes", "splits" in two or two "merge"
-        ("merges"); "several" where more than one changes at once. Else empty.
-    contacts : tuple of str
-        Sequence of contacts before and after it along the branch.
-    after : int
-        Number of the orbit of the branch that it follows.
-    sharp : bool
-        Whether it was located; otherwise it is known between two orbits only.
-    """
-
-    kind: EventKind
-    value: float
-    state: FloatArray
-    multipliers: npt.NDArray[np.complex128]
-    surface: str
-    change: Change
-    contacts: tuple[str, str]
-    after: int
-    sharp: bool
-    point: BranchPoint = field(repr=False)
+    kind: EventKind = part(
+        '"fold": the branch turns back; "period doubling": a multiplier is -1, orbits of twice the period are'
+        ' born; "Neimark-Sacker": a complex pair of multipliers crosses the unit circle, a torus is born;'
+        ' "branching": two branches cross; "grazing": a contact appears or vanishes'
+    )
+    value: float = part("of the constant, SI")
+    state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
+    multipliers: npt.NDArray[np.complex128] = part("the multipliers there, shape (2,)")
+    surface: str = part('of a grazing: "pack", "backstop" or, where several contacts change at once, ""')
+    change: Change = part(
+        'of a grazing, as the constant grows: a contact "appears", "vanishes", "splits" in two or two "merge"'
+        ' ("merges"); "several" where more than one changes at once. Else empty'
+    )
+    contacts: tuple[str, str] = part("sequence of contacts before and after it along the branch")
+    after: int = part("number of the orbit of the branch that it follows")
+    sharp: bool = part("whether it was located; otherwise it is known between two orbits only")
+    point: BranchPoint = part("the point of the curve", repr=False)
 
     @property
     def message(self) -> str:

@@ -6,7 +6,6 @@ Beside its value and derivatives it tells of the contacts on the way; their sequ
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
@@ -14,14 +13,14 @@ import numpy as np
 from printhammer.chaos.continuation.fixed_points import MapValue
 from printhammer.chaos.strobe.map import IN_PACK, image_of, margin_of, usable
 from printhammer.errors import InputError
+from printhammer.results import Declared, column, part, scalar
 from printhammer.run.contacts import contacts_of
 from printhammer.run.ledger import increments_of
-from printhammer.run.problem import Problem
+from printhammer.run.problem import Problem, Record
 from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.problem import Record
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
@@ -37,30 +36,23 @@ _MANY: Final = f"more than {_MOST_TOUCHES} contacts"
 Surface = Literal["pack", "backstop"]
 
 
-@dataclass(frozen=True)
-class Touch:
-    """One contact of an orbit that begins within its period."""
+class Touch(Declared):
+    """One contact of an orbit that begins within its period; times since the firing before the section."""
 
-    surface: Surface
-    """"pack" or "backstop"."""
-    t_in: float
-    t_out: float
-    """Times of touch and leaving, s, since the firing before the section; leaving may be in the next period,
-    and is infinite for a contact without end."""
-    v_in: float
-    """Velocity at touch, m/s."""
+    surface: Surface = part('"pack" or "backstop"')
+    t_in: float = scalar("s", "time of touch")
+    t_out: float = scalar(
+        "s", "time of leaving", more="may be in the next period; infinite for a contact without end"
+    )
+    v_in: float = scalar("m/s", "velocity at touch")
 
 
-@dataclass(frozen=True)
-class Passage:
+class Passage(Declared):
     """What happens on the way from a section to the last."""
 
-    touches: tuple[Touch, ...]
-    """In order."""
-    period: float
-    """Time between firings, s."""
-    firings: int
-    """Number of firings on the way."""
+    touches: tuple[Touch, ...] = part("in order")
+    period: float = scalar("s", "time between firings")
+    firings: int = part("number of firings on the way")
 
     def of(self, surface: Surface) -> list[Touch]:
         """Return the touches of one surface."""
@@ -90,19 +82,17 @@ class Passage:
         return dots
 
 
-@dataclass(frozen=True)
-class Course:
-    """What a periodic orbit does in one period of it."""
+class Course(Declared):
+    """What a periodic orbit does in one period of it; energies in J."""
 
-    states: FloatArray
-    """Displacement, m, and velocity, m/s, at the sections, shape (firings, 2)."""
-    peak_forces: FloatArray
-    """Largest pack force of the contacts of each firing, N; NaN without one. Shape (firings,)."""
-    coil_work: float
-    drive_work: float
-    pack_loss: float
-    backstop_loss: float
-    """Energies, J."""
+    states: FloatArray = part("displacement, m, and velocity, m/s, at the sections, shape (firings, 2)")
+    peak_forces: FloatArray = column(
+        "N", "largest pack force of the contacts of each firing", "firing", more="NaN without one"
+    )
+    coil_work: float = part("of the coil")
+    drive_work: float = part("of a drive that is a force")
+    pack_loss: float = part("in the pack")
+    backstop_loss: float = part("in the backstop")
 
 
 class RegimeFamily:

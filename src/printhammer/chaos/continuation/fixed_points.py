@@ -7,17 +7,15 @@ G(u, p) = u in the plane z . row = constant, in scaled variables: u and p each d
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Hashable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable
-
     import numpy.typing as npt
 
     from printhammer.support.arrays import FloatArray
@@ -27,23 +25,19 @@ _STAGNANT: Final = 1e3
 """Corrections that no longer shrink are noise of the map if they are below this many precisions."""
 
 
-@dataclass(frozen=True)
-class MapValue:
+class MapValue(Declared):
     """A map with a parameter, evaluated at one point."""
 
-    image: FloatArray
-    """G(u, p), shape (n,)."""
-    jacobian: FloatArray
-    """dG/du, shape (n, n)."""
-    slope: FloatArray
-    """dG/dp, shape (n,)."""
-    label: Hashable = ()
-    """What kind of motion led there, such as its sequence of contacts; where it changes along a curve, that
-    is an event."""
-    trouble: str = ""
-    """Why the map has no value there; empty where it has one."""
-    extra: Any = field(default=None, repr=False)
-    """Whatever else the map wants to keep of this evaluation."""
+    image: FloatArray = part("image G(u, p), shape (n,)")
+    jacobian: FloatArray = part("derivative dG/du, shape (n, n)")
+    slope: FloatArray = part("derivative dG/dp, shape (n,)")
+    label: Hashable = part(
+        "what kind of motion led there, such as its sequence of contacts",
+        more="where it changes along a curve, that is an event",
+        default=(),
+    )
+    trouble: str = part("why the map has no value there; empty where it has one", default="")
+    extra: Any = part("whatever else the map wants to keep of this evaluation", default=None, repr=False)
 
     @classmethod
     def none(cls, count: int, trouble: str) -> MapValue:
@@ -56,22 +50,15 @@ MapFamily = Callable[["FloatArray", float], MapValue]
 """A map with a parameter: state, shape (n,), and parameter in, `MapValue` out."""
 
 
-@dataclass(frozen=True)
-class Node:
+class Node(Declared):
     """A fixed point on a curve."""
 
-    state: FloatArray
-    """u, shape (n,)."""
-    parameter: float
-    """p."""
-    tangent: FloatArray
-    """Direction of the curve in scaled variables, of length 1, shape (n + 1,)."""
-    arc: float
-    """Length of the curve from its start in scaled variables, negative before it."""
-    value: MapValue
-    """The map there."""
-    residual: float
-    """Largest scaled component of G(u, p) - u."""
+    state: FloatArray = part("state u, shape (n,)")
+    parameter: float = part("parameter p")
+    tangent: FloatArray = part("direction of the curve in scaled variables, of length 1, shape (n + 1,)")
+    arc: float = part("length of the curve from its start in scaled variables, negative before it")
+    value: MapValue = part("the map there")
+    residual: float = part("largest scaled component of G(u, p) - u")
 
     @property
     def multipliers(self) -> npt.NDArray[np.complex128]:

@@ -24,7 +24,7 @@ from printhammer.hammer.names import RATE
 from printhammer.results import Column, Result, part
 from printhammer.results.stacking import stacked
 from printhammer.run.regime import Regime
-from printhammer.support.threads import mapped
+from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Progress
 
 SEEDS: Final = 6
 """Number of rates at which orbits are searched for unless told otherwise."""

@@ -12,37 +12,33 @@ rest settles, on a grid; a stable orbit need not be what is reached from there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
-from printhammer.chaos.continuation.arclength import Steps, Stop, follow
+from printhammer.chaos.continuation.arclength import Curve, Steps, Stop, follow
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, torus_test
 from printhammer.chaos.continuation.continuation import continuation
-from printhammer.chaos.continuation.fixed_points import MapValue
+from printhammer.chaos.continuation.fixed_points import MapValue, Node
 from printhammer.chaos.continuation.tracer import read_bounds
 from printhammer.chaos.strobe.map import image_of
 from printhammer.chaos.strobe.train import Train, run_trains
 from printhammer.chaos.strobe.verdict import period_of
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.results import Column, Result, column, derived, part, provenance, scalar
-from printhammer.support.threads import mapped, thread_count
+from printhammer.results import Column, Declared, Result, column, derived, part, provenance, scalar
+from printhammer.support.threads import Progress, mapped, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import numpy.typing as npt
 
-    from printhammer.chaos.continuation.arclength import Curve
     from printhammer.chaos.continuation.events import BranchEvent
-    from printhammer.chaos.continuation.fixed_points import Node
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing, Regime
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-    from printhammer.support.threads import Progress
 
 MOST: Final = 200
 """Number of steps of a curve in either direction unless told otherwise."""
@@ -64,33 +60,20 @@ _GRID_TOLERANCE: Final = 1e-9
 _SAME: Final = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class LossCurve:
-    """A curve in the plane of two constants on which an orbit loses its stability, or would.
+class LossCurve(Declared, eq=False):
+    """A curve in the plane of two constants on which an orbit loses its stability, or would."""
 
-    Attributes
-    ----------
-    kind : str
-        "fold", "period doubling" or "Neimark-Sacker".
-    first, second : array, shape (N,)
-        The constants along the curve, SI.
-    state : array, shape (N, 2)
-        Displacement, m, and velocity, m/s, at the section.
-    multipliers : complex array, shape (N, 2)
-        One of them is 1 or -1, or both lie on the unit circle.
-    limits : bool array, shape (N,)
-        Whether the other multiplier lies inside the unit circle, so that stability is lost here.
-    stops : tuple of Stop
-        Why and where the curve ends.
-    """
-
-    kind: str
-    first: FloatArray
-    second: FloatArray
-    state: FloatArray
-    multipliers: npt.NDArray[np.complex128]
-    limits: BoolArray
-    stops: tuple[Stop, Stop]
+    kind: str = part('"fold", "period doubling" or "Neimark-Sacker"')
+    first: FloatArray = part("the first constant along the curve, SI, shape (N,)")
+    second: FloatArray = part("the second constant, SI, shape (N,)")
+    state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (N, 2)")
+    multipliers: npt.NDArray[np.complex128] = part(
+        "one of them is 1 or -1, or both lie on the unit circle, shape (N, 2)"
+    )
+    limits: BoolArray = part(
+        "whether the other multiplier lies inside the unit circle, so that stability is lost here, shape (N,)"
+    )
+    stops: tuple[Stop, Stop] = part("why and where the curve ends")
 
 
 class StabilityChart(Result):

@@ -18,19 +18,16 @@ from printhammer.chaos.continuation.branch_points import (
     follow_doubled,
     points_of,
 )
-from printhammer.chaos.continuation.events import event_of
-from printhammer.chaos.continuation.family import RegimeFamily, rigid_backstop
+from printhammer.chaos.continuation.events import BranchEvent, event_of
+from printhammer.chaos.continuation.family import Passage, RegimeFamily, rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
-from printhammer.support.threads import mapped
+from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
-    from printhammer.chaos.continuation.events import BranchEvent
-    from printhammer.chaos.continuation.family import Passage
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Progress
 
 PRECISION: Final = 1e-10
 """Scaled correction of Newton's method below which an orbit is found; see `arclength`."""

@@ -13,8 +13,8 @@ from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, coordinate, part, provenance, scalar
 from printhammer.run.problem import TOLERANCE
-from printhammer.run.regime import regimes_of
-from printhammer.support.threads import mapped
+from printhammer.run.regime import Regime, regimes_of
+from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,9 +27,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Regime
     from printhammer.support.arrays import BoolArray, FloatArray
-    from printhammer.support.threads import Progress
 
 
 class LyapunovChart(Result, rows="period"):

@@ -15,24 +15,20 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 import numpy as np
 
 from printhammer.chaos.exponents.zero_one import FEWEST, ZeroOne, zero_one
-from printhammer.chaos.strobe.points import strobe_of
+from printhammer.chaos.strobe.points import Strobe, strobe_of
 from printhammer.chaos.strobe.train import States, Train, exponents_of
-from printhammer.chaos.strobe.verdict import SIGNIFICANT, verdict
-from printhammer.derivatives.states import standard_error
+from printhammer.chaos.strobe.verdict import SIGNIFICANT, Verdict, verdict
+from printhammer.derivatives.states import Exponent, standard_error
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, derived, part, scalar
 from printhammer.run.problem import TOLERANCE
-from printhammer.run.regime import Regime
+from printhammer.run.regime import Firing, Regime
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.chaos.strobe.points import Strobe
-    from printhammer.chaos.strobe.verdict import Verdict
-    from printhammer.derivatives.states import Exponent
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray, IntArray
 
 FIRINGS: Final = 1000
@@ -237,12 +233,8 @@ def lyapunov(
         Number of firings over which growth counts.
     transient : int, optional
         Number of firings left out before them.
-    state : tuple of float, optional
-        Displacement, m, and velocity, m/s, at the first firing; by default the rest state.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
-    **firing
-        How the hammer is fired, as for `printhammer.Regime.of`.
+    state, tolerance, **firing
+        As for `printhammer.strobe`.
 
     Returns
     -------

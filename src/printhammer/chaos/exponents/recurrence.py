@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.chaos.strobe.points import Strobe, points_of
 from printhammer.chaos.strobe.verdict import AGREEMENT
-from printhammer.drive.input import read_count
+from printhammer.drive.input import read_array, read_count
 from printhammer.errors import InputError
 from printhammer.results import Result, column, scalar
 
@@ -206,10 +206,7 @@ def _rows(states: npt.ArrayLike | Strobe, scales: npt.ArrayLike | None) -> tuple
         if not np.isfinite(rows).all():
             raise InputError(f"states: the run ended early ({states.status}), expected one that did not")
     else:
-        try:
-            rows = np.array(states, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"states = {states!r}, expected numbers, a row for each state") from None
+        rows = read_array(states, "states", "numbers, a row for each state")
         rows = rows[:, np.newaxis] if rows.ndim == 1 else rows
         if rows.ndim != 2:
             raise InputError(f"states: an array of shape {rows.shape}, expected a row for each state")

@@ -22,7 +22,7 @@ import numpy as np
 
 from printhammer.chaos.strobe.points import Strobe, points_of
 from printhammer.chaos.strobe.verdict import AGREEMENT
-from printhammer.drive.input import read_count
+from printhammer.drive.input import read_array, read_count
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, coordinate, part, scalar
 
@@ -309,10 +309,7 @@ def _correlations(displacements: FloatArray) -> FloatArray:
 
 
 def _numbers(series: npt.ArrayLike) -> FloatArray:
-    try:
-        numbers = np.array(series, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"series = {series!r}, expected numbers") from None
+    numbers = read_array(series, "series")
     if numbers.ndim != 1:
         raise InputError(f"series: an array of shape {numbers.shape}, expected one number after the other")
     wrong = np.flatnonzero(~np.isfinite(numbers))

@@ -16,10 +16,10 @@ from printhammer.drive.input import MOST_PULSES, read_count
 from printhammer.errors import InputError
 from printhammer.results import Result, column, derived, part, scalar
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
-from printhammer.run.regime import Regime, regimes_of
+from printhammer.run.regime import Firing, Regime, regimes_of
 from printhammer.run.start import initial_state
 from printhammer.run.touches import touches_of
-from printhammer.support.threads import mapped
+from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,9 +30,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray, IntArray
-    from printhammer.support.threads import Progress
 
 Surface = Literal["pack", "backstop"]
 SURFACES: Final = get_args(Surface)
@@ -133,12 +131,8 @@ def section(
         Number of firings left out before the first touch.
     firings : int, optional
         Number of firings after which to give up looking; by default ten for each touch asked for.
-    state : tuple of float, optional
-        Displacement, m, and velocity, m/s, at the first firing; by default the rest state.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
-    **firing
-        How the hammer is fired, as for `printhammer.Regime.of`.
+    state, tolerance, **firing
+        As for `printhammer.strobe`.
 
     Returns
     -------

@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 import numpy as np
 
 from printhammer.chaos.impacts.sections import Section, section
-from printhammer.drive.input import read_count, read_positive
+from printhammer.drive.input import read_array, read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, column, derived, part, provenance, scalar
-from printhammer.run.regime import Regime
+from printhammer.run.regime import Firing, Regime
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray, IntArray
 
 BINS: Final = 60
@@ -216,10 +215,7 @@ def _fano(times: FloatArray, length: float) -> tuple[int, float]:
 
 
 def _times(touches: npt.ArrayLike, source: Section | None) -> FloatArray:
-    try:
-        times = np.array(touches, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"touches = {touches!r}, expected times, s") from None
+    times = read_array(touches, "touches", "times, s")
     if times.ndim != 1 or times.size <= _FEWEST:
         why = f" ({source.remark})" if source is not None and source.remark else ""
         raise InputError(f"touches: {times.size} times, expected at least {_FEWEST + 1}{why}")

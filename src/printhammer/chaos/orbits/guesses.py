@@ -7,7 +7,6 @@ plane, so that orbits which no train from rest comes near are found too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,6 +15,7 @@ from printhammer.chaos.orbits.newton import Guess
 from printhammer.chaos.strobe.map import WITH_MEMORY, front_with_memory
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.results import Declared, part
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
 
@@ -42,14 +42,13 @@ _PLASTIC: Final = 1.324717957244746
 """The real root of x^3 = x + 1, whose powers spread points evenly over a square."""
 
 
-@dataclass(frozen=True)
-class Records:
+class Records(Declared):
     """States of many motions at the sections, from one on."""
 
-    states: FloatArray
-    """Displacement, m, and velocity, m/s; NaN where a run did not get. Shape (M, n, 2)."""
-    usable: BoolArray
-    """Whether that is the whole state, shape (M, n)."""
+    states: FloatArray = part(
+        "displacement, m, and velocity, m/s, shape (M, n, 2)", more="NaN where a run did not get"
+    )
+    usable: BoolArray = part("whether that is the whole state, shape (M, n)")
 
 
 def record(

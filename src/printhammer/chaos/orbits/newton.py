@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
+from printhammer.results import Declared, part
+
 if TYPE_CHECKING:
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
 
@@ -55,28 +57,20 @@ class StrobeMaps(Protocol):
         """Return the images."""
 
 
-@dataclass(frozen=True)
-class Guess:
+class Guess(Declared):
     """A stretch of a motion that nearly closes."""
 
-    states: FloatArray
-    """States at the starts of the segments, shape (m, 2)."""
-    firings: IntArray
-    """Number of firings in each segment, shape (m,)."""
+    states: FloatArray = part("states at the starts of the segments, shape (m, 2)")
+    firings: IntArray = part("number of firings in each segment, shape (m,)")
 
 
-@dataclass(frozen=True)
 class Closing(Guess):
     """What Newton's method made of one guess."""
 
-    jacobians: FloatArray
-    """Derivative of the end of each segment with respect to its start. Shape (m, 2, 2)."""
-    residual: float
-    """Largest distance of an end from the start that follows, in half-widths of the window."""
-    smooth: bool
-    """Whether the orbit has a derivative."""
-    reason: str
-    """Why it does not close; empty where it does."""
+    jacobians: FloatArray = part("derivative of the end of each segment by its start, shape (m, 2, 2)")
+    residual: float = part("largest distance of an end from the next start, in half-widths of the window")
+    smooth: bool = part("whether the orbit has a derivative")
+    reason: str = part("why it does not close; empty where it does")
 
     @property
     def closed(self) -> bool:

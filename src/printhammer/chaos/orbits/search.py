@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.chaos.orbits.guesses import PHASES, close_returns, first_state, joined, record, spread
 from printhammer.chaos.orbits.maps import ExactMaps, FastMaps
-from printhammer.chaos.orbits.newton import Closing, close_orbits
+from printhammer.chaos.orbits.newton import Closing, Guess, close_orbits
 from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, no_orbit, orbit_of, orbits_table
 from printhammer.chaos.strobe.map import MAP_TOLERANCE, read_state
 from printhammer.drive.input import read_count
@@ -18,8 +18,8 @@ from printhammer.errors import InputError
 from printhammer.results import Column, Result, part, scalar
 from printhammer.results.stacking import stacked
 from printhammer.run.problem import TOLERANCE, check_tolerance
-from printhammer.run.regime import Regime
-from printhammer.support.threads import mapped, thread_count
+from printhammer.run.regime import Firing, Regime
+from printhammer.support.threads import Progress, mapped, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -28,11 +28,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from printhammer.chaos.orbits.guesses import Records
-    from printhammer.chaos.orbits.newton import Guess
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Firing
     from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Progress
 
 LONGEST: Final = 8
 """Largest number of firings of the orbits that are looked for unless told otherwise."""

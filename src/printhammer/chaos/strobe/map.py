@@ -12,7 +12,6 @@ image says "in the pack"; another phase of the period is to be chosen, at which 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
@@ -21,12 +20,13 @@ import numpy as np
 from printhammer.derivatives.states import follow
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
 from printhammer.run.ensemble import MODE_NAMES
-from printhammer.run.problem import Problem, check_tolerance
+from printhammer.run.problem import Problem, Record, check_tolerance
 from printhammer.run.regime import Regime
 from printhammer.run.start import initial_state
-from printhammer.support.threads import mapped
+from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,9 +34,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.problem import Record
     from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Progress
 
 MAP_TOLERANCE: Final = 1e-13
 """Tolerance with which the map is computed: its noise limits how well a fixed point can be known."""
@@ -59,39 +57,34 @@ _SPACING: Final = 1e-4
 """Relative change of a constant by which a slope is taken."""
 
 
-@dataclass(frozen=True)
-class Image:
-    """What the strobe map makes of a state.
+class Image(Declared):
+    """What the strobe map makes of a state."""
 
-    Attributes
-    ----------
-    state : array, shape (2,)
-        Displacement, m, and velocity, m/s, at the end; NaN unless the status is "ok".
-    jacobian : array, shape (2, 2)
-        Derivative of the state at the end with respect to that at the start, from the tangent flow; NaN
-        likewise.
-    status : str
-        "ok"; how the run ended otherwise; or "in the pack" where the state at the start or the end has a
-        memory.
-    smooth : bool
-        False where the motion passes a touch without velocity, where the state has no derivative.
-    contacts : tuple of (str, float)
-        Surface, "pack" or "backstop", and time of touch since the start, s, of every contact that begins in
-        between, in order; empty where they were not asked for.
-    margin : float
-        Signed nearness of a grazing, in units of the way from backstop to pack: of all local extrema of the
-        displacement, how far the one that is nearest to the pack's front or to the backstop's position lies
-        beyond it in its own direction, so that it passes through 0 where a contact appears, vanishes, parts
-        or merges. An impact on a rigid backstop counts with the square of its speed in units of the typical
-        speed. NaN where there is none, or where it was not asked for.
-    """
-
-    state: FloatArray
-    jacobian: FloatArray
-    status: str
-    smooth: bool
-    contacts: tuple[tuple[str, float], ...]
-    margin: float
+    state: FloatArray = part(
+        'displacement, m, and velocity, m/s, at the end, shape (2,); NaN unless the status is "ok"'
+    )
+    jacobian: FloatArray = part(
+        "derivative of the state at the end with respect to that at the start, from the tangent flow, shape"
+        " (2, 2); NaN likewise"
+    )
+    status: str = part(
+        '"ok"; how the run ended otherwise; or "in the pack" where the state at the start or the end has a'
+        " memory"
+    )
+    smooth: bool = part(
+        "False where the motion passes a touch without velocity, where the state has no derivative"
+    )
+    contacts: tuple[tuple[str, float], ...] = part(
+        'surface, "pack" or "backstop", and time of touch since the start, s, of every contact that begins in'
+        " between, in order; empty where they were not asked for"
+    )
+    margin: float = part(
+        "signed nearness of a grazing, in units of the way from backstop to pack",
+        more="of all local extrema of the displacement, how far the one nearest to the pack's front or to"
+        " the backstop's position lies beyond it in its own direction, so that it passes through 0 where a"
+        " contact appears, vanishes, parts or merges. An impact on a rigid backstop counts with the square of"
+        " its speed in units of the typical speed. NaN where there is none, or where it was not asked for",
+    )
 
     @property
     def ok(self) -> bool:

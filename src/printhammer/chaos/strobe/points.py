@@ -11,29 +11,25 @@ from typing import TYPE_CHECKING, Any, SupportsIndex, Unpack
 
 import numpy as np
 
-from printhammer.chaos.strobe.train import Train, run_trains
-from printhammer.chaos.strobe.verdict import FIRST, LAST
+from printhammer.chaos.strobe.train import States, Train, run_trains
+from printhammer.chaos.strobe.verdict import FIRST, LAST, Verdict
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import TOLERANCE
-from printhammer.run.regime import Regime, regimes_of
-from printhammer.run.window import window_of
+from printhammer.run.regime import Firing, Regime, regimes_of
+from printhammer.run.window import Window, window_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.chaos.strobe.train import States
-    from printhammer.chaos.strobe.verdict import Verdict
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.run.regime import Firing
-    from printhammer.run.window import Window
     from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress
 

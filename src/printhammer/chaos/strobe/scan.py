@@ -20,21 +20,18 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.chaos.strobe.train import Train, exponents_of, exponents_onward, run_trains
-from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, period_of, verdict
+from printhammer.chaos.strobe.train import States, Train, exponents_of, exponents_onward, run_trains
+from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, Verdict, period_of, verdict
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
-from printhammer.support.threads import mapped
+from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.chaos.strobe.train import States
-    from printhammer.chaos.strobe.verdict import Verdict
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.threads import Progress
 
 STAGES: Final = (32, 128)
 """Numbers of firings after which a train may count as periodic."""

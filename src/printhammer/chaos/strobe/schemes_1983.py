@@ -15,10 +15,10 @@ import numpy as np
 
 from printhammer.chaos.strobe.points import POINTS, Strobe, strobe_of
 from printhammer.chaos.strobe.train import States, Train
-from printhammer.chaos.strobe.verdict import FIRST, LAST, verdict
+from printhammer.chaos.strobe.verdict import FIRST, LAST, Verdict, verdict
 from printhammer.errors import InputError
 from printhammer.kernel.model.modes import BACKSTOP, FREE, LOADING, UNLOADING
-from printhammer.kernel.schemes_1983 import READINGS
+from printhammer.kernel.schemes_1983 import READINGS, Reading, Scheme, SchemeRun
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import regimes_of
 from printhammer.run.scheme_runs import SchemeProblem
@@ -27,9 +27,7 @@ from printhammer.run.start import initial_state
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.chaos.strobe.verdict import Verdict
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.schemes_1983 import Reading, Scheme, SchemeRun
     from printhammer.support.threads import Progress
 
 SCHEMES: Final[tuple[Scheme, ...]] = ("runge-kutta-4", "trapezoid")
@@ -49,20 +47,14 @@ def scheme_strobes(
 
     Parameters
     ----------
-    hammers : Hammer or sequence of Hammer
-        One for all trains, or one for each.
-    periods : sequence
-        Time between firings of each train, s, or text with a unit.
+    hammers, periods
+        Hammers and the times between their firings, see `printhammer.run.regime.regimes_of`.
     scheme : str
         "runge-kutta-4" or "trapezoid".
     reading : str, optional
         When the short step is taken, see `printhammer.kernel.schemes_1983.READINGS`.
-    points : int, optional
-        Points to return, from the first firing on.
-    firings : tuple of int, optional
-        First and last firing that the verdict is about.
-    progress : callable, optional
-        Called with the number of trains done and of all.
+    points, firings, progress
+        As for `printhammer.chaos.strobes`; the points are those from the first firing on.
 
     Returns
     -------

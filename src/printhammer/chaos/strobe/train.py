@@ -8,23 +8,22 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from printhammer.chaos.strobe.verdict import period_of, repeats, verdict
+from printhammer.chaos.strobe.verdict import Verdict, period_of, repeats, verdict
+from printhammer.results import Declared, part
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.window import window_of
-from printhammer.support.threads import mapped, shifted
+from printhammer.support.threads import Progress, mapped, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.chaos.strobe.verdict import Verdict
     from printhammer.derivatives.states import Exponent
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray, IntArray
-    from printhammer.support.threads import Progress
 
 HELD_BRANCHES: Final = {
     MODE_NAMES.index(f"held on the {branch} branch"): MODE_NAMES.index(branch)
@@ -36,16 +35,14 @@ _BEFORE: Final = 100
 """Firings before an exponent counts."""
 
 
-@dataclass(frozen=True)
-class Train:
+class Train(Declared):
     """A regime fired from a state on, with nothing fired before."""
 
-    regime: Regime
-    """Hammer and periodic drive."""
-    drive: Drive
-    """So many pulses, or the endless force."""
-    state: tuple[float, float] | None = None
-    """Displacement, m, and velocity, m/s, at time 0; None for the rest state."""
+    regime: Regime = part("hammer and periodic drive")
+    drive: Drive = part("so many pulses, or the endless force")
+    state: tuple[float, float] | None = part(
+        "displacement, m, and velocity, m/s, at time 0", more="None for the rest state", default=None
+    )
 
     @classmethod
     def of(cls, regime: Regime, firings: int, state: tuple[float, float] | None = None) -> Self:

@@ -8,10 +8,11 @@ positive by three standard errors. Everything else is undecided, with the reason
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from printhammer.derivatives.states import Exponent
@@ -35,44 +36,25 @@ LAST: Final = 2000
 _STOPPED: Final = "the run ended before firing"
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What kind of motion a train leads to, and the evidence.
+class Verdict(Declared):
+    """What kind of motion a train leads to, and the evidence."""
 
-    Attributes
-    ----------
-    name : str
-        "period-1", "period-2", ..., "strange" or "undecided".
-    period : int or None
-        Number of firings after which the states repeat.
-    distance : float
-        Largest distance of states `nearest` firings apart, in half-widths of the window; NaN where the run
-        ended before.
-    nearest : int or None
-        Number of firings after which the states come closest to repeating, at most 64; the period where
-        there is one.
-    exponent : float
-        Largest exponent of the strobe map, per firing; NaN where it was not computed.
-    standard_error : float
-        Of the exponent.
-    first, last : int
-        Firings that were judged; the very first one is number 1.
-    tolerance : float
-        Tolerance of the integration.
-    reason : str
-        Why the verdict is "undecided"; else empty.
-    """
-
-    name: str
-    period: int | None
-    distance: float
-    nearest: int | None
-    exponent: float
-    standard_error: float
-    first: int
-    last: int
-    tolerance: float
-    reason: str = ""
+    name: str = part('"period-1", "period-2", ..., "strange" or "undecided"')
+    period: int | None = part("number of firings after which the states repeat")
+    distance: float = part(
+        "largest distance of states `nearest` firings apart, in half-widths of the window",
+        more="NaN where the run ended before",
+    )
+    nearest: int | None = part(
+        "number of firings after which the states come closest to repeating, at most 64",
+        more="the period where there is one",
+    )
+    exponent: float = part("largest exponent of the strobe map, per firing; NaN where it was not computed")
+    standard_error: float = part("of the exponent")
+    first: int = part("first firing that was judged; the very first one is number 1")
+    last: int = part("last firing that was judged")
+    tolerance: float = part("tolerance of the integration")
+    reason: str = part('why the verdict is "undecided"; else empty', default="")
 
     @property
     def stopped(self) -> bool:

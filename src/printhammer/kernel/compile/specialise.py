@@ -77,17 +77,10 @@ announce: Callable[[str], None] | None = None
 class Kernel:
     """The compiled functions of one combination of laws.
 
-    Attributes
-    ----------
-    run, resample, quadratures, peaks, members
-        Entry points; see the template modules of the same names. Kernels for lanes and for variational
-        equations have an entry point of their own, `lanes` or `flow`.
-    label : str
-        What the kernel is for.
-    digest : str
-        Of all its sources.
-    namespace : dict
-        All that its modules define, for what builds on them.
+    Its entry points `run`, `resample`, `quadratures`, `peaks` and `members` are those of the template modules
+    of the same names. Kernels for lanes and for variational equations have an entry point of their own,
+    `lanes` or `flow`. The `label` says what the kernel is for, the `digest` is that of all its sources, and
+    the `namespace` has all that its modules define, for what builds on them.
     """
 
     def __init__(
@@ -164,20 +157,8 @@ one_at_a_time = threading.RLock()
 def specialise(laws: Laws) -> Kernel:
     """Return the kernel compiled for `laws`; the same object for equal laws.
 
-    Parameters
-    ----------
-    laws : Laws
-        Names of the modules that hold the laws, and the flags.
-
-    Returns
-    -------
-    Kernel
-        Its entry points compile on their first call, or load their machine code from disk.
-
-    Raises
-    ------
-    ImportError
-        If a module named in `laws` cannot be imported.
+    Its entry points compile on their first call, or load their machine code from disk. ImportError if a
+    module named in `laws` cannot be imported.
     """
     with one_at_a_time:
         return _specialised(laws)
