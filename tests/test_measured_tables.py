@@ -23,6 +23,7 @@ SILENT = (
     "support/constants",
     "support/outputs",
     "support/sheets",
+    "support/texts",
     "support/threads",
     "units",
 )

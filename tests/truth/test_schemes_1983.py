@@ -10,7 +10,7 @@ import printhammer as ph
 from printhammer.chaos.strobe.schemes_1983 import SCHEMES, scheme_strobes
 from printhammer.chaos.strobe.verdict import repeats
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.kernel.schemes_1983 import READINGS, Reading, Scheme
+from printhammer.run.scheme_runs import READINGS, Reading, Scheme
 
 CLOSE = 1e-9
 """Difference, in half-widths of the window, of what two programs of one scheme compute."""

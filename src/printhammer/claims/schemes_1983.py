@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from printhammer.claims.judging import JudgedClaim
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.schemes_1983 import Scheme
+    from printhammer.run.scheme_runs import Scheme
 
 COMPUTED: Final = (
     "single_pulse_stroke",

@@ -22,7 +22,13 @@ from printhammer.run.problem import Problem, Record
 if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
+
+READINGS = schemes_1983.READINGS
+"""Ways to read when the short step is taken, see `printhammer.kernel.schemes_1983`."""
+
+Reading = schemes_1983.Reading
+Scheme = schemes_1983.Scheme
 
 _GAUSS = np.polynomial.legendre.leggauss(4)
 
@@ -31,7 +37,7 @@ class SchemeProblem(Problem):
     """One hammer under one drive, to be integrated with a scheme of 1983.
 
     Arguments as for `Problem`, the tolerance of no use; `scale` is a factor on all steps of the paper's
-    schedule, and `reading`, one of `printhammer.kernel.schemes_1983.READINGS`, says when its short steps
+    schedule, and `reading`, one of `READINGS`, says when its short steps
     begin and end. InputError where the factor is not positive.
     """
 
@@ -80,6 +86,24 @@ class SchemeProblem(Problem):
             rigid=self._rigid,
             reload_along_unloading=self.laws.reload_along_unloading,
         )
+
+    def strobed(
+        self, moments: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, str]:
+        """Return time, displacement, velocity, mode and memory at moments, s, and the status.
+
+        Where the scheme failed before they are nan, the mode -1.
+        """
+        run = self.integrate(float(moments[-1]), moments)
+        t, x, v, memory = np.full((4, moments.size), np.nan)
+        for row, column in zip((t, x, v, memory), (run.t, run.x, run.v, run.memory), strict=True):
+            row[: column.size] = column
+        front = math.inf if self.hammer.front is None else self.hammer.front
+        position = -math.inf if self.hammer.position is None else self.hammer.position
+        mode = np.where(x > front, np.where(v >= 0.0, M.LOADING, M.UNLOADING), M.FREE)
+        mode = np.where(x < position, M.BACKSTOP, mode).astype(np.int64)
+        mode[run.t.size :] = -1
+        return t, x, v, mode, memory, run.status
 
     def run(self, end: float) -> Record:
         """Integrate to time `end`, s; a run that diverged has the status of a step that cannot be taken."""

@@ -16,7 +16,8 @@ def stuck(steps: float, length: float, ratio: float = 0.5) -> bool:
         pool[(layout.CONTROL + row) * layout.BLOCK] = value
     pool[layout.STEPS * layout.BLOCK] = steps
     good = ratio <= 1.0
-    settle(pool, 0, TIME, 0.0, 0.0, 0.0, length, TIME + length, 0.0, 0.0, 0.0, ratio, good, False, False)
+    start, end = (TIME, 0.0, 0.0, 0.0), (TIME + length, 0.0, 0.0, 0.0)
+    settle(pool, 0, start, length, end, ratio, good, False, False)
     return bool(pool[layout.EVENT * layout.BLOCK] == layout.STUCK)
 
 

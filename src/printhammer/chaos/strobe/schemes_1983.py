@@ -17,11 +17,9 @@ from printhammer.chaos.strobe.points import POINTS, Strobe, strobe_of
 from printhammer.chaos.strobe.train import States, Train
 from printhammer.chaos.strobe.verdict import FIRST, LAST, Verdict, verdict
 from printhammer.errors import InputError
-from printhammer.kernel.model.modes import BACKSTOP, FREE, LOADING, UNLOADING
-from printhammer.kernel.schemes_1983 import READINGS, Reading, Scheme, SchemeRun
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import regimes_of
-from printhammer.run.scheme_runs import SchemeProblem
+from printhammer.run.scheme_runs import READINGS, Reading, Scheme, SchemeProblem
 from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
@@ -52,7 +50,7 @@ def scheme_strobes(
     scheme : str
         "runge-kutta-4" or "trapezoid".
     reading : str, optional
-        When the short step is taken, see `printhammer.kernel.schemes_1983.READINGS`.
+        When the short step is taken, see `printhammer.run.scheme_runs.READINGS`.
     points, firings, progress
         As for `printhammer.chaos.strobes`; the points are those from the first firing on.
 
@@ -79,28 +77,13 @@ def scheme_strobes(
         problem = SchemeProblem(
             train.hammer, train.drive, initial_state(train.hammer, None), TOLERANCE, scheme, reading=reading
         )
-        run = problem.integrate(float(moments[-1]) + train.period, moments)
-        states = _states(run, train, count)
+        states = States(*problem.strobed(moments))
         chosen = np.arange(1, points + 1)
         shown = _part(states, slice(0, points))
         strobed.append(strobe_of(train, chosen, shown, TOLERANCE, _judged(states, train, firings)))
         if progress is not None:
             progress(done, len(regimes))
     return strobed
-
-
-def _states(run: SchemeRun, train: Train, count: int) -> States:
-    """Return the states of a run at the firings; nan from where it failed."""
-    front = np.inf if train.hammer.front is None else train.hammer.front
-    position = -np.inf if train.hammer.position is None else train.hammer.position
-    table = np.full((4, count), np.nan)
-    for row, column in zip(table, (run.t, run.x, run.v, run.memory), strict=True):
-        row[: column.size] = column
-    t, x, v, memory = table
-    pack = np.where(v >= 0.0, LOADING, UNLOADING)
-    branch = np.where(x > front, pack, np.where(x < position, BACKSTOP, FREE))
-    branch[run.t.size :] = -1
-    return States(t, x, v, branch.astype(np.int64), memory, run.status)
 
 
 def _part(states: States, some: slice) -> States:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from printhammer.chaos import Strobe
     from printhammer.figures.elements.scales import Scale
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.schemes_1983 import Reading, Scheme
+    from printhammer.run.scheme_runs import Reading, Scheme
 
 PERIODS: Final = tuple(hundredths / 1e5 for hundredths in range(135, 75, -5))
 """Strobe times of the panels, s: from 1.35 ms down to 0.80 ms."""

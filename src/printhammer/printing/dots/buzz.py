@@ -21,7 +21,6 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.settling import touches
-from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
@@ -250,6 +249,8 @@ def delayed_trains(
     **options
         `tolerance` of the runs and `threads`, as for `printhammer.Ensemble`.
     """
+    from printhammer.run.ensemble import Ensemble
+
     threads = options.pop("threads", None)
     trains = [[0.0] for _ in delays]
     growing = list(range(len(delays)))

@@ -19,7 +19,7 @@ from printhammer.chaos.strobe.schemes_1983 import SCHEMES, scheme_strobes
 from printhammer.claims import Context, claims, judge
 from printhammer.claims.schemes_1983 import judge_as_in_1983
 from printhammer.claims.verdicts import changed, printed_verdicts
-from printhammer.kernel.schemes_1983 import READINGS, Reading
+from printhammer.run.scheme_runs import READINGS, Reading
 from printhammer.reconstruction.family.family import family_hammers
 from printhammer.reconstruction.judging.base_rates import draw
 from printhammer.reconstruction.search.space import hammer_of
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.schemes_1983 import Scheme
+    from printhammer.run.scheme_runs import Scheme
 
 CHANGE: Final = 1e-5
 """By which all constants are changed at once, up, to see how much a verdict hangs on their last digits."""
