@@ -7,10 +7,9 @@ import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.bench.ensembles import DISPLAY, EXACT
+from printhammer.bench.ensembles import DISPLAY, EXACT, Figures, Mass
 
 if TYPE_CHECKING:
-    from printhammer.bench.ensembles import Figures, Mass
     from printhammer.bench.table import Line
 
 Rows = list[tuple[str, ...]]

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.bench import exact, own
-from printhammer.bench.entry import Absent, Entry
+from printhammer.bench.entry import Absent, Entry, Peers, Say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.bench.entry import Peers, Say
     from printhammer.bench.problem import Task
 
 _SHORTEST: Final = 0.02

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.claims.context import CYCLE, NotMeasurableError
+from printhammer.claims.context import CYCLE, Context, NotMeasurableError
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
-    from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.motion import Motion

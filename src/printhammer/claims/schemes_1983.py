@@ -15,13 +15,12 @@ import numpy as np
 from printhammer.chaos.strobe.schemes_1983 import scheme_strobes
 from printhammer.claims.context import TAIL, Context
 from printhammer.claims.definition import claims
-from printhammer.claims.judging import judge
+from printhammer.claims.judging import JudgedClaim, judge
 from printhammer.claims.verdicts import PANELS, printed_verdicts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.claims.judging import JudgedClaim
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.schemes_1983 import Scheme

@@ -5,7 +5,7 @@ In the text everything else stays as it is, comments and layout too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, MutableMapping
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,6 @@ from printhammer.hammer.file import SELECTORS, TEXTS, Body, file_options, kinds_
 from printhammer.support.constants import Constant, Quantity, quantities, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, MutableMapping
-
     from pydantic import BaseModel
 
 Edit = tuple[str, Any]

@@ -28,7 +28,7 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.results.declare import heading
+from printhammer.results.declare import Column, heading
 from printhammer.results.provenance import KEYS
 from printhammer.support.outputs import write_file
 from printhammer.support.sheets import read_sheet
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from printhammer.results.declare import Column
 
 ENDINGS: Final = (".nc", ".zarr", ".csv", ".parquet", ".json")
 """Endings of the files that hold results."""

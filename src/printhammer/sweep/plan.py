@@ -15,13 +15,12 @@ from printhammer.results.provenance import provenance
 from printhammer.results.store import Layout, Variable
 from printhammer.sweep.design import Blocks, between, latin_hypercube
 from printhammer.sweep.members import Maker
-from printhammer.sweep.outputs import FIRING, TIME
+from printhammer.sweep.outputs import FIRING, TIME, Output
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from printhammer.support.arrays import FloatArray
-    from printhammer.sweep.outputs import Output
     from printhammer.sweep.spec import Spec
 
 FORMAT: Final = "1"

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from printhammer.drive.file import read_drive
 from printhammer.drive.text import FORMAT as DRIVE_FORMAT
 from printhammer.drive.text import document
 from printhammer.errors import InputError
-from printhammer.hammer.hammer import load, shipped
+from printhammer.hammer.hammer import Hammer, load, shipped
 from printhammer.hammer.names import quantity_of
 from printhammer.support.constants import shown
 from printhammer.support.texts import read_text
@@ -30,9 +30,6 @@ from printhammer.sweep.members import KINDS, Base
 from printhammer.sweep.outputs import Outputs, read_outputs
 from printhammer.sweep.quantities import read_quantity
 from printhammer.sweep.tables import read_tables
-
-if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from printhammer.figures.elements.marks import dashed, dots, note
-from printhammer.figures.elements.scales import scale
+from printhammer.figures.elements.scales import Scale, scale
 from printhammer.figures.elements.style import BLUE, FAINT, HAIR, MUTED, SMALL, THIN, new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.chaos import ImpactTrain
-    from printhammer.figures.elements.scales import Scale
 
 
 @styled

@@ -10,7 +10,7 @@ from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import RING, panel, scales_of, shown_period
 from printhammer.figures.elements.curves import waveform_of
 from printhammer.figures.elements.marks import legend_below, note
-from printhammer.figures.elements.scales import label
+from printhammer.figures.elements.scales import Scale, label
 from printhammer.figures.elements.style import INK, new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.chaos import Strobe
-    from printhammer.figures.elements.scales import Scale
     from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.schemes_1983 import Reading, Scheme
 

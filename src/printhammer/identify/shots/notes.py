@@ -8,14 +8,13 @@ import numpy as np
 
 from printhammer.identify.shots.identifiable import would_be_found
 from printhammer.identify.shots.shooting import Parameters, Shooting
-from printhammer.identify.shots.shot import FEWEST
+from printhammer.identify.shots.shot import FEWEST, Shot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
-    from printhammer.identify.shots.shot import Shot
     from printhammer.support.arrays import FloatArray
 
 _REJECTED: Final = 0.01

@@ -18,7 +18,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.identify.lowpass import lowpass_motion, time_constant
-from printhammer.identify.shots.shot import stroke_of
+from printhammer.identify.shots.shot import Shot, stroke_of
 from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.shots.pulse import Pulse
-    from printhammer.identify.shots.shot import Shot
     from printhammer.support.arrays import FloatArray, IntArray
 
 _STEP: Final = 1e-7

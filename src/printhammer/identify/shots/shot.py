@@ -15,14 +15,13 @@ import numpy as np
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.identify.residuals import noise_of_record, running_median
-from printhammer.identify.tables import read_table
+from printhammer.identify.tables import Readings, read_table
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray, IntArray
 
 Surface = Literal["pack", "backstop"]
