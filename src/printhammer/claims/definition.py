@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,27 +22,20 @@ SIDES: Final = ("above", "at_least", "below", "at_most")
 _PRINTED_DIGITS: Final = 1e-9
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(Declared):
     """One checkable statement of the paper."""
 
-    name: str
-    """Name."""
-    kind: Kind
-    """"stated", "typical" or "shape"."""
-    source: str
-    """Where the paper says it."""
-    says: str
-    """What it says, in our words."""
-    reading: str
-    """What is measured, and what must be so."""
-    note: str
-    """What a reader must know beside; may be empty."""
-    settings: Mapping[str, Any]
-    """Numbers that set up the experiment, SI."""
-    band: Mapping[str, Any]
-    """What each measured value must be: a number or text, true or false; a list (least, largest) of two
-    numbers, or of texts; a table of `SIDES`."""
+    name: str = part("name")
+    kind: Kind = part('"stated", "typical" or "shape"')
+    source: str = part("where the paper says it")
+    says: str = part("what it says, in our words")
+    reading: str = part("what is measured, and what must be so")
+    note: str = part("what a reader must know beside; may be empty")
+    settings: Mapping[str, Any] = part("numbers that set up the experiment, SI")
+    band: Mapping[str, Any] = part(
+        "what each measured value must be: a number or text, true or false; a list (least, largest) of"
+        " two numbers, or of texts; a table of `SIDES`"
+    )
 
     def holds(self, value: Mapping[str, Any]) -> bool:
         """Whether every measured value is within its band."""

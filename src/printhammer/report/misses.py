@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.report.quantities import band_text, split_name, value_text
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -15,17 +15,13 @@ if TYPE_CHECKING:
 _LEAST: Final = {"above", "at_least"}
 
 
-@dataclass(frozen=True)
-class Miss:
+class Miss(Declared):
     """A measured value outside its band, as text."""
 
-    words: str
-    """What was measured."""
-    value: str
-    band: str
-    """What it is, and what it must be."""
-    distance: str
-    """How far that is apart."""
+    words: str = part("what was measured")
+    value: str = part("what it is")
+    band: str = part("what it must be")
+    distance: str = part("how far these are apart")
 
 
 def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:

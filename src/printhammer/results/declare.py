@@ -217,12 +217,13 @@ class Declared:
     """Values that belong together; a class that derives from it is a frozen dataclass without a Dataset.
 
     Its fields say what they mean as those of a result do, and the Attributes of its docstring follow.
+    With `eq=False` its instances are compared by identity, as those that hold arrays must be.
     """
 
     if TYPE_CHECKING:
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
-    def __init_subclass__(cls, **options: Any) -> None:
+    def __init_subclass__(cls, *, eq: bool = True, **options: Any) -> None:
         super().__init_subclass__(**options)
-        dataclass(frozen=True)(cls)
+        dataclass(frozen=True, eq=eq)(cls)
         cls.__doc__ = with_attributes(cls.__doc__ or "", cls, columns_of(cls))

@@ -6,10 +6,11 @@ corrected by what each stretch by itself shows, before errors can grow from cont
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,16 +30,12 @@ _TRIES: Final = 2
 """Steps at one price."""
 
 
-@dataclass(frozen=True, eq=False)
-class Prior:
+class Prior(Declared, eq=False):
     """What is known of the parameters beside the records: normal, (p - mean) with a covariance."""
 
-    which: IntArray
-    """Numbers of the parameters, shape (k,)."""
-    mean: FloatArray
-    """SI, shape (k,)."""
-    covariance: FloatArray
-    """SI, shape (k, k)."""
+    which: IntArray = part("numbers of the parameters, shape (k,)")
+    mean: FloatArray = part("SI, shape (k,)")
+    covariance: FloatArray = part("SI, shape (k, k)")
 
 
 class Priors:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.residuals import robust_scale
+from printhammer.results import Declared, part
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
@@ -22,16 +22,12 @@ _FALL: Final = 0.05
 """Part of the largest force by which loading may fall before it counts as falling."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cycles:
+class Cycles(Declared, eq=False):
     """Branch and load cycle of each row."""
 
-    unloading: BoolArray
-    """Whether a row is on the unloading branch, shape (m,)."""
-    cycle: IntArray
-    """Number of the load cycle, from 0, shape (m,)."""
-    unloaded: IntArray
-    """Cycles with rows of unloading inside the pack, ascending."""
+    unloading: BoolArray = part("whether a row is on the unloading branch, shape (m,)")
+    cycle: IntArray = part("number of the load cycle, from 0, shape (m,)")
+    unloaded: IntArray = part("cycles with rows of unloading inside the pack, ascending")
 
 
 def cycles_of(table: Readings) -> Cycles:
