@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import tomllib
 from functools import lru_cache
 from importlib.resources import files
@@ -17,7 +18,7 @@ Kind = Literal["stated", "typical", "shape"]
 KINDS: Final = get_args(Kind)
 
 TEXTS: Final = ("kind", "source", "says", "reading", "note")
-SIDES: Final = ("above", "at_least", "below", "at_most")
+SIDES: Final = {"above": operator.gt, "at_least": operator.ge, "below": operator.lt, "at_most": operator.le}
 
 _PRINTED_DIGITS: Final = 1e-9
 
@@ -49,7 +50,7 @@ class Claim(Declared):
 def within(value: Any, band: Any) -> bool:
     """Whether a value is within a band; None and NaN never are."""
     if isinstance(band, dict):
-        return _is_number(value) and all(_on_side(value, side, limit) for side, limit in band.items())
+        return _is_number(value) and all(SIDES[side](value, limit) for side, limit in band.items())
     if isinstance(band, list) and len(band) == 2 and all(_is_number(end) for end in band):
         return _is_number(value) and band[0] <= value <= band[1]
     if isinstance(band, list):
@@ -63,28 +64,14 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value)
 
 
-def _on_side(value: float, side: str, limit: float) -> bool:
-    return {
-        "above": value > limit,
-        "at_least": value >= limit,
-        "below": value < limit,
-        "at_most": value <= limit,
-    }[side]
-
-
 @lru_cache(maxsize=1)
 def claims() -> Mapping[str, Claim]:
     """Return all claims by name, in the order of the paper."""
     text = files("printhammer").joinpath("claims", "claims.toml").read_text(encoding="utf-8")
-    return {name: _claim(name, table) for name, table in tomllib.loads(text).items()}
-
-
-def _claim(name: str, table: dict[str, Any]) -> Claim:
-    settings = table.pop("settings", [])
-    texts = {key: table.pop(key, "") for key in TEXTS}
-    return Claim(
-        name=name,
-        **texts,
-        settings={key: table[key] for key in settings},
-        band={key: band for key, band in table.items() if key not in settings},
-    )
+    made = {}
+    for name, table in tomllib.loads(text).items():
+        settings = {key: table[key] for key in table.pop("settings", [])}
+        texts = {key: table.pop(key, "") for key in TEXTS}
+        band = {key: limits for key, limits in table.items() if key not in settings}
+        made[name] = Claim(name=name, **texts, settings=settings, band=band)
+    return made

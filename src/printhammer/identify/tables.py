@@ -20,7 +20,7 @@ from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import describe, to_si
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from printhammer.support.arrays import FloatArray, IntArray
 
@@ -94,7 +94,10 @@ def read_table(
         for name, cell in zip(names, cells, strict=True):
             where = f"{source}: line {number}, column {name!r}"
             if name in text:
-                words[name].append(_word(cell, text[name], where))
+                word = cell.strip().lower()
+                if word not in text[name]:
+                    raise InputError(f"{where}: {cell.strip()!r}, expected {' or '.join(text[name])}")
+                words[name].append(word)
             else:
                 values[name][row] = _number(cell, *units[name], where)
     rows = np.array([number for number, _cells in lines[1:]], dtype=np.int64)
@@ -146,10 +149,3 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
         )
     with located(where):
         return to_si(number, unit, si)
-
-
-def _word(cell: str, allowed: Sequence[str], where: str) -> str:
-    word = cell.strip().lower()
-    if word not in allowed:
-        raise InputError(f"{where}: {cell.strip()!r}, expected {' or '.join(allowed)}")
-    return word

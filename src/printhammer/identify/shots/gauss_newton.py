@@ -258,7 +258,11 @@ class GaussNewton:
                 values, states = other.values, other.states
         places = np.array(sorted(increases))
         increase = np.array([increases[place] for place in places])
-        return Profile(places, increase, _interval(places, increase, best, student(degrees_of_freedom)))
+        # The root of the increase is nearly straight, and counts standard errors.
+        roots, reach = np.sqrt(increase) * np.sign(places - best), student(degrees_of_freedom)
+        low = float(np.interp(-reach, roots, places)) if roots[0] < -reach else -np.inf
+        high = float(np.interp(reach, roots, places)) if roots[-1] > reach else np.inf
+        return Profile(places, increase, (low, high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,11 +286,3 @@ def _solved(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, Floa
     step = inverse @ (inverse.T @ ((design / sizes).T @ residuals)) / sizes
     errors = np.sqrt((inverse * inverse).sum(axis=1)) / sizes
     return step, errors
-
-
-def _interval(places: FloatArray, increase: FloatArray, best: float, reach: float) -> tuple[float, float]:
-    """Return where the root of the increase, which is nearly straight, passes a number of standard errors."""
-    roots = np.sqrt(increase) * np.sign(places - best)
-    low = float(np.interp(-reach, roots, places)) if roots[0] < -reach else -np.inf
-    high = float(np.interp(reach, roots, places)) if roots[-1] > reach else np.inf
-    return low, high
