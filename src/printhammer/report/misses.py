@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+import math
+from typing import TYPE_CHECKING, Any
 
+from printhammer.claims.definition import SIDES
 from printhammer.report.quantities import band_text, split_name, value_text
 from printhammer.results import Declared, part
 
@@ -11,8 +13,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from printhammer.claims import Claim
-
-_LEAST: Final = {"above", "at_least"}
 
 
 class Miss(Declared):
@@ -78,9 +78,7 @@ def _limit(value: float, band: Any) -> float | None:
     """Return the end of a band that a value outside it misses."""
     if isinstance(band, dict):
         for side, limit in band.items():
-            if (value <= limit if side == "above" else value < limit) and side in _LEAST:
-                return float(limit)
-            if (value >= limit if side == "below" else value > limit) and side not in _LEAST:
+            if not (math.isnan(value) or SIDES[side](value, limit)):
                 return float(limit)
         return None
     if isinstance(band, list):

@@ -41,7 +41,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
     """Losses and verdicts at no cost."""
 
-    def scored(points: list[Any], _aim: str, _pool: Any) -> list[dict[str, Any]]:
+    def scored(points: list[Any], _aim: str, _pool: Any, _shape: str) -> list[dict[str, Any]]:
         return [
             {
                 "point": [float(share) for share in point],
