@@ -166,8 +166,9 @@ def buzz(hammer: "ph.Hammer") -> BuzzSearch:
     times = delayed_train(hammer, 12e-6, 4)
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, at=times), points=2)
     force = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=2).dots[0].peak_force
-    first, forces, clear = longest_run(motion, force)
-    train = BuzzTrain("delayed", 12e-6, times, first, len(forces), forces, clear, motion.drive.peak)
+    run = longest_run(motion, force)
+    dots = (run.first, len(run.forces), run.forces, run.clear, run.touches)
+    train = BuzzTrain("delayed", 12e-6, times, *dots, motion.drive.peak)
     return BuzzSearch(train, "", train, force, 1)
 
 
@@ -178,12 +179,12 @@ def test_figure_7_shows_the_train(hammer: "ph.Hammer", buzz: BuzzSearch) -> None
     numbers = [text.get_text() for text in drawn.axes[0].texts]
     assert [f"{force:.2f}" for force in buzz.train.forces] == numbers[-len(buzz.train.forces) :]
     assert "12 µs after leaving the pack" in drawn.axes[0].get_title(loc="left")
-    assert drawn.get_suptitle() == ""
+    assert drawn.get_suptitle().replace("\n", " ") == f"{buzz.train.touches_text}."
 
 
 def test_figure_7_says_that_there_is_none(hammer: "ph.Hammer", buzz: BuzzSearch) -> None:
     none = BuzzSearch(None, "no train does", buzz.best, buzz.reference_force, 1)
-    assert FIGURES[7].draw(hammer, search=none).get_suptitle() == "No buzz printing: no train does."
+    assert FIGURES[7].draw(hammer, search=none).get_suptitle().startswith("No buzz printing: no train does.")
 
 
 def test_a_motion_that_stopped_says_so(hammer: "ph.Hammer") -> None:

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.bench.problem import ENDS, FIRST, GRID, checked, ensemble_tasks
+from printhammer.bench.problem import ENDS, FIRST, GRID, Task, checked, ensemble_tasks
 from printhammer.reference.integrator import reference
 
 if TYPE_CHECKING:
-    from printhammer.bench.problem import Task
     from printhammer.drive.base import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray

@@ -6,11 +6,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, get_args
 
 from printhammer.bench.entry import Entry
-from printhammer.bench.problem import ENDS, FIRST, GRID, PERIOD, checked, ensemble_tasks
+from printhammer.bench.problem import ENDS, FIRST, GRID, PERIOD, Task, checked, ensemble_tasks
 from printhammer.run.problem import TOLERANCE, Problem
 
 if TYPE_CHECKING:
-    from printhammer.bench.problem import Task
     from printhammer.kernel.schemes_1983 import Scheme
     from printhammer.run.ensemble import Ensemble
     from printhammer.support.arrays import FloatArray

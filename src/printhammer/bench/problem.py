@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+
+from printhammer.results import Declared, part, scalar
 
 if TYPE_CHECKING:
     from printhammer.drive.trains import PulseTrain
@@ -21,14 +22,11 @@ GRID: Final = np.linspace(0.0, FIRST, 3001)
 """Times at which errors are measured, s."""
 
 
-@dataclass(frozen=True)
-class Task:
+class Task(Declared):
     """A hammer with the laws of the paper, fired at a constant rate, from rest."""
 
-    hammer: Hammer
-    """The hammer."""
-    period: float = PERIOD
-    """Time between firings, s."""
+    hammer: Hammer = part("the hammer")
+    period: float = scalar("s", "time between firings", default=PERIOD)
 
     @cached_property
     def rest(self) -> float:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.bench.ensembles import DISPLAY, EXACT
+from printhammer.bench.ensembles import DISPLAY, EXACT, Figures, Mass
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
-    from printhammer.bench.ensembles import Figures, Mass
     from printhammer.bench.table import Line
 
 Rows = list[tuple[str, ...]]
@@ -28,35 +28,18 @@ MASS_HEADS: Final = (
 )
 
 
-@dataclass(frozen=True)
-class Report:
-    """All figures of a benchmark.
+class Report(Declared):
+    """All figures of a benchmark."""
 
-    Attributes
-    ----------
-    machine : dict
-        What it ran on.
-    quick : bool
-        Whether it was a short one, whose figures mean little.
-    lines : list of Line
-        The solvers.
-    absent : dict
-        Peers that are not installed here, or failed, and why.
-    figures : Figures
-        Figures about ensembles.
-    compiling : dict
-        Time to compile everything that an ensemble needs, by engine, s; empty in a quick benchmark.
-    peers : str
-        How the peers are used, in words.
-    """
-
-    machine: dict[str, str]
-    quick: bool
-    lines: list[Line]
-    absent: dict[str, str]
-    figures: Figures
-    compiling: dict[str, float]
-    peers: str = ""
+    machine: dict[str, str] = part("what it ran on")
+    quick: bool = part("whether it was a short one, whose figures mean little")
+    lines: list[Line] = part("the solvers")
+    absent: dict[str, str] = part("peers that are not installed here, or failed, and why")
+    figures: Figures = part("figures about ensembles")
+    compiling: dict[str, float] = part(
+        "time to compile everything that an ensemble needs, by engine, s; empty in a quick benchmark"
+    )
+    peers: str = part("how the peers are used, in words", default="")
 
     def to_json(self) -> str:
         """Return the figures as JSON; null where there is no number."""

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.bench import exact, own
-from printhammer.bench.entry import Absent, Entry
+from printhammer.bench.entry import Absent, Entry, Peers, Say
+from printhammer.results import Declared, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.bench.entry import Peers, Say
     from printhammer.bench.problem import Task
 
 _SHORTEST: Final = 0.02
@@ -25,28 +25,24 @@ _SLOW: Final = 1.0
 """A solver whose turn takes longer has two turns only, s."""
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(Declared):
     """One solver of the table."""
 
-    solver: str
-    """Solver, version, method, tolerance."""
-    ours: bool
-    """Whether it is this program."""
-    members: int
-    """1 for a single run."""
-    error: float
-    """Largest deviation from the reference over the first 3 ms, m; NaN where the solver did not get there."""
-    speed: float
-    """Hammer-seconds per second of processor time."""
-    first: float
-    """Time of the first call, s, in which things are compiled."""
-    duration: float
-    """Hammer-seconds of one call timed."""
-    match: str = ""
-    """For a peer: the fastest of our lines of its kind that is at least as exact."""
-    ratio: float = math.nan
-    """How many times faster that line is; NaN where there is none."""
+    solver: str = part("solver, version, method, tolerance")
+    ours: bool = part("whether it is this program")
+    members: int = part("1 for a single run")
+    error: float = scalar(
+        "m",
+        "largest deviation from the reference over the first 3 ms",
+        more="NaN where the solver did not get there",
+    )
+    speed: float = part("hammer-seconds per second of processor time")
+    first: float = part("time of the first call, s, in which things are compiled")
+    duration: float = part("hammer-seconds of one call timed")
+    match: str = part(
+        "for a peer: the fastest of our lines of its kind that is at least as exact", default=""
+    )
+    ratio: float = part("how many times faster that line is; NaN where there is none", default=math.nan)
 
 
 def measure(

@@ -7,17 +7,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.claims.context import NotMeasurableError
-from printhammer.claims.definition import claims
+from printhammer.claims.context import Context, NotMeasurableError
+from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.claims.shapes import spread
 from printhammer.claims.verdicts import panel_name, printed_verdicts
-from printhammer.drive.trains import PulseTrain
+from printhammer.drive.trains import Drive, PulseTrain
 
 if TYPE_CHECKING:
-    from printhammer.claims.context import Context
-    from printhammer.claims.definition import Claim
-    from printhammer.drive.trains import Drive
     from printhammer.run.motion import Motion
 
 _CLOSER: Final = 8

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.claims.context import TAIL, Context
-from printhammer.claims.definition import claims
+from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.printing.dots.buzz import (
@@ -18,7 +18,6 @@ from printhammer.printing.dots.buzz import (
 from printhammer.printing.dots.settling import touches
 
 if TYPE_CHECKING:
-    from printhammer.claims.definition import Claim
     from printhammer.hammer.hammer import Hammer
 
 

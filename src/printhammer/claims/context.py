@@ -5,22 +5,20 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from printhammer.drive.trains import PulseTrain
+from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.errors import PrinthammerError
 from printhammer.printing.dots.settling import touches
 from printhammer.run.problem import TOLERANCE
-from printhammer.run.simulate import simulate
+from printhammer.run.simulate import Scheme, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Contact, Dot
     from printhammer.run.ensemble import DotTable, EnsembleResult
     from printhammer.run.motion import Motion
-    from printhammer.run.simulate import Scheme
 
 CYCLE: Final = 20e-3
 """Duration of the single-pulse cycle, s: from rest to rest, with ample time to settle."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import operator
 import tomllib
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,32 +18,25 @@ Kind = Literal["stated", "typical", "shape"]
 KINDS: Final = get_args(Kind)
 
 TEXTS: Final = ("kind", "source", "says", "reading", "note")
-SIDES: Final = ("above", "at_least", "below", "at_most")
+SIDES: Final = {"above": operator.gt, "at_least": operator.ge, "below": operator.lt, "at_most": operator.le}
 
 _PRINTED_DIGITS: Final = 1e-9
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(Declared):
     """One checkable statement of the paper."""
 
-    name: str
-    """Name."""
-    kind: Kind
-    """"stated", "typical" or "shape"."""
-    source: str
-    """Where the paper says it."""
-    says: str
-    """What it says, in our words."""
-    reading: str
-    """What is measured, and what must be so."""
-    note: str
-    """What a reader must know beside; may be empty."""
-    settings: Mapping[str, Any]
-    """Numbers that set up the experiment, SI."""
-    band: Mapping[str, Any]
-    """What each measured value must be: a number or text, true or false; a list (least, largest) of two
-    numbers, or of texts; a table of `SIDES`."""
+    name: str = part("name")
+    kind: Kind = part('"stated", "typical" or "shape"')
+    source: str = part("where the paper says it")
+    says: str = part("what it says, in our words")
+    reading: str = part("what is measured, and what must be so")
+    note: str = part("what a reader must know beside; may be empty")
+    settings: Mapping[str, Any] = part("numbers that set up the experiment, SI")
+    band: Mapping[str, Any] = part(
+        "what each measured value must be: a number or text, true or false; a list (least, largest) of"
+        " two numbers, or of texts; a table of `SIDES`"
+    )
 
     def holds(self, value: Mapping[str, Any]) -> bool:
         """Whether every measured value is within its band."""
@@ -55,7 +50,7 @@ class Claim:
 def within(value: Any, band: Any) -> bool:
     """Whether a value is within a band; None and NaN never are."""
     if isinstance(band, dict):
-        return _is_number(value) and all(_on_side(value, side, limit) for side, limit in band.items())
+        return _is_number(value) and all(SIDES[side](value, limit) for side, limit in band.items())
     if isinstance(band, list) and len(band) == 2 and all(_is_number(end) for end in band):
         return _is_number(value) and band[0] <= value <= band[1]
     if isinstance(band, list):
@@ -69,28 +64,14 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value)
 
 
-def _on_side(value: float, side: str, limit: float) -> bool:
-    return {
-        "above": value > limit,
-        "at_least": value >= limit,
-        "below": value < limit,
-        "at_most": value <= limit,
-    }[side]
-
-
 @lru_cache(maxsize=1)
 def claims() -> Mapping[str, Claim]:
     """Return all claims by name, in the order of the paper."""
     text = files("printhammer").joinpath("claims", "claims.toml").read_text(encoding="utf-8")
-    return {name: _claim(name, table) for name, table in tomllib.loads(text).items()}
-
-
-def _claim(name: str, table: dict[str, Any]) -> Claim:
-    settings = table.pop("settings", [])
-    texts = {key: table.pop(key, "") for key in TEXTS}
-    return Claim(
-        name=name,
-        **texts,
-        settings={key: table[key] for key in settings},
-        band={key: band for key, band in table.items() if key not in settings},
-    )
+    made = {}
+    for name, table in tomllib.loads(text).items():
+        settings = {key: table[key] for key in table.pop("settings", [])}
+        texts = {key: table.pop(key, "") for key in TEXTS}
+        band = {key: limits for key, limits in table.items() if key not in settings}
+        made[name] = Claim(name=name, **texts, settings=settings, band=band)
+    return made

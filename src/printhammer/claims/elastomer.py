@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.claims.context import CYCLE, NotMeasurableError
+from printhammer.claims.context import CYCLE, Context, NotMeasurableError
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 
 if TYPE_CHECKING:
-    from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.motion import Motion
@@ -30,7 +29,13 @@ def elastomer_backstop(context: Context, claim: Claim) -> Measured:
     crushed = []
     # The softest that stops the armature before it leaves the range in which the magnet's law holds.
     for force in settings["forces_N"]:
-        motion = _impact(context, _elastomer(context, force, settings), speed)
+        part = {
+            "law": "elastomer",
+            "position": context.position,
+            "stiffness": force / settings["deformation_m"] ** 1.5,
+            "relaxation_time": settings["relaxation_time_s"],
+        }
+        motion = _impact(context, context.hammer.replace("backstop", part), speed)
         if not motion.ok:
             crushed.append(force)
             continue
@@ -51,16 +56,6 @@ def elastomer_backstop(context: Context, claim: Claim) -> Measured:
             " backstop of this hammer.",
         )
     raise NotMeasurableError("No elastomer that deforms by 25 um at a few pounds stops this armature")
-
-
-def _elastomer(context: Context, force: float, settings: Any) -> Hammer:
-    part = {
-        "law": "elastomer",
-        "position": context.position,
-        "stiffness": force / settings["deformation_m"] ** 1.5,
-        "relaxation_time": settings["relaxation_time_s"],
-    }
-    return context.hammer.replace("backstop", part)
 
 
 def _impact(context: Context, hammer: Hammer, speed: float) -> Motion:

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.claims.bursts import hang_up_range, onsets
-from printhammer.claims.context import NotMeasurableError
+from printhammer.claims.context import Context, NotMeasurableError
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.maps.frequency import TAIL
 
 if TYPE_CHECKING:
-    from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
 
 _SPACING: Final = 10e-6

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from printhammer.claims.context import Context, NotMeasurableError
 from printhammer.claims.definition import Claim, claims
 from printhammer.errors import InputError
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
@@ -30,29 +31,16 @@ class Measured:
     """One sentence about them."""
 
 
-@dataclass(frozen=True)
-class JudgedClaim:
-    """A claim, judged.
+class JudgedClaim(Declared):
+    """A claim, judged."""
 
-    Attributes
-    ----------
-    claim : Claim
-        What was judged.
-    value : mapping or None
-        Measured values by name, SI; None where nothing could be measured.
-    verdict : str
-        "holds", "fails" or "not yet".
-    detail : str
-        One sentence: what was found, or why nothing could be.
-    seconds : float
-        Time that it took; no part of `as_dict`.
-    """
-
-    claim: Claim
-    value: Mapping[str, Any] | None
-    verdict: Verdict
-    detail: str
-    seconds: float = 0.0
+    claim: Claim = part("what was judged")
+    value: Mapping[str, Any] | None = part(
+        "measured values by name, SI; None where nothing could be measured"
+    )
+    verdict: Verdict = part('"holds", "fails" or "not yet"')
+    detail: str = part("one sentence: what was found, or why nothing could be")
+    seconds: float = part("time that it took; no part of `as_dict`", default=0.0)
 
     @property
     def missed(self) -> list[str]:

@@ -15,13 +15,12 @@ import numpy as np
 from printhammer.chaos.strobe.schemes_1983 import scheme_strobes
 from printhammer.claims.context import TAIL, Context
 from printhammer.claims.definition import claims
-from printhammer.claims.judging import judge
+from printhammer.claims.judging import JudgedClaim, judge_all
 from printhammer.claims.verdicts import PANELS, printed_verdicts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.claims.judging import JudgedClaim
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.scheme_runs import Scheme
@@ -63,23 +62,8 @@ class SchemeContext(Context):
 def judge_as_in_1983(
     hammer: Hammer, scheme: Scheme = "runge-kutta-4", progress: Callable[[str], None] | None = None
 ) -> list[JudgedClaim]:
-    """Judge the claims in `COMPUTED` from what a scheme of 1983 computes.
-
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    scheme : str, optional
-        "runge-kutta-4" or "trapezoid".
-    progress : callable, optional
-        Called with the name of each claim before it is judged.
-    """
+    """Judge the claims in `COMPUTED` from what a scheme of 1983 computes; `progress` as for `judge_all`."""
     context = SchemeContext(hammer, scheme=scheme)
     points = claims()["poincare_window"].settings["points"]
     context.once(PANELS, lambda: scheme_strobes(hammer, [*printed_verdicts()], scheme, points=points))
-    results = []
-    for name in COMPUTED:
-        if progress is not None:
-            progress(name)
-        results.append(judge(context, claims()[name]))
-    return results
+    return judge_all(hammer, COMPUTED, progress, context)

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from printhammer.claims.context import NotMeasurableError
+from printhammer.claims.context import Context, NotMeasurableError
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.claims.shapes import falling, largest, rank_correlation
 from printhammer.printing.dots.settling import rebounds, touches
 
 if TYPE_CHECKING:
-    from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
     from printhammer.support.arrays import FloatArray
 

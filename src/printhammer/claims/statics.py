@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from printhammer.claims.context import NotMeasurableError
-from printhammer.claims.definition import claims
+from printhammer.claims.context import Context, NotMeasurableError
+from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import equilibria, holding_margin, positive_intervals
 from printhammer.hammer.static_force import StaticForce
-
-if TYPE_CHECKING:
-    from printhammer.claims.context import Context
-    from printhammer.claims.definition import Claim
 
 
 @measures("geometry", "backstop", "pack", "platen")

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.claims.definition import claims
+from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.claims.shapes import rank_correlation
 from printhammer.claims.verdicts import panel_name, printed_verdicts
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
-    from printhammer.claims.definition import Claim
     from printhammer.support.arrays import FloatArray
 
 _ORBIT_TIME: Final = 4e-3

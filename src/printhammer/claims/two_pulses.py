@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from printhammer.claims.context import TAIL
+from printhammer.claims.context import TAIL, Context
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.printing.dots.settling import touches
 
 if TYPE_CHECKING:
-    from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
     from printhammer.drive.waveforms.shapes import Waveform
 

@@ -6,18 +6,16 @@ import itertools
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.chaos import strobes
+from printhammer.chaos import Strobe, Verdict, strobes
 from printhammer.chaos.strobe.scan import scan
 from printhammer.chaos.strobe.verdict import LAST
-from printhammer.claims.definition import claims
+from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, measures
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.chaos import Strobe, Verdict
     from printhammer.claims.context import Context
-    from printhammer.claims.definition import Claim
     from printhammer.hammer.hammer import Hammer
 
 _CHANGE: Final = 1e-5

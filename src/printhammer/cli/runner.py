@@ -9,25 +9,23 @@ sets the exit status.
 from __future__ import annotations
 
 import inspect
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from printhammer.cli import progress
-from printhammer.cli.options import Option
+from printhammer.cli.options import Files, Option
 from printhammer.cli.screen import heading
 from printhammer.cli.terminal import complain, console, say, warn
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-    from contextlib import AbstractContextManager
 
     from rich.console import RenderableType
 
-    from printhammer.cli.options import Files
     from printhammer.hammer.hammer import Hammer
 
 Shown = TypeVar("Shown")

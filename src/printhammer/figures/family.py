@@ -54,7 +54,10 @@ def family(
 
     own, *members = constants
     rows = [key for key in own if any(abs(row[key] - own[key]) > _EQUAL * abs(own[key]) for row in members)]
-    ranks = _ranks([row.get(order) for row in conclusions])
+    # What is missing comes first.
+    known = np.array([-np.inf if row.get(order) is None else row[order] for row in conclusions])
+    places = np.argsort(np.argsort(known, kind="stable"), kind="stable")
+    ranks = np.asarray(places / max(len(known) - 1, 1), dtype=np.float64)
     shades = LinearSegmentedColormap.from_list("family", style.FAMILY)(ranks)
     deep = -(-len(drawn) // _COLUMNS)
     upper, lower = 0.55 + _ROW * len(rows), _STRIP * deep
@@ -71,13 +74,6 @@ def family(
         _conclusion(strip, entry, [member.get(name) for member in conclusions], ranks, shades)
     sign(figure, hammer)
     return figure
-
-
-def _ranks(values: Sequence[float | None]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Return the places of values in their order, from 0 to 1; what is missing comes first."""
-    known = np.array([-np.inf if value is None else value for value in values])
-    places = np.argsort(np.argsort(known, kind="stable"), kind="stable")
-    return np.asarray(places / max(len(known) - 1, 1), dtype=np.float64)
 
 
 def _constants(

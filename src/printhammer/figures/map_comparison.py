@@ -45,19 +45,16 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     for ax in (right, beside):
         ax.set_ylabel("")
         ax.tick_params(axis="y", labelleft=False)
-    _limits(left, scales, computed, measured)
+    # Both pictures, which share their axes, show all of both maps.
+    maps = (computed, measured)
+    rows = [scales.rate.shown(map_marks.edges(chart["rate"].values)) for chart in maps]
+    ends = [scales.time.shown(chart["time"].values[[0, -1]]) for chart in maps]
+    left.set_ylim(min(row[0] for row in rows), max(row[-1] for row in rows))
+    left.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
     remark = _difference(beside, scales, computed, measured)
     map_marks.colour_bar(bar, computed, scales)
     map_marks.sign_map(figure, computed, map_marks.failures(computed), remark)
     return figure
-
-
-def _limits(ax: Axes, scales: map_marks.Scales, *charts: xr.Dataset) -> None:
-    """Have both pictures, which share their axes, show all of both maps."""
-    rows = [scales.rate.shown(map_marks.edges(chart["rate"].values)) for chart in charts]
-    ax.set_ylim(min(row[0] for row in rows), max(row[-1] for row in rows))
-    ends = [scales.time.shown(chart["time"].values[[0, -1]]) for chart in charts]
-    ax.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
 
 
 def _difference(ax: Axes, scales: map_marks.Scales, computed: xr.Dataset, measured: xr.Dataset) -> str:

@@ -5,17 +5,15 @@ In the text everything else stays as it is, comments and layout too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, MutableMapping
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from printhammer.errors import InputError, located
 from printhammer.hammer.file import SELECTORS, TEXTS, Body, file_options, kinds_of, model_of, si_unit_of
-from printhammer.support.constants import Constant, Quantity, quantities, shown
+from printhammer.support.constants import Constant, quantities, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, MutableMapping
-
     from pydantic import BaseModel
 
 Edit = tuple[str, Any]
@@ -59,14 +57,11 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
         raise InputError(f"the key {shown(key)} is not known, expected {expected}")
     if note is None or value is None:
         return key, value
-    return key, _constant(key, _si_unit(note, document, section, name), value, status, source)
-
-
-def _si_unit(note: Quantity, document: Mapping[str, Any], section: str, name: str) -> str:
-    """Return the SI unit of a bare number: that of what it replaces, where the constant may have several."""
-    known = document.get(section, {}).get(name) if note.also else None
-    unit = known.get("unit") if isinstance(known, Mapping) else None
-    return note.si if unit is None else si_unit_of(note, unit)
+    # A bare number is in the unit of what it replaces, where the constant may have several.
+    before = document.get(section, {}).get(name) if note.also else None
+    unit = before.get("unit") if isinstance(before, Mapping) else None
+    si = note.si if unit is None else si_unit_of(note, unit)
+    return key, _constant(key, si, value, status, source)
 
 
 def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> dict[str, Any]:

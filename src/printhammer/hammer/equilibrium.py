@@ -30,25 +30,17 @@ _LARGEST_CURRENT: Final = 1e6
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """One equilibrium.
-
-    Attributes
-    ----------
-    x : float
-        Displacement, m.
-    stable : bool
-        Whether the force drives the armature back after a small displacement to either side.
-    frequency : float or None
-        Natural frequency of small undamped oscillations, Hz; None where unstable, on a rigid backstop, or
-        in a pack with memory, which has no single stiffness.
-    surface : str or None
-        "backstop" or "pack" where the armature touches it.
-    """
+    """One equilibrium."""
 
     x: float
+    """Displacement, m."""
     stable: bool
+    """Whether the force drives the armature back after a small displacement to either side."""
     frequency: float | None
+    """Natural frequency of small undamped oscillations, Hz; None where unstable, on a rigid backstop, or in a
+    pack with memory, which has no single stiffness."""
     surface: str | None
+    """"backstop" or "pack" where the armature touches it."""
 
 
 @dataclass(frozen=True)

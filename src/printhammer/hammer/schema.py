@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pydantic import TypeAdapter
+from pydantic import BaseModel, TypeAdapter
 
 from printhammer.hammer.file import (
     CONSTANT_KEYS,
@@ -17,9 +17,6 @@ from printhammer.hammer.file import (
     model_of,
 )
 from printhammer.support.constants import STATUSES, Quantity, quantities
-
-if TYPE_CHECKING:
-    from pydantic import BaseModel
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -6,12 +6,11 @@ import math
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from printhammer.parts import absent
+from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart, absent
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart
 
 FAR: Final = 1.0
 """Distance from the origin up to which equilibria are sought where the hammer sets no limit, m."""

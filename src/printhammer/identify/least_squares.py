@@ -15,12 +15,12 @@ variance: J. Orear, Am. J. Phys. 50 (1982) 912).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
 from printhammer.identify.residuals import robust_scale
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from printhammer.support.arrays import BoolArray, FloatArray
@@ -50,33 +50,23 @@ class Law(Protocol):
         """Return how much each component of the variance has in each row, shape (m, q), not negative."""
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Declared, eq=False):
     """Parameters and what the residuals say."""
 
-    p: FloatArray
-    """Parameters, shape (n,)."""
-    covariance: FloatArray
-    """Of the parameters, shape (n, n)."""
-    fitted: FloatArray
-    residuals: FloatArray
-    """The law, and the data less the law, shape (m,)."""
-    jacobian: FloatArray
-    """At `p`, shape (m, n)."""
-    variance: FloatArray
-    """Of the noise in each row; all 1 where the data are exact. Shape (m,)."""
-    outliers: BoolArray
-    """Rows left out, shape (m,)."""
-    degrees_of_freedom: int
-    """Rows used less parameters."""
-    freedoms: FloatArray
-    """Degrees of freedom with which the variance of each parameter is known. Shape (n,)."""
-    residual_scale: float
-    """Root of the sum of squared residuals over the degrees of freedom."""
-    condition_number: float
-    """Of the weighted Jacobian with columns of unit length."""
-    exact: bool
-    """Whether the residuals are no more than rounding."""
+    p: FloatArray = part("parameters, shape (n,)")
+    covariance: FloatArray = part("of the parameters, shape (n, n)")
+    fitted: FloatArray = part("the law, shape (m,)")
+    residuals: FloatArray = part("the data less the law, shape (m,)")
+    jacobian: FloatArray = part("at `p`, shape (m, n)")
+    variance: FloatArray = part("of the noise in each row; all 1 where the data are exact. Shape (m,)")
+    outliers: BoolArray = part("rows left out, shape (m,)")
+    degrees_of_freedom: int = part("rows used less parameters")
+    freedoms: FloatArray = part(
+        "degrees of freedom with which the variance of each parameter is known. Shape (n,)"
+    )
+    residual_scale: float = part("root of the sum of squared residuals over the degrees of freedom")
+    condition_number: float = part("of the weighted Jacobian with columns of unit length")
+    exact: bool = part("whether the residuals are no more than rounding")
 
     @property
     def used(self) -> BoolArray:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.results import Column, Result, column, coordinate, part, scalar
+from printhammer.results import Column, Declared, Result, column, coordinate, part, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,36 +39,25 @@ REPLACED: Final = {
 """Constants from which another one follows, and which go where that one is given itself, by its key."""
 
 
-@dataclass(frozen=True)
-class FittedConstant:
-    """One constant that a fit has found.
+class FittedConstant(Declared):
+    """One constant that a fit has found."""
 
-    Attributes
-    ----------
-    key : str
-        Dotted key of the hammer file, such as "magnet.F0"; another name where `in_file` is false.
-    value : float
-        SI.
-    standard_error : float
-        SI.
-    interval : tuple of float
-        Ends of the 95 % interval, SI.
-    unit : str
-        SI unit.
-    in_file : bool
-        Whether a hammer file has such a constant; a combination of constants, or an exponent, has no place
-        there.
-    how : str
-        How it was found if not by the fit to the files, such as "computed from radii and Young's moduli".
-    """
-
-    key: str
-    value: float
-    standard_error: float
-    interval: tuple[float, float]
-    unit: str
-    in_file: bool = True
-    how: str = ""
+    key: str = part(
+        'dotted key of the hammer file, such as "magnet.F0"; another name where `in_file` is false'
+    )
+    value: float = part("SI")
+    standard_error: float = part("SI")
+    interval: tuple[float, float] = part("ends of the 95 % interval, SI")
+    unit: str = part("SI unit")
+    in_file: bool = part(
+        "whether a hammer file has such a constant; a combination of constants, or an exponent, has no"
+        " place there",
+        default=True,
+    )
+    how: str = part(
+        'how it was found if not by the fit to the files, such as "computed from radii and Young\'s moduli"',
+        default="",
+    )
 
     @classmethod
     def of(
@@ -88,25 +77,18 @@ class FittedConstant:
         return cls(key, float(value), float(standard_error), ends, unit, in_file, how)
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
-    """How much worse the fit becomes where one constant is held at other values.
+class Profile(Declared, eq=False):
+    """How much worse the fit becomes where one constant is held at other values."""
 
-    Attributes
-    ----------
-    values : array, shape (n,)
-        Values at which the constant is held, SI, ascending.
-    increase : array, shape (n,)
-        Increase of the weighted sum of squares over its least value, in units of the noise variance; all
-        other constants are fitted again.
-    interval : tuple of float
-        Ends of the 95 % interval where the increase reaches the square of Student's t, SI; infinite where it
-        does not.
-    """
-
-    values: FloatArray
-    increase: FloatArray
-    interval: tuple[float, float]
+    values: FloatArray = part("values at which the constant is held, SI, ascending, shape (n,)")
+    increase: FloatArray = part(
+        "increase of the weighted sum of squares over its least value, in units of the noise variance;"
+        " all other constants are fitted again; shape (n,)"
+    )
+    interval: tuple[float, float] = part(
+        "ends of the 95 % interval where the increase reaches the square of Student's t, SI; infinite"
+        " where it does not"
+    )
 
 
 class Fit(Result):

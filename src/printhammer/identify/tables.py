@@ -8,7 +8,6 @@ passed over; a comment such as ``# sampling rate: 1 MHz`` is kept as a key and i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
@@ -16,11 +15,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError, located
+from printhammer.results import Declared, part
 from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import describe, to_si
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from printhammer.support.arrays import FloatArray, IntArray
 
@@ -28,29 +28,14 @@ _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
 
 
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """Columns of a file in the order of its rows.
+class Readings(Declared, eq=False):
+    """Columns of a file in the order of its rows."""
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    values : dict of str to array, shape (rows,)
-        Columns of numbers by name, SI.
-    words : dict of str to list of str
-        Columns of words by name, in lower case.
-    lines : array of int, shape (rows,)
-        Line of the file in which each row stands, counted from 1.
-    comments : dict of str to str
-        Comments of the form ``# key: value``; of a key given twice, the last.
-    """
-
-    path: Path
-    values: dict[str, FloatArray]
-    words: dict[str, list[str]]
-    lines: IntArray
-    comments: dict[str, str]
+    path: Path = part("the file")
+    values: dict[str, FloatArray] = part("columns of numbers by name, SI, shape (rows,)")
+    words: dict[str, list[str]] = part("columns of words by name, in lower case")
+    lines: IntArray = part("line of the file in which each row stands, counted from 1; shape (rows,)")
+    comments: dict[str, str] = part("comments of the form ``# key: value``; of a key given twice, the last")
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -109,7 +94,10 @@ def read_table(
         for name, cell in zip(names, cells, strict=True):
             where = f"{source}: line {number}, column {name!r}"
             if name in text:
-                words[name].append(_word(cell, text[name], where))
+                word = cell.strip().lower()
+                if word not in text[name]:
+                    raise InputError(f"{where}: {cell.strip()!r}, expected {' or '.join(text[name])}")
+                words[name].append(word)
             else:
                 values[name][row] = _number(cell, *units[name], where)
     rows = np.array([number for number, _cells in lines[1:]], dtype=np.int64)
@@ -161,10 +149,3 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
         )
     with located(where):
         return to_si(number, unit, si)
-
-
-def _word(cell: str, allowed: Sequence[str], where: str) -> str:
-    word = cell.strip().lower()
-    if word not in allowed:
-        raise InputError(f"{where}: {cell.strip()!r}, expected {' or '.join(allowed)}")
-    return word

@@ -10,10 +10,10 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.claims import Context, buzz_search, judge_all
+from printhammer.claims import Context, JudgedClaim, buzz_search, judge_all
 from printhammer.claims.verdicts import panel_strobes, printed_verdicts
 from printhammer.errors import InputError, PrinthammerError
-from printhammer.reconstruction.results import shipped_results
+from printhammer.reconstruction.results import BaseRates, Results, shipped_results
 from printhammer.report.citations import cited_figures
 from printhammer.report.contents import Drawing, Report
 from printhammer.report.publish import CLAIMS, PAGE, PDF, PICTURES, staged
@@ -22,9 +22,7 @@ from printhammer.support.outputs import write_file
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from printhammer.claims import JudgedClaim
     from printhammer.hammer.hammer import Hammer
-    from printhammer.reconstruction.results import BaseRates, Results
 
 _BUZZ: Final = 7
 _POINCARE: Final = 11

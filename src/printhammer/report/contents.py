@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -14,58 +15,30 @@ if TYPE_CHECKING:
     from printhammer.reconstruction.results import Family, Results, Search
 
 
-@dataclass(frozen=True)
-class Drawing:
+class Drawing(Declared):
     """One figure of the paper, drawn."""
 
-    number: int
-    """Number in the paper."""
-    title: str
-    caption: str
-    """What it is, and what it shows for this hammer."""
-    says: str
-    """What the paper says of it, in our words."""
-    svg: bytes
-    """The picture; empty where it could not be drawn."""
-    pdf: Path | None
-    """Its file as vectors, seen from the folder of the report."""
-    reason: str
-    """Why it could not be drawn; empty where it was."""
-    claims: tuple[JudgedClaim, ...]
-    """Claims that cite the figure."""
-    seconds: float
-    """Time that it took."""
+    number: int = part("number in the paper")
+    title: str = part("what it is")
+    caption: str = part("what it shows for this hammer")
+    says: str = part("what the paper says of it, in our words")
+    svg: bytes = part("the picture; empty where it could not be drawn")
+    pdf: Path | None = part("its file as vectors, seen from the folder of the report")
+    reason: str = part("why it could not be drawn; empty where it was")
+    claims: tuple[JudgedClaim, ...] = part("claims that cite the figure")
+    seconds: float = part("time that it took")
 
 
-@dataclass(frozen=True)
-class Report:
-    """What `write_report` judged, drew and wrote.
+class Report(Declared):
+    """What `write_report` judged, drew and wrote."""
 
-    Attributes
-    ----------
-    hammer : Hammer
-        The hammer.
-    results : list of JudgedClaim
-        The claims, judged.
-    drawings : list of Drawing
-        The figures.
-    provenance : mapping
-        Versions, fingerprint, tolerance.
-    reconstruction : Results
-        Results of a reconstruction, of this hammer or of another.
-    seconds : float
-        Time that all took.
-    files : list of Path
-        What was written.
-    """
-
-    hammer: Hammer
-    results: list[JudgedClaim]
-    drawings: list[Drawing]
-    provenance: Mapping[str, Any]
-    reconstruction: Results
-    seconds: float
-    files: list[Path] = field(default_factory=list)
+    hammer: Hammer = part("the hammer")
+    results: list[JudgedClaim] = part("the claims, judged")
+    drawings: list[Drawing] = part("the figures")
+    provenance: Mapping[str, Any] = part("versions, fingerprint, tolerance")
+    reconstruction: Results = part("results of a reconstruction, of this hammer or of another")
+    seconds: float = part("time that all took")
+    files: list[Path] = part("what was written", default_factory=list)
 
     def count(self, verdict: str) -> int:
         """Return how many claims have a verdict."""

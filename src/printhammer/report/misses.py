@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+import math
+from typing import TYPE_CHECKING, Any
 
+from printhammer.claims.definition import SIDES
 from printhammer.report.quantities import band_text, split_name, value_text
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from printhammer.claims import Claim
 
-_LEAST: Final = {"above", "at_least"}
 
-
-@dataclass(frozen=True)
-class Miss:
+class Miss(Declared):
     """A measured value outside its band, as text."""
 
-    words: str
-    """What was measured."""
-    value: str
-    band: str
-    """What it is, and what it must be."""
-    distance: str
-    """How far that is apart."""
+    words: str = part("what was measured")
+    value: str = part("what it is")
+    band: str = part("what it must be")
+    distance: str = part("how far these are apart")
 
 
 def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
@@ -82,9 +78,7 @@ def _limit(value: float, band: Any) -> float | None:
     """Return the end of a band that a value outside it misses."""
     if isinstance(band, dict):
         for side, limit in band.items():
-            if (value <= limit if side == "above" else value < limit) and side in _LEAST:
-                return float(limit)
-            if (value >= limit if side == "below" else value > limit) and side not in _LEAST:
+            if not (math.isnan(value) or SIDES[side](value, limit)):
                 return float(limit)
         return None
     if isinstance(band, list):

@@ -61,6 +61,9 @@ def view(report: Report) -> dict[str, Any]:
     """Return what the page and its printed form show of a report, as texts and places on tracks."""
     drawn = {drawing.number for drawing in report.drawings}
     constants = report.hammer.constants.values()
+    by_kind = {kind: dict.fromkeys(VERDICTS, 0) for kind in KINDS}
+    for result in report.results:
+        by_kind[result.claim.kind][result.verdict] += 1
     return {
         "hammer": report.hammer,
         "statuses": dict(Counter(constant.status for constant in constants)),
@@ -68,7 +71,7 @@ def view(report: Report) -> dict[str, Any]:
         "parts": _parts(report.hammer),
         "verdicts": {verdict: report.count(verdict) for verdict in VERDICTS},
         "kinds": KINDS,
-        "by_kind": _by_kind(report.results),
+        "by_kind": by_kind,
         "judged": {result.claim.name for result in report.results},
         "claims": [_claim(result, report, drawn) for result in report.results],
         "failing": failing_view(report),
@@ -94,14 +97,6 @@ def _parts(hammer: Hammer) -> list[dict[str, Any]]:
         {"name": name or "armature and platen", "law": laws.get(name, ""), "constants": constants}
         for name, constants in sections.items()
     ]
-
-
-def _by_kind(results: list[JudgedClaim]) -> dict[str, dict[str, int]]:
-    """Return how many claims of each kind have each verdict."""
-    counts = {kind: dict.fromkeys(VERDICTS, 0) for kind in KINDS}
-    for result in results:
-        counts[result.claim.kind][result.verdict] += 1
-    return counts
 
 
 def _judged_lines(result: JudgedClaim) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ and the HTML repr follow from them. For values that belong together and are no r
 from __future__ import annotations
 
 import re
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from inspect import cleandoc
 from typing import (
@@ -25,7 +25,6 @@ from typing import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from dataclasses import Field
 
 Kind = Literal["column", "coordinate", "scalar", "part"]
 
@@ -218,6 +217,7 @@ class Declared:
     """Values that belong together; a class that derives from it is a frozen dataclass without a Dataset.
 
     Its fields say what they mean as those of a result do, and the Attributes of its docstring follow.
+    With `eq=False` its instances are compared by identity, as those that hold arrays must be.
     """
 
     if TYPE_CHECKING:

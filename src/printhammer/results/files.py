@@ -18,7 +18,6 @@ import math
 import shutil
 import tempfile
 from contextlib import suppress
-from dataclasses import dataclass, field
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -28,7 +27,7 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.results.declare import heading
+from printhammer.results.declare import Column, Declared, heading, part
 from printhammer.results.provenance import KEYS
 from printhammer.support.outputs import write_file
 from printhammer.support.sheets import read_sheet
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from printhammer.results.declare import Column
 
 ENDINGS: Final = (".nc", ".zarr", ".csv", ".parquet", ".json")
 """Endings of the files that hold results."""
@@ -52,25 +50,14 @@ _COLUMNS: Final = "columns"
 _MOST_INT: Final = 2**31
 
 
-@dataclass(frozen=True)
-class Reopened:
-    """A result from a file.
+class Reopened(Declared):
+    """A result from a file."""
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    dataset : xarray.Dataset
-        The arrays; of a table (.csv, .parquet) its columns over `row`.
-    dataframe : pandas.DataFrame
-        The table; of a Dataset the arrays over the dimensions of the first one.
-    provenance : dict
-        Where the result comes from, see `printhammer.results.provenance`.
-    """
-
-    path: Path
-    dataset: xr.Dataset = field(repr=False)
-    dataframe: pd.DataFrame = field(repr=False)
+    path: Path = part("the file")
+    dataset: xr.Dataset = part("the arrays; of a table (.csv, .parquet) its columns over `row`", repr=False)
+    dataframe: pd.DataFrame = part(
+        "the table; of a Dataset the arrays over the dimensions of the first one", repr=False
+    )
 
     @property
     def attributes(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ and arrays that are no fields, come from a class's own `entries`; further attrib
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import Field, dataclass
 from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
@@ -36,7 +36,6 @@ from printhammer.results.provenance import provenance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from dataclasses import Field
     from pathlib import Path
 
     import pandas as pd

@@ -13,11 +13,11 @@ import os
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from printhammer.errors import InputError
+from printhammer.results.declare import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -34,49 +34,27 @@ _ARRAYS: Final = "arrays"
 _DRAFT: Final = f"{MARK}/.draft"
 
 
-@dataclass(frozen=True)
-class Variable:
-    """One array of a store.
+class Variable(Declared):
+    """One array of a store."""
 
-    Attributes
-    ----------
-    name : str
-        Its name.
-    dims : tuple of str
-        Names of its dimensions; those of the members come first.
-    shape : tuple of int
-        Their lengths.
-    dtype : str
-        Type of the numbers, as numpy names it.
-    fill : object
-        What stands where nothing is written yet.
-    attrs : mapping
-        Unit, meaning and the like.
-    values : array or None
-        Of a coordinate, which is written with the layout; None for a result.
-    """
-
-    name: str
-    dims: tuple[str, ...]
-    shape: tuple[int, ...]
-    dtype: str
-    fill: Any
-    attrs: Mapping[str, Any] = field(default_factory=dict)
-    values: npt.NDArray[Any] | None = None
+    name: str = part("its name")
+    dims: tuple[str, ...] = part("names of its dimensions; those of the members come first")
+    shape: tuple[int, ...] = part("their lengths")
+    dtype: str = part("type of the numbers, as numpy names it")
+    fill: Any = part("what stands where nothing is written yet")
+    attrs: Mapping[str, Any] = part("unit, meaning and the like", default_factory=dict)
+    values: npt.NDArray[Any] | None = part(
+        "of a coordinate, which is written with the layout; None for a result", default=None
+    )
 
 
-@dataclass(frozen=True)
-class Layout:
+class Layout(Declared):
     """What a store holds."""
 
-    chunks: tuple[int, ...]
-    """Members of a block along each of their dimensions."""
-    variables: tuple[Variable, ...]
-    """Results and coordinates, `MARK` among the results."""
-    attrs: Mapping[str, Any]
-    """Attributes of the group."""
-    identity: Mapping[str, str]
-    """What must be the same where a sweep goes on."""
+    chunks: tuple[int, ...] = part("members of a block along each of their dimensions")
+    variables: tuple[Variable, ...] = part("results and coordinates, `MARK` among the results")
+    attrs: Mapping[str, Any] = part("attributes of the group")
+    identity: Mapping[str, str] = part("what must be the same where a sweep goes on")
 
 
 class Store:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Final
 from starlette.applications import Starlette
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.websockets import WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from printhammer.studio.bounds import MOST_TABS
 from printhammer.studio.files import KINDS, page_files
-from printhammer.studio.guard import HEADERS
+from printhammer.studio.guard import HEADERS, Guard
 from printhammer.studio.session import Session
 from printhammer.studio.states.state import ProtocolError
 
@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from starlette.requests import Request
-    from starlette.websockets import WebSocket
 
-    from printhammer.studio.guard import Guard
     from printhammer.studio.states.shelf import Shelf
 
 REFUSED: Final = 1008

@@ -56,11 +56,8 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
 
         def __init__(self, **traits: Any) -> None:
             super().__init__(**traits)
-            self._session = Session(self._pass_on, shelf)
+            self._session = Session(lambda data: self.send({}, [data]), shelf)
             self.on_msg(self._take)
-
-        def _pass_on(self, data: bytes) -> None:
-            self.send({}, [data])
 
         def _take(self, _widget: Any, content: Any, _buffers: Any) -> None:
             try:

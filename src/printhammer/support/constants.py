@@ -33,68 +33,45 @@ _KEY = "quantity"
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a model field says about a physical constant.
-
-    Attributes
-    ----------
-    si : str
-        SI unit of the stored float, as `printhammer.units` writes it; "1" for a pure number.
-    also : tuple of str
-        Further SI units of other dimension that a file may give instead (a waveform's amplitude: A or N).
-    symbol : str
-        Symbol in the paper or the usual textbook, plain text.
-    meaning : str
-        One phrase for tables and help.
-    gt, ge, lt, le : float or None
-        Bounds of the SI value.
-    required : bool
-        Whether a file must give it.
-    """
+    """What a model field says about a physical constant."""
 
     si: str
+    """SI unit of the stored float, as `printhammer.units` writes it; "1" for a pure number."""
     symbol: str
+    """Symbol in the paper or the usual textbook, plain text."""
     meaning: str
+    """One phrase for tables and help."""
     also: tuple[str, ...] = ()
+    """Further SI units of other dimension that a file may give instead (a waveform's amplitude: A or N)."""
     gt: float | None = None
     ge: float | None = None
     lt: float | None = None
     le: float | None = None
+    """Bounds of the SI value."""
     required: bool = True
+    """Whether a file must give it."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """One constant of a hammer as its file gives it, with its SI value beside.
-
-    Attributes
-    ----------
-    key : str
-        Dotted key, such as "magnet.F0".
-    value : float
-        Number as written in the file, in `unit`.
-    unit : str
-        Unit as written in the file.
-    si : float
-        Value in `si_unit`.
-    status : str
-        "stated", "derived", "reconstructed" or "assumed".
-    source : str
-        Where the value comes from.
-    meaning, symbol : str
-        From the field's `Quantity`.
-    si_unit : str
-        SI unit of `si`.
-    """
+    """One constant of a hammer as its file gives it, with its SI value beside."""
 
     key: str
+    """Dotted key, such as "magnet.F0"."""
     value: float
     unit: str
+    """Number and unit as written in the file."""
     si: float
+    """Value in `si_unit`."""
     status: str
+    """"stated", "derived", "reconstructed" or "assumed"."""
     source: str
+    """Where the value comes from."""
     meaning: str
     symbol: str
+    """As of the field's `Quantity`."""
     si_unit: str
+    """SI unit of `si`."""
 
 
 def quantity(
@@ -109,25 +86,10 @@ def quantity(
     le: float | None = None,
     default: Any = PydanticUndefined,
 ) -> Any:
-    """Declare a pydantic field that holds a physical constant in SI.
+    """Declare a pydantic field that holds a physical constant in SI; arguments as for `Quantity`.
 
-    Parameters
-    ----------
-    si : str
-        SI unit of the float ("1" for a pure number).
-    symbol, meaning : str
-        Symbol and one phrase for tables and help.
-    also : tuple of str
-        Further SI units a file may give instead.
-    gt, ge, lt, le : float, optional
-        Bounds of the SI value; NaN and infinity are always refused.
-    default : float or None, optional
-        Makes the constant optional.
-
-    Returns
-    -------
-    pydantic field
-        For the right-hand side of a `float` (or `float | None`) annotation.
+    It is the right-hand side of a `float` (or `float | None`) annotation. NaN and infinity are always
+    refused; a `default` makes the constant optional.
     """
     note = Quantity(si, symbol, meaning, also, gt, ge, lt, le, default is PydanticUndefined)
     limits: dict[str, Any] = {"gt": gt, "ge": ge, "lt": lt, "le": le, "allow_inf_nan": False}

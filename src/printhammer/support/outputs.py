@@ -32,7 +32,9 @@ def write_file(path: str | Path, content: str | bytes) -> None:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
         # A temporary file is for its owner only.
-        Path(draft).chmod(0o666 & ~_umask())
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(draft).chmod(0o666 & ~mask)
         Path(draft).replace(target)
     except OSError as error:
         if draft is not None:
@@ -87,9 +89,3 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
             raise InputError(f"{path}: expected a file in a folder that exists")
         if not os.access(place.parent, os.W_OK):
             raise InputError(f"{path}: expected a file in a folder that can be written to")
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.results.store import Store, open_store
 from printhammer.support.threads import thread_count
-from printhammer.sweep.local import run_local
+from printhammer.sweep.local import Index, run_local
 from printhammer.sweep.plan import make_plan
 from printhammer.sweep.spec import read_spec
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from printhammer.sweep.local import Index
     from printhammer.sweep.work import Results
 
 Progress = Callable[[float, int, int], None]

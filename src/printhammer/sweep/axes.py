@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from difflib import get_close_matches
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal
@@ -15,6 +14,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.hammer.file import kinds_of, model_of
 from printhammer.hammer.names import FORCE, PERIOD, RATE, TIMING, in_unit_of_drive, quantity_of
+from printhammer.results import Declared, part
 from printhammer.support.constants import Quantity, expected, quantities, shown
 from printhammer.sweep.quantities import read_quantities, read_quantity
 
@@ -45,24 +45,18 @@ _STATE: Final = {
 _FIRING: Final = Quantity("s", "t", "time of a firing", ge=0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
+class Axis(Declared, eq=False):
     """One axis of a sweep."""
 
-    key: str
-    """As the spec gives it."""
-    name: str
-    """Of its dimension or coordinate in the store."""
-    target: Target
-    """Whether it changes the hammer, the waveform of the drive, its timing, a firing time or the state."""
-    field: str
-    """What it changes there: the key, the name of a number, or the number of a firing."""
-    note: Quantity
-    """Unit, meaning and bounds."""
-    values: FloatArray
-    """In a grid its values; else the two ends of its range; SI."""
-    geometric: bool = False
-    """Whether a range is divided geometrically."""
+    key: str = part("as the spec gives it")
+    name: str = part("of its dimension or coordinate in the store")
+    target: Target = part(
+        "whether it changes the hammer, the waveform of the drive, its timing, a firing time or the state"
+    )
+    field: str = part("what it changes there: the key, the name of a number, or the number of a firing")
+    note: Quantity = part("unit, meaning and bounds")
+    values: FloatArray = part("in a grid its values; else the two ends of its range; SI")
+    geometric: bool = part("whether a range is divided geometrically", default=False)
 
     @property
     def counts(self) -> bool:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.results.provenance import versions
-from printhammer.sweep.outputs import WORKER_LOST
+from printhammer.sweep.outputs import WORKER_LOST, Outputs
 from printhammer.sweep.work import Results, run_chunk
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
     from printhammer.sweep.local import Index
     from printhammer.sweep.members import Base
-    from printhammer.sweep.outputs import Outputs
     from printhammer.sweep.plan import Plan
 
 ANSWER: Final = 5.0

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -37,14 +38,11 @@ def between(share: FloatArray, low: float, high: float, geometric: bool) -> Floa
     return np.clip(values, min(low, high), max(low, high))
 
 
-@dataclass(frozen=True)
-class Blocks:
+class Blocks(Declared):
     """Members of a grid in blocks that are whole chunks of it and consecutive in its order."""
 
-    shape: tuple[int, ...]
-    """Members along each dimension; the last one runs fastest."""
-    chunks: tuple[int, ...]
-    """Those of a block."""
+    shape: tuple[int, ...] = part("members along each dimension; the last one runs fastest")
+    chunks: tuple[int, ...] = part("those of a block")
 
     @classmethod
     def of(cls, shape: Sequence[int], most: int) -> Blocks:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.drive.file import read_drive
 from printhammer.drive.text import FORMAT, document
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.results import Declared, part, scalar
 from printhammer.run.simulate import CYCLE
 from printhammer.sweep.axes import COUNTS, Axis
 
@@ -33,26 +34,21 @@ class Member:
     state: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Base:
+class Base(Declared):
     """What all members have in common; complete, so that another machine can make them."""
 
-    hammer: Hammer
-    """The hammer, before the axes change it."""
-    drive: Mapping[str, Any]
-    """Tables of the drive file; its waveform only where an axis changes it."""
-    waveform: Waveform | None
-    """Of the drive; None where that of the hammer is fired, or an axis changes it."""
-    folder: Path
-    """Where what the drive names lies."""
-    state: tuple[float | None, float | None]
-    """Displacement, m, and velocity, m/s, at the start; None for those at rest."""
-    duration: float | None
-    """End of the runs, s."""
-    tolerance: float
-    """Error allowed in one step."""
-    axes: tuple[Axis, ...]
-    """What a row of values means."""
+    hammer: Hammer = part("the hammer, before the axes change it")
+    drive: Mapping[str, Any] = part("tables of the drive file; its waveform only where an axis changes it")
+    waveform: Waveform | None = part(
+        "of the drive; None where that of the hammer is fired, or an axis changes it"
+    )
+    folder: Path = part("where what the drive names lies")
+    state: tuple[float | None, float | None] = part(
+        "displacement, m, and velocity, m/s, at the start; None for those at rest"
+    )
+    duration: float | None = scalar("s", "end of the runs")
+    tolerance: float = part("error allowed in one step")
+    axes: tuple[Axis, ...] = part("what a row of values means")
 
     @property
     def kind(self) -> str:

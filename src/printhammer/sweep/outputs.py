@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.results import Declared, part
 from printhammer.support.constants import shown
 from printhammer.sweep.quantities import read_quantity
 
@@ -117,16 +118,12 @@ OF_MOTION: Final = (
 """Scalars for which the whole motion is computed once more, which takes several times as long."""
 
 
-@dataclass(frozen=True)
-class Outputs:
+class Outputs(Declared):
     """What is kept of each member."""
 
-    arrays: tuple[Output, ...]
-    """All arrays, the status first."""
-    firings: int
-    """Length of the dimension of the firings."""
-    times: FloatArray
-    """Times of the displacements, s."""
+    arrays: tuple[Output, ...] = part("all arrays, the status first")
+    firings: int = part("length of the dimension of the firings")
+    times: FloatArray = part("times of the displacements, s")
 
     def wants(self, *outputs: Output) -> bool:
         """Tell whether one of some arrays is asked for."""

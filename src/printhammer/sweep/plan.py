@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
@@ -11,17 +10,17 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.results import Declared, part
 from printhammer.results.provenance import provenance
 from printhammer.results.store import Layout, Variable
 from printhammer.sweep.design import Blocks, between, latin_hypercube
 from printhammer.sweep.members import Maker
-from printhammer.sweep.outputs import FIRING, TIME
+from printhammer.sweep.outputs import FIRING, TIME, Output
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from printhammer.support.arrays import FloatArray
-    from printhammer.sweep.outputs import Output
     from printhammer.sweep.spec import Spec
 
 FORMAT: Final = "1"
@@ -36,17 +35,13 @@ _MOST_IN_BLOCK: Final = 256
 _MOST_BYTES: Final = 2**25
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(Declared):
     """A spec and what follows from it."""
 
-    spec: Spec
-    shape: tuple[int, ...]
-    """Members along each dimension."""
-    dims: tuple[str, ...]
-    """Names of these dimensions."""
-    blocks: Blocks
-    """The blocks of work."""
+    spec: Spec = part("the spec")
+    shape: tuple[int, ...] = part("members along each dimension")
+    dims: tuple[str, ...] = part("names of these dimensions")
+    blocks: Blocks = part("the blocks of work")
 
     @property
     def members(self) -> int:

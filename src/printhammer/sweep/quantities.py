@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Final
 
 from pydantic import WithJsonSchema
 
 from printhammer.errors import InputError, located
 from printhammer.support.constants import shown
 from printhammer.units import describe, parse, to_si
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 _ONE: Final[dict[str, Any]] = {
     "oneOf": [

@@ -10,10 +10,10 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +21,9 @@ from printhammer.drive.file import read_drive
 from printhammer.drive.text import FORMAT as DRIVE_FORMAT
 from printhammer.drive.text import document
 from printhammer.errors import InputError
-from printhammer.hammer.hammer import load, shipped
+from printhammer.hammer.hammer import Hammer, load, shipped
 from printhammer.hammer.names import quantity_of
+from printhammer.results import Declared, part
 from printhammer.support.constants import shown
 from printhammer.support.texts import read_text
 from printhammer.sweep.axes import COUNTS, Axis, read_axis
@@ -31,32 +32,20 @@ from printhammer.sweep.outputs import Outputs, read_outputs
 from printhammer.sweep.quantities import read_quantity
 from printhammer.sweep.tables import read_tables
 
-if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
 
-
-@dataclass(frozen=True)
-class Spec:
+class Spec(Declared):
     """A sweep as it is meant."""
 
-    where: str
-    """What to name in a message, usually the file."""
-    text: str
-    """TOML."""
-    title: str
-    """One line that says what it is."""
-    base: Base
-    """What all members have in common."""
-    axes: tuple[Axis, ...]
-    design: str
-    """Either "grid" or "latin-hypercube"."""
-    members: int | None
-    seed: int | None
-    """Of a Latin hypercube."""
-    chunk: int | None
-    """Members of a block of work."""
-    outputs: Outputs
-    """What is kept."""
+    where: str = part("what to name in a message, usually the file")
+    text: str = part("TOML")
+    title: str = part("one line that says what it is")
+    base: Base = part("what all members have in common")
+    axes: tuple[Axis, ...] = part("what varies")
+    design: str = part('either "grid" or "latin-hypercube"')
+    members: int | None = part("number of members of a Latin hypercube; None in a grid")
+    seed: int | None = part("of a Latin hypercube")
+    chunk: int | None = part("members of a block of work")
+    outputs: Outputs = part("what is kept")
 
     @property
     def grid(self) -> bool:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.run.ensemble import Ensemble
+from printhammer.run.ensemble import DotTable, Ensemble
 from printhammer.support.threads import in_threads
-from printhammer.sweep.members import Maker
+from printhammer.sweep.members import Base, Maker, Member
 from printhammer.sweep.outputs import (
     DISPLACEMENT,
     DOTS,
@@ -26,10 +26,8 @@ from printhammer.sweep.outputs import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.run.ensemble import DotTable
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray
-    from printhammer.sweep.members import Base, Member
     from printhammer.sweep.outputs import Outputs
 
 Results = dict[str, Any]

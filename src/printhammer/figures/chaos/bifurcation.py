@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.diagram import hysteresis
+from printhammer.chaos.bifurcation.diagram import Bifurcation, hysteresis
 from printhammer.chaos.bifurcation.windows import cells
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.bifurcation.diagram import Bifurcation
     from printhammer.support.arrays import FloatArray
 
 SHADES: Final = {

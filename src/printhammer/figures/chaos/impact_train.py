@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.chaos import ImpactTrain
-    from printhammer.figures.elements.scales import Scale
 
 
 @styled
@@ -30,7 +29,13 @@ def plot(train: ImpactTrain) -> Figure:
     time = scale("time", float(train.intervals.max()))
     bars.stairs(train.counts, time.shown(train.edges), fill=True, color=BLUE, gid="histogram")
     bars.set(xlabel=f"Interval  [{time.sign}]", ylabel="Number")
-    _returns(returns, train, time)
+    shown = time.shown(train.intervals)
+    dots(returns, shown[:-1], shown[1:], 1.8, BLUE, gid="returns", zorder=3.0)
+    low, high = (float(end) for end in time.shown(train.edges[[0, -1]]))
+    room = 0.06 * (high - low)
+    ends = (low - room, high + room)
+    returns.plot(ends, ends, color=FAINT, lw=HAIR, zorder=1.0)
+    returns.set(xlabel=f"Interval  [{time.sign}]", ylabel=f"Next one  [{time.sign}]", xlim=ends, ylim=ends)
     _lags(lags, train)
     for ax in (bars, returns, lags):
         ax.tick_params(axis="both", top=True, right=True)
@@ -46,16 +51,6 @@ def plot(train: ImpactTrain) -> Figure:
     if train.hammer is not None:
         sign(figure, train.hammer)
     return figure
-
-
-def _returns(ax: Axes, train: ImpactTrain, time: Scale) -> None:
-    shown = time.shown(train.intervals)
-    dots(ax, shown[:-1], shown[1:], 1.8, BLUE, gid="returns", zorder=3.0)
-    low, high = (float(end) for end in time.shown(train.edges[[0, -1]]))
-    room = 0.06 * (high - low)
-    ends = (low - room, high + room)
-    ax.plot(ends, ends, color=FAINT, lw=HAIR, zorder=1.0)
-    ax.set(xlabel=f"Interval  [{time.sign}]", ylabel=f"Next one  [{time.sign}]", xlim=ends, ylim=ends)
 
 
 def _lags(ax: Axes, train: ImpactTrain) -> None:

@@ -20,7 +20,7 @@ from printhammer.figures.elements.marks import (
     note,
     place_lines,
 )
-from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.orbits.orbit import Orbit
     from printhammer.chaos.orbits.search import Orbits
-    from printhammer.figures.elements.scales import Scale
     from printhammer.run.motion import Motion
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray

@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import HALO, dots, heading, note
-from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_panel, sign, styled
 from printhammer.run.window import Window
 from printhammer.units import from_si
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.chaos import Strobe
-    from printhammer.figures.elements.scales import Scale
 
 _CYCLE: Final = 8
 """Largest period whose points are ringed."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.table.histories import REST, gap_text, histories, number_of
-from printhammer.control.table.report import STRATEGIES
+from printhammer.control.table.report import STRATEGIES, TableReport
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import heading, inside
 from printhammer.figures.elements.scales import Scale
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.control.table.compensation import CompensationTable
-    from printhammer.control.table.report import TableReport
     from printhammer.support.arrays import FloatArray
 
 _FEW: Final = 4

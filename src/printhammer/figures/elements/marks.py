@@ -8,7 +8,7 @@ import numpy as np
 
 from printhammer.figures.elements.curves import places
 from printhammer.figures.elements.room import CURVE, freest, occupied
-from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import (
     BLUE,
     FAINT,
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
-    from printhammer.figures.elements.scales import Scale
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final, Literal
 
+from printhammer.results import Declared, part
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
@@ -18,18 +18,13 @@ if TYPE_CHECKING:
 Name = Literal["displacement", "velocity", "force", "time", "current"]
 
 
-@dataclass(frozen=True)
-class Scale:
+class Scale(Declared):
     """How a quantity is shown."""
 
-    label: str
-    """Name on the axis."""
-    si: str
-    """SI unit of the numbers inside."""
-    unit: str
-    """Unit of the numbers drawn."""
-    other: str = ""
-    """Unit of the opposite axis; empty for none."""
+    label: str = part("name on the axis")
+    si: str = part("SI unit of the numbers inside")
+    unit: str = part("unit of the numbers drawn")
+    other: str = part("unit of the opposite axis; empty for none", default="")
 
     @property
     def factor(self) -> float:

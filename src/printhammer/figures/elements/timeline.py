@@ -17,13 +17,8 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
 
-_LOOKS: Final = (
-    (style.BLUE, "-", style.LINE),
-    (style.ORANGE, "-", style.LINE),
-    (style.GREEN, "-", style.LINE),
-)
+_COLOURS: Final = (style.BLUE, style.ORANGE, style.GREEN)
 _HEADROOM: Final = 0.08
 
 
@@ -65,7 +60,9 @@ def timeline(
     panel, strip = with_strip(figure)
     grids = [times_of(motion, 0.0, until) for motion in motions]
     paths = [motion.at(grid)[0] for motion, grid in zip(motions, grids, strict=True)]
-    low, high = _limits(hammer, paths)
+    every = [*places(hammer).values(), *(float(end) for path in paths for end in (path.min(), path.max()))]
+    room = _HEADROOM * (max(every) - min(every)) or 1e-6
+    low, high = min(every) - room, max(every) + room
     way, time = scale("displacement", max(abs(low), abs(high))), scale("time", until)
 
     panel.set_xlim(0.0, float(time.shown(until)))
@@ -73,18 +70,22 @@ def timeline(
     marks.place_lines(panel, hammer, way)
     several = len(motions) > 1
     for number, (motion, grid, path) in enumerate(zip(motions, grids, paths, strict=True)):
-        colour, dash, width = _LOOKS[number % len(_LOOKS)]
+        colour = _COLOURS[number % len(_COLOURS)]
         gid = f"displacement {number + 1}" if several else "displacement"
         # Later motions lie under earlier ones where they agree.
         order = 3.0 - 0.1 * number
-        marks.curve(panel, time.shown(grid), way.shown(path), gid, colour, ls=dash, lw=width, zorder=order)
+        marks.curve(panel, time.shown(grid), way.shown(path), gid, colour, zorder=order)
         if show_firings:
             fired = motion.drive.times[motion.drive.times <= until]
             marks.firings(panel, fired, time, colour if several else style.BLUE)
-    marks.drive_strip(strip, motions, grids, until, [look[0] for look in _LOOKS[: len(motions)]])
+    marks.drive_strip(strip, motions, grids, until, _COLOURS[: len(motions)])
     marks.name_lines(panel, hammer, way)
     if labels:
-        _legend(panel, labels)
+        from matplotlib.lines import Line2D
+
+        lines = zip(_COLOURS, labels, strict=False)
+        handles = [Line2D([], [], color=colour, lw=style.THIN + 0.5, label=text) for colour, text in lines]
+        marks.legend_above(panel, handles)
     elif heading:
         marks.heading(panel, heading, color=style.INK, pad=4.0)
     label(panel, "y", way)
@@ -117,21 +118,3 @@ def current_between(ax: Axes, motion: Motion, largest: float) -> None:
     ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
     marks.dashed(ax.axhline, -largest, largest)
     ax.set_ylabel("Current  [A]")
-
-
-def _limits(hammer: Hammer, paths: Sequence[FloatArray]) -> tuple[float, float]:
-    """Return limits of the displacement, m, that hold the motions and the places of the hammer."""
-    every = [*places(hammer).values(), *(float(end) for path in paths for end in (path.min(), path.max()))]
-    low, high = min(every), max(every)
-    room = _HEADROOM * (high - low) or 1e-6
-    return low - room, high + room
-
-
-def _legend(panel: Axes, labels: Sequence[str]) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], color=colour, ls=dash, lw=style.THIN + 0.5, label=text)
-        for (colour, dash, _width), text in zip(_LOOKS, labels, strict=False)
-    ]
-    marks.legend_above(panel, handles)

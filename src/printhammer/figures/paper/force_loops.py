@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.figures.elements.curves import fired, places, times_of, total_force
 from printhammer.figures.elements.marks import HALO, arrows, curve, note, place_lines
 from printhammer.figures.elements.room import freest, occupied
-from printhammer.figures.elements.scales import label, scale
+from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import BLUE, FAINT, HAIR, MUTED, TINY, new_panel, sign, styled
 from printhammer.figures.paper.total_force import rigid_remark
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from printhammer.figures.elements.scales import Scale
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import BoolArray, FloatArray

@@ -10,7 +10,7 @@ from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import RING, panel, scales_of, shown_period
 from printhammer.figures.elements.curves import waveform_of
 from printhammer.figures.elements.marks import legend_below, note
-from printhammer.figures.elements.scales import label
+from printhammer.figures.elements.scales import Scale, label
 from printhammer.figures.elements.style import INK, new_figure, sign, styled
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.chaos import Strobe
-    from printhammer.figures.elements.scales import Scale
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.scheme_runs import Reading, Scheme
 
@@ -81,7 +80,8 @@ def poincare(
     for i, strobe in enumerate(shown):
         row, column = divmod(i, columns)
         ax = figure.add_subplot(grid[row, column])
-        panel(ax, strobe, window, way, speed, size=1.6, printed=_printed(strobe, printed or {}))
+        said = [name for t, name in (printed or {}).items() if math.isclose(t, strobe.period, rel_tol=1e-9)]
+        panel(ax, strobe, window, way, speed, size=1.6, printed=said[0] if said else "")
         if len(shown) <= len(ascii_lowercase):
             note(ax, f"({ascii_lowercase[i]})", (0.03, 0.96), color=INK)
         ax.locator_params(axis="both", nbins=5)
@@ -117,12 +117,6 @@ def _strobed(
     from printhammer.chaos.strobe.schemes_1983 import scheme_strobes
 
     return scheme_strobes(hammer, periods, scheme, reading=reading, points=points)
-
-
-def _printed(strobe: Strobe, verdicts: Mapping[float, str]) -> str:
-    """Return what the paper says of a strobe time; empty if nothing."""
-    said = (name for period, name in verdicts.items() if math.isclose(period, strobe.period, rel_tol=1e-9))
-    return next(said, "")
 
 
 def _edge(ax: Axes, side: Literal["x", "y"], shown: Scale, here: bool, opposite: bool) -> None:

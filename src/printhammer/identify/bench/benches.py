@@ -15,7 +15,6 @@ motion
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -25,6 +24,7 @@ from printhammer.hammer.static_force import StaticForce, law_of
 from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform, time_constant
 from printhammer.parts.backstop._hertz import damping_from_restitution
 from printhammer.parts.backstop.hertz import HertzBackstop
+from printhammer.results import Declared, part
 from printhammer.run.simulate import CYCLE, simulate
 
 if TYPE_CHECKING:
@@ -71,20 +71,14 @@ _LEAST: Final = 1e-6
 """Restitution below which no backstop is taken for one that sends the armature back."""
 
 
-@dataclass(frozen=True, eq=False)
-class Bench:
+class Bench(Declared, eq=False):
     """What is there to be measured."""
 
-    what: str
-    """One line that says what is measured, and how."""
-    true: dict[str, FloatArray]
-    """Columns by name, SI, before noise and resolution, shape (rows,)."""
-    suspect: str
-    """Column in which wrong readings occur."""
-    words: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    """Columns of words."""
-    exact: tuple[str, ...] = ()
-    """Columns that have no error, such as the time."""
+    what: str = part("one line that says what is measured, and how")
+    true: dict[str, FloatArray] = part("columns by name, SI, before noise and resolution, shape (rows,)")
+    suspect: str = part("column in which wrong readings occur")
+    words: dict[str, tuple[str, ...]] = part("columns of words", default_factory=dict)
+    exact: tuple[str, ...] = part("columns that have no error, such as the time", default=())
 
 
 def magnet(

@@ -8,7 +8,6 @@ a bench would give before anybody builds it.
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,6 +20,7 @@ from printhammer.identify.shots.motion import fit_motion
 from printhammer.identify.static.backstop import Stiffness, fit_backstop
 from printhammer.identify.static.magnet import fit_magnet
 from printhammer.identify.static.pack import fit_pack
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,18 +38,15 @@ _START: Final = 0.2
 """The fit of the motion begins with constants wrong by up to this share."""
 
 
-@dataclass(frozen=True, eq=False)
-class Recovery:
+class Recovery(Declared, eq=False):
     """One laboratory, and what was found."""
 
-    truth: Hammer
-    """What was measured."""
-    fits: Mapping[str, Fit]
-    """By kind: "magnet" (with the spring), "pack", "backstop", "motion"."""
-    constants: Mapping[str, FittedConstant]
-    """The constants of the hammer file in the end, from all measurements."""
-    hammer: Hammer
-    """Built of them."""
+    truth: Hammer = part("what was measured")
+    fits: Mapping[str, Fit] = part('by kind: "magnet" (with the spring), "pack", "backstop", "motion"')
+    constants: Mapping[str, FittedConstant] = part(
+        "the constants of the hammer file in the end, from all measurements"
+    )
+    hammer: Hammer = part("built of them")
 
     def true(self, key: str) -> float:
         """Return the true value of a constant, SI."""

@@ -8,7 +8,7 @@ The noise is white and normal. A limited bandwidth acts before all this, see `pr
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -67,16 +68,12 @@ class Amount:
         return np.full(true.shape, self.size * (full_scale(true) if self.of else 1.0))
 
 
-@dataclass(frozen=True)
-class Channel:
+class Channel(Declared):
     """One quantity as it is read."""
 
-    noise: Amount = field(default_factory=Amount)
-    """Standard deviation of white, normal noise."""
-    resolution: Amount = field(default_factory=Amount)
-    """Step of the readings; 0 for none."""
-    offset: Amount = field(default_factory=Amount)
-    """What is read at zero."""
+    noise: Amount = part("standard deviation of white, normal noise", default_factory=Amount)
+    resolution: Amount = part("step of the readings; 0 for none", default_factory=Amount)
+    offset: Amount = part("what is read at zero", default_factory=Amount)
 
     def __post_init__(self) -> None:
         if self.resolution.of == READING:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.identify.bench.sensor import Amount, Sensor
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 NONE: Final = "none"
 """What a bandwidth is called that does not limit anything."""

@@ -6,10 +6,11 @@ corrected by what each stretch by itself shows, before errors can grow from cont
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,16 +30,12 @@ _TRIES: Final = 2
 """Steps at one price."""
 
 
-@dataclass(frozen=True, eq=False)
-class Prior:
+class Prior(Declared, eq=False):
     """What is known of the parameters beside the records: normal, (p - mean) with a covariance."""
 
-    which: IntArray
-    """Numbers of the parameters, shape (k,)."""
-    mean: FloatArray
-    """SI, shape (k,)."""
-    covariance: FloatArray
-    """SI, shape (k, k)."""
+    which: IntArray = part("numbers of the parameters, shape (k,)")
+    mean: FloatArray = part("SI, shape (k,)")
+    covariance: FloatArray = part("SI, shape (k, k)")
 
 
 class Priors:
@@ -93,7 +90,8 @@ class Approach:
         chains = self.shooting.chains(values, states, derivatives=True)
         width = 0.0 if chains is None else _WIDE * largest_gap(chains, self.shooting.units)
         while width > _NARROW and chains is not None:
-            scales = self._scales(chains)
+            left = zip(self._left(chains), self.keep, strict=True)
+            scales = np.maximum([float(np.sqrt(row @ row / keep.sum())) for row, keep in left], 1e-16)
             for _ in range(_TRIES):
                 cost = self._cost(values, chains, scales, width)
                 step = self._step(values, chains, scales, width)
@@ -130,13 +128,6 @@ class Approach:
                 zip(self.shooting.shots, chains, self.keep, strict=True)
             )
         ]
-
-    def _scales(self, chains: Sequence[Chain]) -> FloatArray:
-        spreads = [
-            float(np.sqrt(left @ left / keep.sum()))
-            for left, keep in zip(self._left(chains), self.keep, strict=True)
-        ]
-        return np.maximum(spreads, 1e-16)
 
     def _cost(self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float) -> float:
         total = sum(float(off @ off) for off in self.priors.residuals(values))

@@ -18,6 +18,7 @@ from printhammer.identify.residuals import memory_factor, outliers_of, spikes_of
 from printhammer.identify.result import Profile, student
 from printhammer.identify.shots.approach import Approach, Prior, Priors, largest_gap
 from printhammer.identify.shots.identifiable import singular
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,30 +48,23 @@ _LOST: Final = 1e-7
 _NO_MOTION: Final = "the hammer does not move so that the records could be compared with it"
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Declared, eq=False):
     """Where the fit ended."""
 
-    values: FloatArray
-    """Parameters, SI, shape (p,)."""
-    covariance: FloatArray
-    """SI, shape (p, p)."""
-    states: list[FloatArray]
-    """States at the joints of each shot."""
-    shown: list[FloatArray]
-    by_parameter: list[FloatArray]
-    """The model of each record, m, and its derivatives with respect to the parameters in their scales. Shape
-    (n,) and (n, p)."""
-    outliers: list[BoolArray]
-    """Samples left out."""
-    scales: FloatArray
-    memories: FloatArray
-    """Standard deviation of the residuals, m, and the factor by which their memory increases variances. Shape
-    (shots,)."""
-    design: FloatArray
-    """Rows of data and prior over their standard errors, columns counted in the scales."""
-    cost: float
-    """Weighted sum of squares, prior included."""
+    values: FloatArray = part("parameters, SI, shape (p,)")
+    covariance: FloatArray = part("SI, shape (p, p)")
+    states: list[FloatArray] = part("states at the joints of each shot")
+    shown: list[FloatArray] = part("the model of each record, m, shape (n,)")
+    by_parameter: list[FloatArray] = part(
+        "its derivatives with respect to the parameters in their scales, shape (n, p)"
+    )
+    outliers: list[BoolArray] = part("samples left out")
+    scales: FloatArray = part("standard deviation of the residuals, m, shape (shots,)")
+    memories: FloatArray = part("factor by which their memory increases variances, shape (shots,)")
+    design: FloatArray = part(
+        "rows of data and prior over their standard errors, columns counted in the scales"
+    )
+    cost: float = part("weighted sum of squares, prior included")
 
 
 class GaussNewton:
@@ -264,7 +258,11 @@ class GaussNewton:
                 values, states = other.values, other.states
         places = np.array(sorted(increases))
         increase = np.array([increases[place] for place in places])
-        return Profile(places, increase, _interval(places, increase, best, student(degrees_of_freedom)))
+        # The root of the increase is nearly straight, and counts standard errors.
+        roots, reach = np.sqrt(increase) * np.sign(places - best), student(degrees_of_freedom)
+        low = float(np.interp(-reach, roots, places)) if roots[0] < -reach else -np.inf
+        high = float(np.interp(reach, roots, places)) if roots[-1] > reach else np.inf
+        return Profile(places, increase, (low, high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,11 +286,3 @@ def _solved(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, Floa
     step = inverse @ (inverse.T @ ((design / sizes).T @ residuals)) / sizes
     errors = np.sqrt((inverse * inverse).sum(axis=1)) / sizes
     return step, errors
-
-
-def _interval(places: FloatArray, increase: FloatArray, best: float, reach: float) -> tuple[float, float]:
-    """Return where the root of the increase, which is nearly straight, passes a number of standard errors."""
-    roots = np.sqrt(increase) * np.sign(places - best)
-    low = float(np.interp(-reach, roots, places)) if roots[0] < -reach else -np.inf
-    high = float(np.interp(reach, roots, places)) if roots[-1] > reach else np.inf
-    return low, high

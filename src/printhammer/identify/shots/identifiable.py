@@ -60,8 +60,9 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
         return
     direction = np.abs(vectors[:, 0])
     tied = [name for name, part in zip(names, direction, strict=True) if part > _SHARE * direction.max()]
+    listed = tied[0] if len(tied) == 1 else f"{', '.join(tied[:-1])} and {tied[-1]}"
     raise InputError(
-        f"{where}: a motion cannot tell apart {_listed(tied)}: changed together they leave the records as"
+        f"{where}: a motion cannot tell apart {listed}: changed together they leave the records as"
         " they are, expected at least one of them to be held"
     )
 
@@ -106,7 +107,3 @@ def would_be_found(
         if size > 1e-12 * float(column @ column):
             further.append((name, size**-0.5, float(own @ residuals) / size))
     return further
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

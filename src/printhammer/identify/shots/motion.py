@@ -19,14 +19,13 @@ from printhammer.identify.shots.identifiable import condition_number, refuse_deg
 from printhammer.identify.shots.notes import further, remembered, rests, tested
 from printhammer.identify.shots.pulse import Pulse, fit_pulse
 from printhammer.identify.shots.shooting import Parameters, Shooting
-from printhammer.identify.shots.shot import FEWEST, read_shot
+from printhammer.identify.shots.shot import FEWEST, Shot, read_shot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.shots.shot import Shot
     from printhammer.support.arrays import FloatArray
 
 _DAMPING: Final = "backstop.damping"

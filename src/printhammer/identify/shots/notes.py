@@ -8,15 +8,13 @@ import numpy as np
 
 from printhammer.identify.shots.identifiable import would_be_found
 from printhammer.identify.shots.shooting import Parameters, Shooting
-from printhammer.identify.shots.shot import FEWEST
+from printhammer.identify.shots.shot import FEWEST, Shot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
-    from printhammer.identify.shots.shot import Shot
-    from printhammer.support.arrays import FloatArray
 
 _REJECTED: Final = 0.01
 """Probability below which the model is rejected."""
@@ -41,7 +39,9 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
         before = shot.x[shot.t < 0.0]
         if len(before) >= 30:
             noise = max(noise, float(np.std(before, ddof=1)))
-        noise = max(noise, _resolution(shot.x) / np.sqrt(12.0))
+        steps = np.diff(np.unique(shot.x))
+        resolution = float(steps.min()) if len(steps) else 0.0
+        noise = max(noise, resolution / np.sqrt(12.0))
         if noise == 0.0:
             continue
         number = int((~out).sum())
@@ -58,12 +58,6 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
     # The largest of several records counts.
     p_value = min(1.0, p_value * len(shots))
     return p_value, worst if p_value < _REJECTED else ""
-
-
-def _resolution(x: FloatArray) -> float:
-    """Return the smallest difference between different samples, m."""
-    steps = np.diff(np.unique(x))
-    return float(steps.min()) if len(steps) else 0.0
 
 
 def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,6 +11,7 @@ from printhammer.drive.waveforms.shapes import Sampled, Waveform
 from printhammer.errors import InputError
 from printhammer.identify.lowpass import lowpass_waveform
 from printhammer.identify.residuals import noise_of_record, outliers_of, robust_scale
+from printhammer.results import Declared, part
 from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
@@ -29,20 +29,16 @@ _INTERVALS: Final = 200
 """Most pieces of a waveform that is taken from the record."""
 
 
-@dataclass(frozen=True, eq=False)
-class Pulse:
+class Pulse(Declared, eq=False):
     """The waveform of one shot, and how well it is known."""
 
-    waveform: Waveform
-    """At the values found."""
-    names: tuple[str, ...]
-    """Constants that are uncertain; "scale" for the size of a waveform taken from the record."""
-    values: FloatArray
-    """Their values, SI, shape (n,)."""
-    covariance: FloatArray
-    """Of these, shape (n, n)."""
-    note: str = ""
-    """What is odd; may be empty."""
+    waveform: Waveform = part("at the values found")
+    names: tuple[str, ...] = part(
+        'constants that are uncertain; "scale" for the size of a waveform taken from the record'
+    )
+    values: FloatArray = part("their values, SI, shape (n,)")
+    covariance: FloatArray = part("of these, shape (n, n)")
+    note: str = part("what is odd; may be empty", default="")
 
     def changed(self, values: Sequence[float]) -> Waveform:
         """Return the waveform with other values of its constants."""

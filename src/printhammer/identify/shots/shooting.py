@@ -18,7 +18,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.identify.lowpass import lowpass_motion, time_constant
-from printhammer.identify.shots.shot import stroke_of
+from printhammer.identify.shots.shot import Shot, stroke_of
 from printhammer.run.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.shots.pulse import Pulse
-    from printhammer.identify.shots.shot import Shot
     from printhammer.support.arrays import FloatArray, IntArray
 
 _STEP: Final = 1e-7
@@ -113,12 +112,9 @@ class Shooting:
         speed = max(float(np.abs(np.gradient(shot.x, shot.t)).max()) for shot in shots)
         self.units = np.array([self.stroke, speed])
         self.steps = _STEP * self.units
-        self.lasting = [self._lasting(pulse) for pulse in pulses]
-
-    def _lasting(self, pulse: Pulse | None) -> float:
-        waveform = self.hammer.waveform if pulse is None else pulse.waveform
+        waveforms = [hammer.waveform if pulse is None else pulse.waveform for pulse in pulses]
         # Half as long again, as a fit may make a pulse longer.
-        return 1.5 * waveform.support if waveform is not None else 0.0
+        self.lasting = [0.0 if each is None else 1.5 * each.support for each in waveforms]
 
     def hammer_at(self, values: FloatArray) -> Hammer:
         """Return the hammer with other values of the constants fitted, SI."""

@@ -6,7 +6,6 @@ local parabola; they are where the integration of a stretch begins.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -15,14 +14,14 @@ import numpy as np
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.identify.residuals import noise_of_record, running_median
-from printhammer.identify.tables import read_table
+from printhammer.identify.tables import Readings, read_table
+from printhammer.results import Declared, part, scalar
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray, IntArray
 
 Surface = Literal["pack", "backstop"]
@@ -35,15 +34,12 @@ _WINDOW: Final = 15e-6
 """Longest time over which samples are averaged to find contacts, s; contacts last longer."""
 
 
-@dataclass(frozen=True)
-class Touch:
+class Touch(Declared):
     """A contact as the record shows it."""
 
-    surface: Surface
-    """Either "pack" or "backstop"."""
-    first: int
-    last: int
-    """Rows of the first and the last sample in it."""
+    surface: Surface = part('either "pack" or "backstop"')
+    first: int = part("row of the first sample in it")
+    last: int = part("row of the last sample in it")
 
     @property
     def count(self) -> int:
@@ -51,29 +47,21 @@ class Touch:
         return self.last - self.first + 1
 
 
-@dataclass(frozen=True, eq=False)
-class Shot:
+class Shot(Declared, eq=False):
     """One record, ready to be fitted."""
 
-    name: str
-    """The file, as messages name it."""
-    t: FloatArray
-    x: FloatArray
-    """Times of the samples, s, ascending, 0 at the firing, and displacements, m. Shape (n,)."""
-    current: FloatArray | None
-    """Current, A, shape (n,), or None."""
-    lines: IntArray
-    """Line of the file of each sample, shape (n,)."""
-    bandwidth: float | None
-    """Of the sensor, Hz; None for one without delay."""
-    noise: float
-    """Of the displacement, m, from the differences of the samples."""
-    touches: list[Touch]
-    """Contacts in order; the first is the rest at the backstop, if there is one."""
-    joints: IntArray
-    """Rows at which the record is cut, shape (j,)."""
-    states: FloatArray
-    """Displacement, m, and velocity, m/s, there, as the record shows them. Shape (j, 2)."""
+    name: str = part("the file, as messages name it")
+    t: FloatArray = part("times of the samples, s, ascending, 0 at the firing, shape (n,)")
+    x: FloatArray = part("displacements, m, shape (n,)")
+    current: FloatArray | None = part("current, A, shape (n,), or None")
+    lines: IntArray = part("line of the file of each sample, shape (n,)")
+    bandwidth: float | None = scalar("Hz", "of the sensor", more="None for one without delay")
+    noise: float = part("of the displacement, m, from the differences of the samples")
+    touches: list[Touch] = part("contacts in order; the first is the rest at the backstop, if there is one")
+    joints: IntArray = part("rows at which the record is cut, shape (j,)")
+    states: FloatArray = part(
+        "displacement, m, and velocity, m/s, there, as the record shows them. Shape (j, 2)"
+    )
 
     def touching(self, surface: Surface) -> list[Touch]:
         """Return the contacts with one surface, but for the rest at the beginning."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.identify.result import Fit, FittedConstant, Profile, student
 from printhammer.identify.static.checks import inseparable
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,24 +25,17 @@ _WEAK: Final = 0.1
 _GRID: Final = 25
 
 
-@dataclass(frozen=True, eq=False)
-class Data:
+class Data(Declared, eq=False):
     """The data of a fit and where they were measured."""
 
-    files: tuple[Path, ...]
-    kind: str
-    """One of "magnet", "spring", "pack" and "backstop"."""
-    abscissa: FloatArray
-    values: FloatArray
-    """SI, shape (m,)."""
-    axes: tuple[tuple[str, str], tuple[str, str]]
-    """Names and SI units."""
-    series: IntArray
-    """Place in `series_names`, shape (m,)."""
-    series_names: tuple[str, ...]
-    """For the legend."""
-    lines: IntArray
-    """Lines of the files, shape (m,)."""
+    files: tuple[Path, ...] = part("where they come from")
+    kind: str = part('one of "magnet", "spring", "pack" and "backstop"')
+    abscissa: FloatArray = part("SI, shape (m,)")
+    values: FloatArray = part("SI, shape (m,)")
+    axes: tuple[tuple[str, str], tuple[str, str]] = part("names and SI units")
+    series: IntArray = part("place in `series_names`, shape (m,)")
+    series_names: tuple[str, ...] = part("for the legend")
+    lines: IntArray = part("lines of the files, shape (m,)")
 
 
 def assemble(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import solve
+from printhammer.identify.least_squares import Solution, solve
 from printhammer.identify.result import Fit, FittedConstant
 from printhammer.identify.static.assemble import Data, assemble, enough
 from printhammer.identify.static.checks import judge
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from printhammer.identify.least_squares import Solution
     from printhammer.support.arrays import FloatArray
 
 RATIO: Final = "backstop.damping / backstop.stiffness"

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.identify.least_squares import sandwich
+from printhammer.identify.least_squares import Solution, sandwich
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from printhammer.identify.least_squares import Solution
     from printhammer.support.arrays import FloatArray, IntArray
 
 LEVEL: Final = 0.01

@@ -19,13 +19,12 @@ from printhammer.identify.static.assemble import Data, assemble, enough
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.magnet_law import TotalLaw, start_of
 from printhammer.identify.static.spring import start_of as spring_start
-from printhammer.identify.tables import read_table
+from printhammer.identify.tables import Readings, read_table
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from printhammer.identify.result import Fit
-    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray, IntArray
 
 _SPARE: Final = 4

@@ -16,18 +16,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import solve
+from printhammer.identify.least_squares import Solution, solve
 from printhammer.identify.static.assemble import Data, assemble, enough
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.pack_cycles import Cycles, check_loading, cycles_of
-from printhammer.identify.tables import read_table
+from printhammer.identify.tables import Readings, read_table
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from printhammer.identify.least_squares import Solution
     from printhammer.identify.result import Fit
-    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 LOADING, UNLOADING = 2.7, 11.0

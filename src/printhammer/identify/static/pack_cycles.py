@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.residuals import robust_scale
+from printhammer.results import Declared, part
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
@@ -22,16 +22,12 @@ _FALL: Final = 0.05
 """Part of the largest force by which loading may fall before it counts as falling."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cycles:
+class Cycles(Declared, eq=False):
     """Branch and load cycle of each row."""
 
-    unloading: BoolArray
-    """Whether a row is on the unloading branch, shape (m,)."""
-    cycle: IntArray
-    """Number of the load cycle, from 0, shape (m,)."""
-    unloaded: IntArray
-    """Cycles with rows of unloading inside the pack, ascending."""
+    unloading: BoolArray = part("whether a row is on the unloading branch, shape (m,)")
+    cycle: IntArray = part("number of the load cycle, from 0, shape (m,)")
+    unloaded: IntArray = part("cycles with rows of unloading inside the pack, ascending")
 
 
 def cycles_of(table: Readings) -> Cycles:
@@ -92,11 +88,15 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
                 f" {from_si(float(depth[rows[-1]]), 'm', 'um'):.4g} um, expected one that grows"
             )
         order = rows[np.argsort(depth[rows], kind="stable")]
-        smooth = _smooth(force[order])
+        # Running medians, of as many values as there are enough for, pass single outliers over.
+        width = 5 if len(order) >= 9 else 3 if len(order) >= 5 else 1
+        padded = np.pad(force[order], width // 2, mode="edge")
+        smooth = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
+        noise = robust_scale(np.diff(force[order], 2)) / float(np.sqrt(6.0)) if len(order) >= 9 else 0.0
         peaks = np.maximum.accumulate(smooth)
         k = int(np.argmax(peaks - smooth))
         fall = float(peaks[k] - smooth[k])
-        if fall > max(_FALL * np.abs(force).max(), 4.0 * _noise(force[order])):
+        if fall > max(_FALL * np.abs(force).max(), 4.0 * noise):
             high, low = (
                 f"{force[row]:.4g} N at {at:.4g} um (line {table.lines[row]})"
                 for row in (order[int(np.argmax(smooth[: k + 1]))], order[k])
@@ -106,17 +106,3 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
                 f"{table.path}: the force of the loading branch falls from {high} to {low}, expected one that"
                 " grows"
             )
-
-
-def _smooth(values: FloatArray) -> FloatArray:
-    """Return running medians, of as many values as there are enough for; they pass single outliers over."""
-    width = 5 if len(values) >= 9 else 3 if len(values) >= 5 else 1
-    padded = np.pad(values, width // 2, mode="edge")
-    return np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
-
-
-def _noise(values: FloatArray) -> float:
-    """Return the standard deviation of noise, from second differences; 0 for few values."""
-    if len(values) < 9:
-        return 0.0
-    return robust_scale(np.diff(values, 2)) / float(np.sqrt(6.0))

@@ -100,7 +100,13 @@ def map_frame(
 
     # While one piece is integrated, another is made ready.
     in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE])
-    low, high = _limits(hammer.position, hammer.platen, x)
+    # Colours lie between backstop and platen, or what there is.
+    known = x[np.isfinite(x)]
+    low, high = hammer.position or 0.0, hammer.platen or 0.0
+    if known.size:
+        low = float(known.min()) if hammer.position is None else low
+        high = float(known.max()) if hammer.platen is None else high
+    high = max(high, float(np.nextafter(np.float32(low), np.float32(np.inf))))
     arrays = {"codes": codes_of(x, low, high)}
     heading = {
         "rates": [state.low, state.high],
@@ -128,14 +134,6 @@ def _trains(waveform: Waveform, rates: tuple[float, ...], slots: str, overlap: O
         return [PulseTrain(waveform, rate=rate, pulses=len(slots), overlap=overlap) for rate in rates]
     fired = np.flatnonzero([mark == "1" for mark in slots])
     return [PulseTrain(waveform, at=(fired / rate).tolist(), overlap=overlap) for rate in rates]
-
-
-def _limits(low: float | None, high: float | None, x: Any) -> tuple[float, float]:
-    """Return the displacements between which colours lie: backstop and platen, or what there is."""
-    known = x[np.isfinite(x)]
-    first = float(known.min()) if low is None and known.size else (low or 0.0)
-    last = float(known.max()) if high is None and known.size else (high or 0.0)
-    return first, max(last, float(np.nextafter(np.float32(first), np.float32(np.inf))))
 
 
 def codes_of(x: Any, low: float, high: float) -> Any:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.drive.waveforms.shapes import SHAPES
+from printhammer.drive.waveforms.shapes import SHAPES, Waveform
 from printhammer.hammer.names import range_of
 from printhammer.studio import bounds
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
 
 SHOWN: Final = {

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, located
 from printhammer.studio.bounds import MOST_SAMPLES
 from printhammer.studio.frames import frame
 from printhammer.studio.states.state import dropped_hammer
@@ -59,10 +59,8 @@ def read_curve(text: str, where: str) -> tuple[str, np.ndarray, np.ndarray]:
     if len(numbers) < 2 or (np.diff(numbers[:, 0]) <= 0.0).any():
         raise InputError(f"{where}: expected at least 2 samples at increasing times")
     keep = np.unique(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_SAMPLES)).astype(int))
-    try:
+    with located(where):
         factors = to_si(1.0, units[0], "s"), to_si(1.0, units[1], _COLUMNS[names[1]])
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
     return names[1], numbers[keep, 0] * factors[0], numbers[keep, 1] * factors[1]
 
 

@@ -9,7 +9,6 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,6 +17,7 @@ from printhammer.drive.waveforms.shapes import SHAPES, Sampled, Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import range_of
+from printhammer.results import Declared, part, scalar
 from printhammer.studio import bounds
 from printhammer.studio.states.shelf import Shelf
 from printhammer.support.constants import quantities
@@ -33,35 +33,29 @@ class ProtocolError(Exception):
     """A message that the page would never send; it ends the connection, and its text is the reason."""
 
 
-@dataclass(frozen=True)
-class State:
+class State(Declared):
     """What the user has set; all numbers SI."""
 
-    hammer: str
-    """Name of a hammer that the studio offers; not looked at where `text` is given."""
-    text: str
-    """Text of a hammer file that was dropped, or empty."""
-    constants: tuple[tuple[str, float], ...]
-    """Constants that are changed, by dotted key, sorted."""
-    waveform: tuple[tuple[str, Any], ...] | None
-    """The pulse that is fired, ``shape`` and its constants; None for the hammer's own."""
-    rate: float
-    """Firing rate, Hz."""
-    pulses: int
-    """Number of firings."""
-    pattern: str
-    """Instead of all pulses: which of the slots are fired, such as "1101"."""
-    overlap: Overlap
-    """"add" or "replace"."""
-    low: float
-    high: float
-    """Rates of the map, Hz."""
-    line: str
-    """Text that is printed."""
-    views: tuple[str, ...]
-    """Views that are shown, see `VIEWS`."""
-    shelf: Shelf = field(default_factory=Shelf, compare=False, repr=False)
-    """Where hammers are looked up by name; no part of what the page sends."""
+    hammer: str = part("name of a hammer that the studio offers; not looked at where `text` is given")
+    text: str = part("text of a hammer file that was dropped, or empty")
+    constants: tuple[tuple[str, float], ...] = part("constants that are changed, by dotted key, sorted")
+    waveform: tuple[tuple[str, Any], ...] | None = part(
+        "the pulse that is fired, ``shape`` and its constants; None for the hammer's own"
+    )
+    rate: float = scalar("Hz", "firing rate")
+    pulses: int = part("number of firings")
+    pattern: str = part('instead of all pulses: which of the slots are fired, such as "1101"')
+    overlap: Overlap = part('"add" or "replace"')
+    low: float = scalar("Hz", "lowest rate of the map")
+    high: float = scalar("Hz", "highest rate of the map")
+    line: str = part("text that is printed")
+    views: tuple[str, ...] = part("views that are shown, see `VIEWS`")
+    shelf: Shelf = part(
+        "where hammers are looked up by name; no part of what the page sends",
+        default_factory=Shelf,
+        compare=False,
+        repr=False,
+    )
 
     @cached_property
     def base(self) -> Hammer:

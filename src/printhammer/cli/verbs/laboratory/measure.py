@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.bench.laboratory import Measurement
 
 ALL: Final = "all"
 _LISTS: Final = {"displacements": "m", "currents": "A", "peaks": "m", "speeds": "m/s"}
@@ -80,7 +79,10 @@ def measure(
         make_folder(out)
     for each, table in tables.items():
         table.write(paths[each])
-        job.screen.print(_described(table), soft_wrap=True)
+        rows = len(next(iter(table.values.values())))
+        wrong = f", {len(table.outliers)} of them wrong" if len(table.outliers) else ""
+        text = f"[bold]{table.kind}[/bold]  {escape(table.comments['measured'])}: {rows} rows{wrong}"
+        job.screen.print(text, soft_wrap=True)
         job.wrote(paths[each])
     return Answer()
 
@@ -163,9 +165,3 @@ def _possible(kinds: list[str], hammer: Hammer) -> list[str]:
             what = "waveform" if kind == "motion" else kind
             say(f"{hammer.path}: the hammer has no {what}, {kind} is left out")
     return [kind for kind, part in needed.items() if part is not None]
-
-
-def _described(table: Measurement) -> str:
-    rows = len(next(iter(table.values.values())))
-    wrong = f", {len(table.outliers)} of them wrong" if len(table.outliers) else ""
-    return f"[bold]{table.kind}[/bold]  {escape(table.comments['measured'])}: {rows} rows{wrong}"

@@ -9,12 +9,11 @@ import numpy as np
 from rich.markup import escape
 
 from printhammer.cli.screen import Column, coloured, facts, table
-from printhammer.cli.units import shown, unit, with_unit
+from printhammer.cli.units import Units, shown, unit, with_unit
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from printhammer.cli.units import Units
     from printhammer.printing.dots.limits import Limits
     from printhammer.printing.rates.damping import DampingStudy
     from printhammer.printing.rates.quality import Quality, Spread
