@@ -19,10 +19,10 @@ from printhammer.chaos.strobe.schemes_1983 import SCHEMES, scheme_strobes
 from printhammer.claims import Context, claims, judge
 from printhammer.claims.schemes_1983 import judge_as_in_1983
 from printhammer.claims.verdicts import changed, printed_verdicts
-from printhammer.run.scheme_runs import READINGS, Reading
 from printhammer.reconstruction.family.family import family_hammers
 from printhammer.reconstruction.judging.base_rates import draw
 from printhammer.reconstruction.search.space import hammer_of
+from printhammer.run.scheme_runs import READINGS, Reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
