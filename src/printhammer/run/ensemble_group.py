@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.kernel.lanes import layout as lane_layout
-from printhammer.kernel.lanes.batch import Batch, Kept
 from printhammer.kernel.model.layout import CUBIC_PIECE, END, EXPONENTIAL_PIECE, MAGNET, PLACES, SINE_PIECE
 from printhammer.kernel.single import carry
 from printhammer.run.problem import MAX_STEPS, Problem, scales_of
@@ -111,6 +110,9 @@ class Group:
         self.lane_kinds = forms[0][1]
         self.uniform = len(problems) == 1 and len(tables) == 1
         self.most_firings = max(len(times) for times in firings)
+        # Imported late, since it takes numba.
+        from printhammer.kernel.lanes.batch import Batch
+
         self.batch = Batch(
             hammer_of=hammer_of,
             hammers=constants,
@@ -189,6 +191,8 @@ class Job:
         self.order = np.arange(count)
         own = [moments[member] for member in group.members]
         strobe_times = np.concatenate(own)
+        from printhammer.kernel.lanes.batch import Kept
+
         self.kept = Kept(
             strobe_starts=starts_of(own),
             strobe_times=strobe_times,
