@@ -166,8 +166,8 @@ def buzz(hammer: "ph.Hammer") -> BuzzSearch:
     times = delayed_train(hammer, 12e-6, 4)
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, at=times), points=2)
     force = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=2).dots[0].peak_force
-    first, forces, clear = longest_run(motion, force)
-    train = BuzzTrain("delayed", 12e-6, times, first, len(forces), forces, clear, motion.drive.peak)
+    run, peak = longest_run(motion, force), motion.drive.peak
+    train = BuzzTrain(**vars(run), kind="delayed", interval=12e-6, times=times, peak_current=peak)
     return BuzzSearch(train, "", train, force, 1)
 
 

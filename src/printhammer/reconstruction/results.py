@@ -56,15 +56,8 @@ class _Predicted(_Counted):
     kind: Literal["stated", "typical", "shape"] = Field(description=f"one of {', '.join(KINDS)}")
 
 
-class _Panel(_Table):
-    measured: _Count = Field(description="the number of hammers")
-    as_printed: _Count = Field(description="the number of those with the verdict of the paper")
-
-    @model_validator(mode="after")
-    def _possible(self) -> _Panel:
-        if self.as_printed > self.measured:
-            raise ValueError("expected no more panels as printed than were measured")
-        return self
+class _Panel(_Counted):
+    holds: _Count = Field(alias="as_printed", description="the number of those with the verdict of the paper")
 
 
 class BaseRates(_Table):
@@ -86,11 +79,8 @@ class BaseRates(_Table):
     @property
     def panels(self) -> dict[str, Share]:
         """How often each panel of Fig. 11 is as printed."""
-        return {
-            name: Share(panel.measured, panel.as_printed)
-            for name, panel in self.poincare_panels.items()
-            if panel.measured
-        }
+        shares = {name: _share(panel) for name, panel in self.poincare_panels.items()}
+        return {name: share for name, share in shares.items() if share is not None}
 
 
 class Predictions(_Table):
@@ -301,8 +291,8 @@ def results_in(folder: str | Path) -> Results:
     return Results(path)
 
 
-def _share(found: _Counted | None) -> Share | None:
-    return Share(found.measured, found.holds) if found is not None and found.measured else None
+def _share(counted: _Counted | None) -> Share | None:
+    return Share(counted.measured, counted.holds) if counted is not None and counted.measured else None
 
 
 def _refuse(text: str) -> None:

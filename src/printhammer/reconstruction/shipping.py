@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.claims import claims, judge_all
+from printhammer.claims import JudgedClaim, claims, judge_all
 from printhammer.reconstruction.judging.shortlist import standing
 from printhammer.reconstruction.search.candidates import TOLERANCE
 from printhammer.reconstruction.search.space import BEYOND, CURRENT, PRINT_FORCE, hammer_of
@@ -13,7 +13,6 @@ from printhammer.units import from_si
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from printhammer.claims import JudgedClaim
     from printhammer.hammer.hammer import Hammer
 
 TITLE: Final = "The stored-energy print hammer of Hendriks (1983), reconstructed"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
-from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, DotTable, Ensemble, Strobes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
-    from printhammer.run.ensemble import DotTable, Strobes
     from printhammer.support.arrays import BoolArray
 
 

@@ -12,7 +12,6 @@ backstop once before the dots that count, and settles into the buzz afterwards.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
@@ -21,14 +20,14 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.settling import touches
-from printhammer.run.ensemble import Ensemble
+from printhammer.results import Declared, part
+from printhammer.run.ensemble import DotTable, Ensemble
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.ensemble import DotTable
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import BoolArray
 
@@ -55,31 +54,29 @@ PATIENCE: Final = 3.0
 _ZOOMS, _PER_ZOOM = 2, 4
 
 
-@dataclass(frozen=True)
-class BuzzTrain:
-    """One train that was tried."""
+class Run(Declared):
+    """The longest run of dots of a train that count, one for each firing.
 
-    kind: Literal["uniform", "delayed"]
-    """"uniform": pulses one period apart; "delayed": each a constant delay after leaving the pack."""
-    interval: float
-    """That period or delay, s."""
-    times: tuple[float, ...]
-    """Firing times, s."""
-    first: int
-    count: int
-    """Number of the firing that made the first dot of the longest run that counts, and number of its dots,
-    which may be 0: one for each firing, each with a peak force within limits, no touch of the backstop
-    between the first and the last."""
-    forces: tuple[float, ...]
-    """Peak forces of the dots of the run, in units of that of a single pulse."""
-    clear: bool
-    """Whether there is no lost dot and no touch of the backstop from the first dot of the train, which starts
-    from rest, to the last of the run: not only the dots that count, the whole burst stays clear."""
-    touches: tuple[int, int, int]
-    """Touches of the backstop before the first dot of the run, between its first and its last, and from there
-    to the end of the run of the train, which is still long enough for a dot after the last firing."""
-    peak_current: float
-    """Largest value of the drive, A (N under a drive that is a force)."""
+    Each has a peak force within limits, and there is no touch of the backstop between the first and the last.
+    """
+
+    first: int = part("number of the firing that made the first dot of the run")
+    forces: tuple[float, ...] = part("peak forces of its dots, in units of that of a single pulse")
+    clear: bool = part(
+        "whether there is no lost dot and no touch of the backstop from the first dot of the train, which"
+        " starts from rest, to the last of the run",
+        more="not only the dots that count, the whole burst stays clear",
+    )
+    touches: tuple[int, int, int] = part(
+        "touches of the backstop before the first dot of the run, between its first and its last, and from"
+        " there to the end of the run of the train",
+        more="which is still long enough for a dot after the last firing",
+    )
+
+    @property
+    def count(self) -> int:
+        """Number of its dots, which may be 0."""
+        return len(self.forces)
 
     @property
     def weakest(self) -> float:
@@ -96,20 +93,27 @@ class BuzzTrain:
         )
 
 
-@dataclass(frozen=True)
-class BuzzSearch:
+class BuzzTrain(Run):
+    """One train that was tried, and its longest run of dots that count."""
+
+    kind: Literal["uniform", "delayed"] = part(
+        '"uniform": pulses one period apart; "delayed": each a constant delay after leaving the pack'
+    )
+    interval: float = part("that period or delay, s")
+    times: tuple[float, ...] = part("firing times, s")
+    peak_current: float = part("largest value of the drive, A (N under a drive that is a force)")
+
+
+class BuzzSearch(Declared):
     """Result of a search for buzz printing."""
 
-    train: BuzzTrain | None
-    """The train found."""
-    reason: str
-    """Why there is none, in one sentence; empty if there is one."""
-    best: BuzzTrain | None
-    """The best attempt, which is `train` if there is one; None if no dot of any train counts."""
-    reference_force: float
-    """Peak force of the dot of a single pulse, N; 0 if it makes none."""
-    tried: int
-    """Number of trains tried."""
+    train: BuzzTrain | None = part("the train found")
+    reason: str = part("why there is none, in one sentence; empty if there is one")
+    best: BuzzTrain | None = part(
+        "the best attempt, which is `train` if there is one; None if no dot of any train counts"
+    )
+    reference_force: float = part("peak force of the dot of a single pulse, N; 0 if it makes none")
+    tried: int = part("number of trains tried")
 
 
 def find_buzz_train(
@@ -153,16 +157,6 @@ def find_buzz_train(
         The hammer has no waveform, pack, backstop or rest state, or `pulses` is less than `fewest`.
     """
     return _Search(hammer, pulses, fewest, forces, max_current).result()
-
-
-@dataclass(frozen=True)
-class Run:
-    """The longest run of dots of a motion that count; its fields are those of `BuzzTrain`."""
-
-    first: int
-    forces: tuple[float, ...]
-    clear: bool
-    touches: tuple[int, int, int]
 
 
 def longest_run(motion: Motion, reference_force: float, forces: tuple[float, float] = FORCES) -> Run:
@@ -379,11 +373,8 @@ class _Search:
             motion = _run(self.hammer, times, self.patience)
             run = longest_run(motion, self.reference, self.forces)
             if run.forces and (peak := motion.drive.peak) <= self.limit:
-                count = len(run.forces)
                 judged.append(
-                    BuzzTrain(
-                        kind, interval, times, run.first, count, run.forces, run.clear, run.touches, peak
-                    )
+                    BuzzTrain(**vars(run), kind=kind, interval=interval, times=times, peak_current=peak)
                 )
         self.best = max(judged + ([self.best] if self.best else []), key=self._merit, default=None)
         return judged

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from printhammer.results import Declared, column
-from printhammer.run.ensemble import Ensemble
+from printhammer.run.ensemble import DotTable, Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.ensemble import DotTable
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 20

@@ -16,7 +16,7 @@ import numpy as np
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
-from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
+from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of, single_pulses
 from printhammer.printing.dots.settling import settle
 from printhammer.printing.rates.materials import Material, materials
 from printhammer.printing.rates.perturbation import changed
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import FloatArray, TextArray
     from printhammer.support.threads import Progress
 

@@ -21,8 +21,8 @@ from printhammer.printing.dots.judging import FAULTS
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.slots import LEAD_IN, SLOTS, cycle_with_lead_in, eight_slot_patterns, slots_of
-from printhammer.printing.dots.strategy import name_of, open_loop
-from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
+from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.run.problem import TOLERANCE
 
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import SinglePulse
-    from printhammer.printing.dots.strategy import Strategy
-    from printhammer.printing.dots.trial import Trial
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
 

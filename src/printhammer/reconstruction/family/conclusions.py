@@ -7,7 +7,7 @@ same; which of them can be trusted is seen where they are compared over a family
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.chaos.strobe.scan import scan
@@ -19,6 +19,8 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.dots.settling import SETTLED, rebounds
 from printhammer.printing.rates.safe_rate import safe_rate
+from printhammer.results import Declared, scalar
+from printhammer.results.declare import columns_of
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
@@ -36,83 +38,63 @@ band."""
 _TOGETHER: Final = 40
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """What a conclusion is."""
+class Conclusions(Declared):
+    """The conclusions about one hammer; their units end their names. None: it has none."""
 
-    title: str
-    """A few words."""
-    unit: str
-    """SI unit; "1" for a pure number."""
-    meaning: str
-    """One sentence."""
-
-
-QUANTITIES: Final[dict[str, Quantity]] = {
-    "safe_rate_Hz": Quantity(
-        "safe rate",
+    safe_rate_Hz: float | None = scalar(
         "Hz",
-        "Largest rate up to which every pattern of eight slots prints with the force of the single pulse"
-        " within a tenth and its flight time within 50 us, on a grid of 5 Hz.",
-    ),
-    "chaos_onset_s": Quantity(
-        "chaos onset", "s", "Longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms."
-    ),
-    "flight_time_spread_s": Quantity(
-        "flight-time spread",
+        "largest rate up to which every pattern of eight slots prints with the force of the single pulse"
+        " within a tenth and its flight time within 50 us, on a grid of 5 Hz",
+        name="safe rate",
+    )
+    chaos_onset_s: float | None = scalar(
         "s",
-        "Largest difference of flight times within a burst of nine pulses, over rates from 500 to 1250 Hz"
-        " on a grid of 5 Hz; lost dots have none.",
-    ),
-    "engraved_limit_Hz": Quantity(
-        "spread exceeds 30 us from",
-        "Hz",
-        "Lowest of these rates at which that difference exceeds 30 us, what engraved characters tolerate.",
-    ),
-    "dot_matrix_limit_Hz": Quantity(
-        "spread exceeds 200 us from",
-        "Hz",
-        "Lowest of these rates at which that difference exceeds 200 us, what dot-matrix printing tolerates.",
-    ),
-    "energy_per_dot_J": Quantity(
-        "energy per dot", "J", "Work of the coil on the armature in the cycle of a single pulse."
-    ),
-    "pack_loss_J": Quantity("pack loss", "J", "What the pack keeps of it."),
-    "backstop_loss_J": Quantity("backstop loss", "J", "What the backstop takes of it."),
-    "settle_out_s": Quantity(
-        "settle-out",
+        "longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms",
+        name="chaos onset",
+    )
+    flight_time_spread_s: float = scalar(
         "s",
-        "Time from the firing of a single pulse to the end of the last rebound higher than a hundredth of the"
-        " stroke.",
-    ),
-    "print_force_N": Quantity(
-        "print force",
+        "largest difference of flight times within a burst of nine pulses, over rates from 500 to 1250 Hz on"
+        " a grid of 5 Hz",
+        more="lost dots have none",
+        name="flight-time spread",
+    )
+    engraved_limit_Hz: float | None = scalar(
+        "Hz",
+        "lowest of these rates at which that difference exceeds 30 us, what engraved characters tolerate",
+        name="spread exceeds 30 us from",
+    )
+    dot_matrix_limit_Hz: float | None = scalar(
+        "Hz",
+        "lowest of these rates at which that difference exceeds 200 us, what dot-matrix printing tolerates",
+        name="spread exceeds 200 us from",
+    )
+    energy_per_dot_J: float = scalar(
+        "J", "work of the coil on the armature in the cycle of a single pulse", name="energy per dot"
+    )
+    pack_loss_J: float = scalar("J", "what the pack keeps of it", name="pack loss")
+    backstop_loss_J: float = scalar("J", "what the backstop takes of it", name="backstop loss")
+    settle_out_s: float = scalar(
+        "s",
+        "time from the firing of a single pulse to the end of the last rebound higher than a hundredth of the"
+        " stroke",
+        name="settle-out",
+    )
+    print_force_N: float = scalar(
         "N",
-        "Peak force of the single-pulse dot. Mass and all forces scale together without a change of the"
-        " motion; it sets that scale.",
-    ),
-}
-"""Every conclusion, by the name of its field in `Conclusions`; the unit is the end of the name."""
-
-
-@dataclass(frozen=True)
-class Conclusions:
-    """The conclusions about one hammer; what they are is said by `QUANTITIES`. None: it has none."""
-
-    safe_rate_Hz: float | None
-    chaos_onset_s: float | None
-    flight_time_spread_s: float
-    engraved_limit_Hz: float | None
-    dot_matrix_limit_Hz: float | None
-    energy_per_dot_J: float
-    pack_loss_J: float
-    backstop_loss_J: float
-    settle_out_s: float
-    print_force_N: float
+        "peak force of the single-pulse dot",
+        more="mass and all forces scale together without a change of the motion; it sets that scale",
+        name="print force",
+    )
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values by name, for JSON."""
         return asdict(self)
+
+
+QUANTITIES: Final = columns_of(Conclusions)
+"""Every conclusion, by the name of its field in `Conclusions`: its `unit`, its `meaning`, and as `name` a few
+words."""
 
 
 def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:

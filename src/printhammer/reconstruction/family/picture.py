@@ -8,13 +8,12 @@ from printhammer.errors import InputError
 from printhammer.reconstruction.family.choice import at_gauge
 from printhammer.reconstruction.family.family import family_table, print_forces
 from printhammer.reconstruction.family.robustness import robustness
-from printhammer.reconstruction.results import shipped_results
+from printhammer.reconstruction.results import Results, shipped_results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.reconstruction.results import Results
 
 
 def family_picture(hammer: Hammer, results: Results | None = None) -> Figure:

@@ -9,12 +9,12 @@ random sample: ranges are those of its members, and correlations hold among them
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims.definition import claims
 from printhammer.claims.shapes import rank_correlation
 from printhammer.reconstruction.family.conclusions import QUANTITIES
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -31,18 +31,15 @@ _FEWEST: Final = 4
 _SCALING: Final = ("J", "N")
 
 
-@dataclass(frozen=True)
-class Statement:
+class Statement(Declared):
     """Something that the paper says in general, as a margin by which it is true of a hammer."""
 
-    text: str
-    """The statement."""
-    source: str
-    """Where the paper says it."""
-    unit: str
-    """SI unit of the margin."""
-    margin: Callable[[Values], float]
-    """Conclusions of a hammer to the margin; the statement is true where it is positive."""
+    text: str = part("the statement")
+    source: str = part("where the paper says it")
+    unit: str = part("SI unit of the margin")
+    margin: Callable[[Values], float] = part(
+        "conclusions of a hammer to the margin", more="the statement is true where it is positive"
+    )
 
 
 def _tolerated(name: str) -> float:
@@ -117,7 +114,7 @@ def robustness(
         values = [row[name] for row in conclusions]
         found[name] = {
             "kind": "quantity",
-            "title": quantity.title,
+            "title": quantity.name,
             "unit": quantity.unit,
             **_quantity(values, constants, quantity.unit in _SCALING),
         }

@@ -17,7 +17,7 @@ from printhammer.claims.context import CYCLE
 from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.drive.trains import PulseTrain
 from printhammer.reconstruction.judging.judged import FIGURE_11, SLOW, row_of
-from printhammer.reconstruction.search.candidates import candidates
+from printhammer.reconstruction.search.candidates import Candidate, candidates
 from printhammer.reconstruction.search.losses import run_all
 from printhammer.reconstruction.search.space import VARIABLES
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from concurrent.futures import Executor
 
-    from printhammer.reconstruction.search.candidates import Candidate
 
 STROKE: Final = "single_pulse_stroke"
 MASSES: Final = (0.05e-3, 2e-3)

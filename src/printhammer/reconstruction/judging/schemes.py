@@ -17,7 +17,7 @@ from printhammer.chaos import strobes
 from printhammer.chaos.strobe.schemes_1983 import SCHEMES, scheme_strobes
 from printhammer.claims.schemes_1983 import judge_as_in_1983
 from printhammer.claims.verdicts import changed, printed_verdicts
-from printhammer.kernel.schemes_1983 import READINGS
+from printhammer.kernel.schemes_1983 import READINGS, Reading, Scheme
 from printhammer.reconstruction.family.family import family_hammers
 from printhammer.reconstruction.judging.base_rates import draw
 from printhammer.reconstruction.search.space import hammer_of
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.schemes_1983 import Reading, Scheme
 
 CHANGE: Final = 1e-5
 """By which all constants are changed at once, up, to see how much a verdict hangs on their last digits."""

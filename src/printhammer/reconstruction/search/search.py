@@ -6,25 +6,23 @@ on where it was: what the log holds is not computed again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import load
-from printhammer.reconstruction.search.evaluation import AIMS, WEIGHTS, losses_digest, scored
+from printhammer.reconstruction.search.evaluation import AIMS, WEIGHTS, Aim, losses_digest, scored
 from printhammer.reconstruction.search.explorer import Explorer
 from printhammer.reconstruction.search.log import Log, read_search
-from printhammer.reconstruction.search.space import SHAPES, VARIABLES, point_of, values_of
+from printhammer.reconstruction.search.space import SHAPES, VARIABLES, Shape, point_of, values_of
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from concurrent.futures import Executor
     from pathlib import Path
 
-    from printhammer.reconstruction.search.evaluation import Aim
-    from printhammer.reconstruction.search.space import Shape
     from printhammer.support.arrays import FloatArray
 
 FORMAT: Final = 1
@@ -53,20 +51,16 @@ STARTS: Final = 64
 """Points taken over from another search."""
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(Declared):
     """What decides on a search."""
 
-    aim: Aim
-    """Which claims lead, one of `AIMS`."""
-    seed: int
-    """Of everything random."""
-    sample: int = SAMPLE
-    """Points of the wide sample."""
-    starts: tuple[tuple[float, ...], ...] = ()
-    """Further points from which islands may begin, such as the best of another search."""
-    shape: Shape = "rectangle"
-    """Waveform of the hammers."""
+    aim: Aim = part("which claims lead, one of `AIMS`")
+    seed: int = part("of everything random")
+    sample: int = part("points of the wide sample", default=SAMPLE)
+    starts: tuple[tuple[float, ...], ...] = part(
+        "further points from which islands may begin, such as the best of another search", default=()
+    )
+    shape: Shape = part("waveform of the hammers", default="rectangle")
 
     def heading(self) -> dict[str, Any]:
         """Return the first line of the log."""
@@ -138,6 +132,8 @@ def search(
     InputError
         The log is that of another search, or the package that searches is not installed.
     """
+    from scipy.stats import qmc
+
     _strategies()
     log = Log(path, plan.heading())
     place, best = 0, None
@@ -158,7 +154,10 @@ def search(
 
     rng = np.random.default_rng([plan.seed, AIMS.index(plan.aim), SHAPES.index(plan.shape)])
     start: list[dict[str, Any]] = []
-    points = [*(np.array(point) for point in plan.starts), *_wide(plan, rng)]
+    points = [
+        *(np.array(point) for point in plan.starts),
+        *qmc.Sobol(len(VARIABLES), seed=rng).random(plan.sample),
+    ]
     for first in range(0, len(points), _TOGETHER):
         for row in batch(points[first : first + _TOGETHER]):
             start.append(row)
@@ -180,13 +179,6 @@ def search(
                 start.append(island.best)
                 start.sort(key=lambda row: row["total"])
                 islands[number] = _Island(start, rng)
-
-
-def _wide(plan: Plan, rng: np.random.Generator) -> list[FloatArray]:
-    from scipy.stats import qmc
-
-    sampler = qmc.Sobol(len(VARIABLES), seed=rng)
-    return list(sampler.random(plan.sample))
 
 
 def _strategies() -> Any:
