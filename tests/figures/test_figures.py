@@ -178,12 +178,13 @@ def test_figure_7_shows_the_train(hammer: "ph.Hammer", buzz: BuzzSearch) -> None
     numbers = [text.get_text() for text in drawn.axes[0].texts]
     assert [f"{force:.2f}" for force in buzz.train.forces] == numbers[-len(buzz.train.forces) :]
     assert "12 µs after leaving the pack" in drawn.axes[0].get_title(loc="left")
-    assert drawn.get_suptitle() == ""
+    assert drawn.get_suptitle().replace("\n", " ") == f"{buzz.train.touches_text}."
 
 
 def test_figure_7_says_that_there_is_none(hammer: "ph.Hammer", buzz: BuzzSearch) -> None:
     none = BuzzSearch(None, "no train does", buzz.best, buzz.reference_force, 1)
-    assert FIGURES[7].draw(hammer, search=none).get_suptitle() == "No buzz printing: no train does."
+    remark = FIGURES[7].draw(hammer, search=none).get_suptitle().replace("\n", " ")
+    assert remark == f"No buzz printing: no train does. {buzz.best.touches_text}."
 
 
 def test_a_motion_that_stopped_says_so(hammer: "ph.Hammer") -> None:

@@ -195,16 +195,9 @@ def longest_run(motion: Motion, reference_force: float, forces: tuple[float, flo
 
 
 def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[float, ...]:
-    """Return firing times, s, of which each but the first follows the leaving of the pack by a delay.
+    """Return firing times, s, of which each but the first follows the leaving of the pack by a delay, s.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    delay : float
-        From the leaving of the pack contact that a firing made to the next firing, s.
-    pulses : int, optional
-        Number of firings; there are fewer where a firing makes no dot, so that no leaving follows it.
+    There are fewer firings than `pulses` where one of them makes no dot, so that no leaving follows it.
 
     Raises
     ------
@@ -225,24 +218,13 @@ def delayed_trains(
     hopeless: Callable[[DotTable, list[int]], BoolArray] | None = None,
     **options: Any,
 ) -> list[tuple[float, ...]]:
-    """Return the trains of many hammers and delays, built side by side; see `delayed_train`.
+    """Return the trains of many hammers and delays, s, built side by side; see `delayed_train`.
 
-    Parameters
-    ----------
-    hammers : sequence of Hammer
-        Hammer of each train.
-    delays : sequence of float
-        Delay of each, s.
-    patience : sequence of float
-        How long after a firing the leaving of its dot is waited for, s.
-    pulses : int
-        Number of firings of a train that is not broken off.
-    states : sequence of tuple, optional
-        Displacement, m, and velocity, m/s, from which each starts; by default at rest.
-    hopeless : callable, optional
-        From the dots of trains that still grow, and their numbers, to which of them are broken off.
-    **options
-        `tolerance` of the runs and `threads`, as for `printhammer.Ensemble`.
+    `patience` is how long after a firing the leaving of its dot is waited for, s, and `pulses` the number of
+    firings of a train that is not broken off. The trains start from rest, or from `states`: displacement, m,
+    and velocity, m/s. `hopeless` is called with the dots of trains that still grow, and their numbers, and
+    returns which of them are broken off. Further `options` are the `tolerance` of the runs and `threads`, as
+    for `printhammer.Ensemble`.
     """
     threads = options.pop("threads", None)
     trains = [[0.0] for _ in delays]

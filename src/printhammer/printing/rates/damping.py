@@ -240,12 +240,8 @@ def tuned(
     """Return factors on the amplitudes of waveforms with which single pulses print with a force.
 
     The factor is looked for from `LEAST` to `MOST` on a grid, then on ever finer ones: where the force first
-    rises through that wanted, of several such places the one nearest to 1.
-
-    Returns
-    -------
-    array, shape (hammers,)
-        NaN where there is none; good to 1e-6.
+    rises through that wanted, of several such places the one nearest to 1. It is good to 1e-6; NaN where
+    there is none.
     """
     scales = np.tile(np.linspace(LEAST, MOST, _COARSE), (len(hammers), 1))
     factors = np.full(len(hammers), np.nan)

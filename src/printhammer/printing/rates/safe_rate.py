@@ -376,12 +376,8 @@ def safe_rates(
     """Return the safe rates of some hammers on a grid of ascending rates, Hz; arguments as for `all_pass`.
 
     Each hammer is judged by its own one of `singles`; `progress` is called with the number of hammers whose
-    rate is found, and of all.
-
-    Returns
-    -------
-    array, shape (hammers,)
-        NaN where not even the first rate of the grid passes; its last one where all pass.
+    rate is found, and of all. The rate is NaN where not even the first one of the grid passes, and the last
+    one where all pass.
     """
     rates = np.full(len(hammers), np.nan)
     alive = np.arange(len(hammers))

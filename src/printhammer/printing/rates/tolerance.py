@@ -266,12 +266,9 @@ def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, 
 
 
 def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
-    """Draw factors on constants, evenly within their spreads to either side.
+    """Draw factors on constants, (number, constants), evenly within their spreads to either side.
 
-    Returns
-    -------
-    array, shape (number, constants)
-        From a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
+    They come from a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
 
     Raises
     ------

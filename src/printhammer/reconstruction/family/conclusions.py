@@ -35,7 +35,7 @@ RATES: Final = (500, 1250, 5)
 """First and last rate and step of the grid of bursts, Hz: from where dots are independent into the erratic
 band."""
 
-_TOGETHER: Final = 40
+_AT_ONCE: Final = 40
 
 
 class Conclusions(Declared):
@@ -134,7 +134,7 @@ def rate_from_rest(context: Context) -> float | None:
     force, flight = context.print_force, context.dot.flight_time
     assert flight is not None
     first, last, step = GRID
-    found = safe_rate(
+    rate = safe_rate(
         context.hammer,
         nominal=SinglePulse(force, flight),
         first=first,
@@ -142,8 +142,8 @@ def rate_from_rest(context: Context) -> float | None:
         step=step,
         cycle=False,
         tolerance=context.tolerance,
-    )
-    return None if math.isnan(found.rate) else found.rate
+    ).rate
+    return None if math.isnan(rate) else rate
 
 
 def settle_out(context: Context) -> float:
@@ -169,8 +169,8 @@ def chaos_onset(context: Context) -> float | None:
     periods: list[float] = [
         round(first - ONSET_STEP * k, 12) for k in range(round((first - last) / ONSET_STEP) + 1)
     ]
-    for start in range(0, len(periods), _TOGETHER):
-        some = periods[start : start + _TOGETHER]
+    for start in range(0, len(periods), _AT_ONCE):
+        some = periods[start : start + _AT_ONCE]
         for period, verdict in zip(
             some, scan(context.hammer, some, tolerance=context.tolerance), strict=True
         ):
@@ -182,13 +182,9 @@ def chaos_onset(context: Context) -> float | None:
 def flight_times(context: Context) -> tuple[float, dict[str, float | None]]:
     """Return the largest flight-time spread of bursts, s, and the rates, Hz, at which it exceeds limits.
 
-    Returns
-    -------
-    largest : float
-        Largest peak-to-peak flight time of the struck dots of a burst, s.
-    limits : dict
-        By "engraved_s" and "dot_matrix_s" the lowest rate at which it exceeds that limit of the claim
-        `flight_time_spread`; None where it never does.
+    The spread is that of the struck dots of a burst, peak to peak. For "engraved_s" and "dot_matrix_s" the
+    rate is the lowest at which it exceeds that limit of the claim `flight_time_spread`; None where it never
+    does.
 
     Raises
     ------
@@ -205,7 +201,7 @@ def flight_times(context: Context) -> tuple[float, dict[str, float | None]]:
         for times, struck in zip(dots.flight_time, dots.struck, strict=True)
     ]
     limits = {
-        name: next((rate for rate, found in zip(rates, spreads, strict=True) if found > settings[name]), None)
+        name: next((rate for rate, wide in zip(rates, spreads, strict=True) if wide > settings[name]), None)
         for name in ("engraved_s", "dot_matrix_s")
     }
     return float(max(spreads)), limits
