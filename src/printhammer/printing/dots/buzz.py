@@ -31,22 +31,18 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import BoolArray
 
-MAX_CURRENT: Final = 2.0
-"""Largest coil current of a train, A: the range of the paper's Fig. 2."""
+MAX_CURRENT: Final = 2.0  # Largest coil current of a train, A: the range of the paper's Fig. 2
 
-FORCES: Final = (0.3, 0.95)
-"""Peak force of a dot that counts, in units of that of a single pulse."""
+FORCES: Final = (0.3, 0.95)  # Peak force of a dot that counts, in units of that of a single pulse
 
-FEWEST: Final = 6
-"""Number of dots without a touch of the backstop that makes buzz printing."""
+FEWEST: Final = 6  # Number of dots without a touch of the backstop that makes buzz printing
 
 _PULSES: Final = 9
 _PERIODS: Final = 96
 _DELAY_STEP: Final = 2e-6
 """Step of the delays tried, s."""
 
-_DELAYS: Final = 400
-"""Most delays tried at that step; a slower hammer is tried at as many, farther apart."""
+_DELAYS: Final = 400  # Most delays tried at that step; a slower hammer is tried at as many, farther apart
 
 PATIENCE: Final = 3.0
 """How long a dot is waited for after its firing, in times of the single pulse from firing to leaving."""

@@ -16,11 +16,9 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-SLOTS: Final = 8
-"""Number of slots of a pattern from rest, and order of the cycle."""
+SLOTS: Final = 8  # Number of slots of a pattern from rest, and order of the cycle
 
-LEAD_IN: Final = 64
-"""Slots of the cycle that are run before the first one that is judged."""
+LEAD_IN: Final = 64  # Slots of the cycle that are run before the first one that is judged
 
 FIRST_SLOT: Final = 1e-3
 """Time of slot 0 in a run, s: a drive may fire ahead of a slot, and no drive fires before time 0."""

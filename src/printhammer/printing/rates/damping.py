@@ -32,11 +32,9 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray, TextArray
     from printhammer.support.threads import Progress
 
-CURRENT: Final = 2.0
-"""Largest current by default, A."""
+CURRENT: Final = 2.0  # Largest current by default, A
 
-STEP: Final = 25.0
-"""Step of the grid of rates by default, Hz."""
+STEP: Final = 25.0  # Step of the grid of rates by default, Hz
 
 LEAST: Final = 0.6
 MOST: Final = 1.6

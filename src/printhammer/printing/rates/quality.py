@@ -33,13 +33,11 @@ if TYPE_CHECKING:
     from printhammer.run.ledger import Ledger
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-PITCH: Final = 25.4e-3 / 60.0
-"""Distance of neighbouring slots on the paper by default, m: sixty to the inch."""
+PITCH: Final = 25.4e-3 / 60.0  # Distance of neighbouring slots on the paper by default, m: sixty to the inch
 
 _SPREADS: Final = {"flight_time": "s", "force": "N", "indentation": "m", "arrival": "s", "placement": "m"}
 
-MOST_SLOTS: Final = 20_000
-"""Number of slots above which a pattern is refused."""
+MOST_SLOTS: Final = 20_000  # Number of slots above which a pattern is refused
 
 
 class Spread(Declared):

@@ -36,17 +36,13 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
 
-FIRST: Final = 100.0
-"""First rate of the grid, Hz."""
+FIRST: Final = 100.0  # First rate of the grid, Hz
 
-LAST: Final = 4000.0
-"""Last rate of the grid, Hz."""
+LAST: Final = 4000.0  # Last rate of the grid, Hz
 
-STEP: Final = 5.0
-"""Step of the grid, Hz."""
+STEP: Final = 5.0  # Step of the grid, Hz
 
-MOST_RATES: Final = 10_000
-"""Number of rates above which a grid is refused."""
+MOST_RATES: Final = 10_000  # Number of rates above which a grid is refused
 
 _AT_ONCE: Final = 16  # Number of rates of one ensemble
 _HAMMERS_AT_ONCE: Final = 32

@@ -25,14 +25,11 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import BoolArray, FloatArray, TextArray
     from printhammer.support.threads import Progress
 
-SPREAD: Final = 0.01
-"""Relative spread of a constant, to either side, by default."""
+SPREAD: Final = 0.01  # Relative spread of a constant, to either side, by default
 
-STEP: Final = 25.0
-"""Step of the grid of rates by default, Hz: coarser than that of one safe rate."""
+STEP: Final = 25.0  # Step of the grid of rates by default, Hz: coarser than that of one safe rate
 
-MOST: Final = 100_000
-"""Number of hammers above which a yield is refused."""
+MOST: Final = 100_000  # Number of hammers above which a yield is refused
 
 Judged = Literal["own", "design"]
 GAP: Final = "pack.front"

@@ -19,11 +19,9 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import FloatArray
 
-APART: Final = 0.1
-"""Distance from which on two values of a constant count as different."""
+APART: Final = 0.1  # Distance from which on two values of a constant count as different
 
-CONSTANTS_APART: Final = 3
-"""Number of constants in which two hammers are that far apart at least."""
+CONSTANTS_APART: Final = 3  # Number of constants in which two hammers are that far apart at least
 
 FORCE_POWERS: Final[dict[str, float]] = {
     "kg": 1.0,

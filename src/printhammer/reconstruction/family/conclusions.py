@@ -25,11 +25,9 @@ from printhammer.results.declare import columns_of
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
-ONSET_STEP: Final = 5e-6
-"""Step of the strobe times at which chaos is looked for, s."""
+ONSET_STEP: Final = 5e-6  # Step of the strobe times at which chaos is looked for, s
 
-GRID: Final = (100, 3000, 5)
-"""First and last rate and step of the grid of the safe rate, Hz."""
+GRID: Final = (100, 3000, 5)  # First and last rate and step of the grid of the safe rate, Hz
 
 RATES: Final = (500, 1250, 5)
 """First and last rate and step of the grid of bursts, Hz: from where dots are independent into the erratic

@@ -45,11 +45,9 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-LEAST: Final = 20
-"""Number of hammers that make a family at least."""
+LEAST: Final = 20  # Number of hammers that make a family at least
 
-COUNT: Final = 24
-"""Number of hammers of the family unless told otherwise."""
+COUNT: Final = 24  # Number of hammers of the family unless told otherwise
 
 FORMAT: Final = 1
 

@@ -22,11 +22,9 @@ if TYPE_CHECKING:
 
 Values = dict[str, Any]
 
-ROBUST: Final = 0.1
-"""Spread over median below which a conclusion is robust."""
+ROBUST: Final = 0.1  # Spread over median below which a conclusion is robust
 
-SIGNIFICANT: Final = 0.05
-"""Probability with which any constant would seem to decide a conclusion by chance."""
+SIGNIFICANT: Final = 0.05  # Probability with which any constant would seem to decide a conclusion by chance
 
 _FEWEST: Final = 4
 _SCALING: Final = ("J", "N")

@@ -8,8 +8,7 @@ from typing import Any, Final
 
 from printhammer.results import Declared, part
 
-CONFIDENCE: Final = 0.95
-"""Of the interval of a share."""
+CONFIDENCE: Final = 0.95  # Of the interval of a share
 
 _Z: Final = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)
 

@@ -17,11 +17,9 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
-APART: Final = 0.01
-"""Least distance of two candidates of a shortlist in one variable, in shares of its range."""
+APART: Final = 0.01  # Least distance of two candidates of a shortlist in one variable, in shares of its range
 
-DIGITS: Final = 6
-"""Digits of the constants that are judged and shipped."""
+DIGITS: Final = 6  # Digits of the constants that are judged and shipped
 
 _TOGETHER: Final = 8
 

@@ -24,8 +24,7 @@ CHEAP: Final = (
 )
 """Claims that make the region, as far as they lead the search."""
 
-MOST: Final = 3000
-"""Points of the region that are remembered."""
+MOST: Final = 3000  # Points of the region that are remembered
 
 _FEW: Final = 24
 _NEARLY: Final = 0.3

@@ -37,11 +37,9 @@ POPULATION: Final = 16
 SIGMA: Final = 0.08
 """Largest first step length of an island, in shares of the ranges."""
 
-PATIENCE: Final = 30
-"""Generations without gain after which an island begins anew."""
+PATIENCE: Final = 30  # Generations without gain after which an island begins anew
 
-_SEEDS: Final = 200
-"""Best points known from which islands begin."""
+_SEEDS: Final = 200  # Best points known from which islands begin
 
 _FAVOUR: Final = 2.0
 _TOGETHER: Final = 128
