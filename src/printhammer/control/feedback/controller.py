@@ -75,18 +75,10 @@ class Ahead(NamedTuple):
 
 
 class Controller:
-    """A controller made for one hammer.
+    """A controller made for one hammer, the nominal one, and the driver of its coil.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The nominal hammer, with a pack and a backstop.
-    driver : Driver
-        Of its coil.
-    limits : Limits, optional
-        How far a dot may be off.
-    threads : int, optional
-        By default as many as there are cores.
+    The hammer has a pack and a backstop. `limits` say how far a dot may be off; `threads` are by default as
+    many as there are cores.
 
     Raises
     ------

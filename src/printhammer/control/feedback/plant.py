@@ -51,10 +51,7 @@ class Plant:
     ) -> tuple[BoolArray, DotTable, Strobes]:
         """Run drives from rest, or from states (drives, 2), m and m/s, up to an end, s.
 
-        Returns
-        -------
-        tuple
-            Whether each run came to its end, what its firings did, and states at the instants asked for.
+        Returns whether each run came to its end, what its firings did, and states at the instants asked for.
         """
         begun = None if states is None else np.array(states)
         result = Ensemble(self.hammer, list(drives), end, states=begun, tolerance=DISPLAY_TOLERANCE).run(

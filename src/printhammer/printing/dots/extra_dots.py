@@ -7,6 +7,7 @@ second ones, and so on.
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -124,10 +125,9 @@ def _joined(parts: Sequence[ExtraDots]) -> ExtraDots:
     """Return contacts found round by round, in the order of members, firings and times."""
     none = np.zeros(0, np.int64)
     rounds = [ExtraDots(none, none, np.zeros(0), np.zeros(0)), *parts]
-    member = np.concatenate([part.member for part in rounds])
-    firing = np.concatenate([part.firing for part in rounds])
-    touch = np.concatenate([part.touch for part in rounds])
-    force = np.concatenate([part.peak_force for part in rounds])
+    member, firing, touch, force = (
+        np.concatenate([getattr(part, entry.name) for part in rounds]) for entry in fields(ExtraDots)
+    )
     order = np.lexsort((touch, firing, member))
     return ExtraDots(member[order], firing[order], touch[order], force[order])
 
