@@ -128,22 +128,22 @@ def write_family(
     tell = progress or (lambda _: None)
     paths = list(logs)
     logged = read_logs(paths)
-    found = promising(logged)
-    tell(f"{len(logged)} hammers in the logs, {len(found)} of them promising")
-    hammers = [hammer_of(row.constants) for row in found]
+    candidates = promising(logged)
+    tell(f"{len(logged)} hammers in the logs, {len(candidates)} of them promising")
+    hammers = [hammer_of(row.constants) for row in candidates]
     forces = print_forces(hammers)
     printing = np.flatnonzero(np.isfinite(forces)).tolist()
-    found, hammers = [found[i] for i in printing], [hammers[i] for i in printing]
-    if not found:
+    candidates, hammers = [candidates[i] for i in printing], [hammers[i] for i in printing]
+    if not candidates:
         raise InputError(_too_few(paths, 0, least))
-    tables = compared([row.constants for row in found], forces[printing].tolist())
+    tables = compared([row.constants for row in candidates], forces[printing].tolist())
     place = make_folder(folder)
     shelf = Shelf(place / "family.part.jsonl")
     members: dict[int, FamilyMember] = {}
 
     def accept(number: int) -> bool:
-        member = _judged(found[number], hammers[number], shelf)
-        tell(f"{found[number].source}: {_described(member)}")
+        member = _judged(candidates[number], hammers[number], shelf)
+        tell(f"{candidates[number].source}: {_described(member)}")
         if member is not None:
             members[number] = member
         return member is not None
@@ -159,7 +159,7 @@ def write_family(
         for place, number in enumerate(chosen, 1)
     ]
     rows = [
-        dict(zip(_keys([row.constants for row in found]), tables[1][number], strict=True))
+        dict(zip(_keys([row.constants for row in candidates]), tables[1][number], strict=True))
         for number in chosen
     ]
     write_file(place / "family.csv", csv_text(family))
@@ -178,17 +178,17 @@ def promising(logged: Sequence[Logged], most: int = _MOST) -> list[Logged]:
 
     From `most` on, nearly equal hammers count once.
     """
-    found = sorted(
+    rows = sorted(
         (row for row in logged if row.promising),
         key=lambda row: (-(row.panels or 0), -sum(row.verdicts.values())),
     )
     cell = _CELL
-    while len(found) > most:
+    while len(rows) > most:
         cells: dict[tuple[tuple[str, float, int], ...], Logged] = {}
-        for row in found:
+        for row in rows:
             cells.setdefault(_cell(row.constants, cell), row)
-        found, cell = list(cells.values()), 1.5 * cell
-    return found
+        rows, cell = list(cells.values()), 1.5 * cell
+    return rows
 
 
 def _cell(constants: Mapping[str, float], width: float) -> tuple[tuple[str, float, int], ...]:
@@ -228,8 +228,8 @@ def compared(constants: Sequence[Mapping[str, float]], forces: Sequence[float]) 
 
 def _keys(constants: Sequence[Mapping[str, float]]) -> list[str]:
     """Return the keys that any of some hammers gives, and the amplitude, in the order of the hammer file."""
-    given = {key for row in constants for key in row} | {"waveform.amplitude"}
-    return [key for key in template().constants if key in given]
+    named = {key for row in constants for key in row} | {"waveform.amplitude"}
+    return [key for key in template().constants if key in named]
 
 
 def _judged(row: Logged, hammer: Hammer, shelf: Shelf) -> FamilyMember | None:
@@ -258,22 +258,22 @@ def _judge(hammer: Hammer) -> dict[str, Any]:
     """Judge the stated claims, those that take longest last, and draw the conclusions if all is well."""
     context = Context(hammer)
     verdicts: dict[str, str] = {}
-    found: dict[str, Any] = {"member": False, "verdicts": verdicts, "panels": 0, "conclusions": {}}
+    judged: dict[str, Any] = {"member": False, "verdicts": verdicts, "panels": 0, "conclusions": {}}
     for name in STATED:
         verdicts[name] = judge(context, claims()[name]).verdict
         if verdicts[name] != "holds":
-            return found
+            return judged
     result = judge(context, claims()[FIGURE_11])
     verdicts[FIGURE_11] = result.verdict
-    found["panels"] = result.value["panels_as_printed"] if result.value is not None else 0
-    if found["panels"] < LEAST_PANELS:
-        return found
+    judged["panels"] = result.value["panels_as_printed"] if result.value is not None else 0
+    if judged["panels"] < LEAST_PANELS:
+        return judged
     try:
-        found["conclusions"] = conclude(hammer, context).as_dict()
+        judged["conclusions"] = conclude(hammer, context).as_dict()
     except NotMeasurableError:
-        return found
-    found["member"] = True
-    return found
+        return judged
+    judged["member"] = True
+    return judged
 
 
 def _described(member: FamilyMember | None) -> str:

@@ -42,12 +42,12 @@ def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
     InputError
         A file cannot be read, is no such log, or has no candidates.
     """
-    found: dict[Key, tuple[dict[str, Any], str]] = {}
+    hammers: dict[Key, tuple[dict[str, Any], str]] = {}
     for path in map(Path, paths):
         for number, row in enumerate(read_judged(path, some=True), 1):
             key = key_of(row["constants"])
-            before, source = found.get(key, (None, f"{path}, candidate {number}"))
-            found[key] = joined(before, row), source
+            before, source = hammers.get(key, (None, f"{path}, candidate {number}"))
+            hammers[key] = joined(before, row), source
     return [
         Logged(
             {key: float(value) for key, value in row["constants"].items()},
@@ -55,5 +55,5 @@ def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
             row.get("panels"),
             source,
         )
-        for row, source in found.values()
+        for row, source in hammers.values()
     ]

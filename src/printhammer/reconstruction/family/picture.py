@@ -54,6 +54,6 @@ def family_picture(hammer: Hammer, results: Results | None = None) -> Figure:
         for row in table.hammers
     ]
     conclusions = [row.conclusions for row in table.hammers]
-    told = robustness(conclusions, members)
-    shown = {name: entry for name, entry in told.items() if entry["kind"] == "quantity"}
+    held = robustness(conclusions, members)
+    shown = {name: entry for name, entry in held.items() if entry["kind"] == "quantity"}
     return family(hammer, [own, *members], conclusions, shown)

@@ -70,17 +70,17 @@ def _comparison(
     first: Way, second: Way, before: Sequence[list[str]], after: Sequence[list[str]]
 ) -> dict[str, Any]:
     """Return how many verdicts differ, from periodic to strange and back, and the share with its error."""
-    pairs = [list(zip(one, other, strict=True)) for one, other in zip(before, after, strict=True)]
+    pairs = [list(zip(*verdicts, strict=True)) for verdicts in zip(before, after, strict=True)]
     every = [pair for row in pairs for pair in row]
-    each = np.array([np.mean([one != other for one, other in row]) for row in pairs])
+    each = np.array([np.mean([name != other for name, other in row]) for row in pairs])
     error = 2.0 * float(each.std(ddof=1)) / math.sqrt(len(each)) if len(each) > 1 else math.nan
-    to_strange = sum(one.startswith("period") and other == "strange" for one, other in every)
-    to_period = sum(one == "strange" and other.startswith("period") for one, other in every)
+    to_strange = sum(name.startswith("period") and other == "strange" for name, other in every)
+    to_period = sum(name == "strange" and other.startswith("period") for name, other in every)
     return {
         "first": named(first),
         "second": named(second),
         "panels": len(every),
-        "differ": sum(one != other for one, other in every),
+        "differ": sum(name != other for name, other in every),
         "share": float(each.mean()),
         "share_error": None if math.isnan(error) else error,
         "periodic_to_strange": to_strange,

@@ -141,14 +141,14 @@ def search(
         there = log.known(place, points)
         fresh = scored(points[len(there) :], plan.aim, pool, plan.shape) if len(there) < len(points) else []
         log.append(fresh)
-        found = [*there, *fresh]
-        place += len(found)
-        for row in found:
+        rows = [*there, *fresh]
+        place += len(rows)
+        for row in rows:
             if best is None or row["total"] < best["total"]:
                 best = row
         if tell is not None and best is not None:
             tell(place, best["total"], best)
-        return found
+        return rows
 
     rng = np.random.default_rng([plan.seed, AIMS.index(plan.aim), SHAPES.index(plan.shape)])
     start: list[dict[str, Any]] = []
@@ -166,11 +166,11 @@ def search(
     islands = [_Island(start, rng) for _ in range(ISLANDS)]
     while True:
         asked = [point for island in islands for point in island.ask()]
-        found = batch(asked + explorer.ask(EXPLORED))
-        yield from found
-        explorer.note(found)
+        rows = batch(asked + explorer.ask(EXPLORED))
+        yield from rows
+        explorer.note(rows)
         for number, island in enumerate(islands):
-            own = found[number * POPULATION : (number + 1) * POPULATION]
+            own = rows[number * POPULATION : (number + 1) * POPULATION]
             island.tell(own)
             if island.done:
                 # What it found may be where another begins.
@@ -209,9 +209,9 @@ class _Island:
     def ask(self) -> list[FloatArray]:
         return [self._strategy.ask() for _ in range(POPULATION)]
 
-    def tell(self, found: list[dict[str, Any]]) -> None:
-        self._strategy.tell([(np.array(row["point"]), row["total"]) for row in found])
-        best = min(found, key=lambda row: float(row["total"]))
+    def tell(self, rows: list[dict[str, Any]]) -> None:
+        self._strategy.tell([(np.array(row["point"]), row["total"]) for row in rows])
+        best = min(rows, key=lambda row: float(row["total"]))
         self._since = 0 if best["total"] < self._least - _GAIN else self._since + 1
         if best["total"] < self._least:
             self._least, self.best = best["total"], best
