@@ -17,7 +17,7 @@ from printhammer.chaos import strobes
 from printhammer.chaos.strobe.schemes_1983 import SCHEMES, scheme_strobes
 from printhammer.claims.schemes_1983 import judge_as_in_1983
 from printhammer.claims.verdicts import changed, printed_verdicts
-from printhammer.kernel.schemes_1983 import READINGS, Reading, Scheme
+from printhammer.kernel.schemes_1983 import READINGS
 from printhammer.reconstruction.family.family import family_hammers
 from printhammer.reconstruction.judging.base_rates import draw
 from printhammer.reconstruction.search.space import hammer_of
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.kernel.schemes_1983 import Reading, Scheme
 
 CHANGE: Final = 1e-5
 """By which all constants are changed at once, up, to see how much a verdict hangs on their last digits."""
@@ -70,17 +71,17 @@ def _comparison(
     first: Way, second: Way, before: Sequence[list[str]], after: Sequence[list[str]]
 ) -> dict[str, Any]:
     """Return how many verdicts differ, from periodic to strange and back, and the share with its error."""
-    pairs = [list(zip(*verdicts, strict=True)) for verdicts in zip(before, after, strict=True)]
+    pairs = [list(zip(one, other, strict=True)) for one, other in zip(before, after, strict=True)]
     every = [pair for row in pairs for pair in row]
-    each = np.array([np.mean([name != other for name, other in row]) for row in pairs])
+    each = np.array([np.mean([one != other for one, other in row]) for row in pairs])
     error = 2.0 * float(each.std(ddof=1)) / math.sqrt(len(each)) if len(each) > 1 else math.nan
-    to_strange = sum(name.startswith("period") and other == "strange" for name, other in every)
-    to_period = sum(name == "strange" and other.startswith("period") for name, other in every)
+    to_strange = sum(one.startswith("period") and other == "strange" for one, other in every)
+    to_period = sum(one == "strange" and other.startswith("period") for one, other in every)
     return {
         "first": named(first),
         "second": named(second),
         "panels": len(every),
-        "differ": sum(name != other for name, other in every),
+        "differ": sum(one != other for one, other in every),
         "share": float(each.mean()),
         "share_error": None if math.isnan(error) else error,
         "periodic_to_strange": to_strange,
