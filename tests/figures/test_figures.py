@@ -166,9 +166,8 @@ def buzz(hammer: "ph.Hammer") -> BuzzSearch:
     times = delayed_train(hammer, 12e-6, 4)
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, at=times), points=2)
     force = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=2).dots[0].peak_force
-    run = longest_run(motion, force)
-    dots = (run.first, len(run.forces), run.forces, run.clear, run.touches)
-    train = BuzzTrain("delayed", 12e-6, times, *dots, motion.drive.peak)
+    run, peak = longest_run(motion, force), motion.drive.peak
+    train = BuzzTrain(**vars(run), kind="delayed", interval=12e-6, times=times, peak_current=peak)
     return BuzzSearch(train, "", train, force, 1)
 
 
@@ -184,7 +183,8 @@ def test_figure_7_shows_the_train(hammer: "ph.Hammer", buzz: BuzzSearch) -> None
 
 def test_figure_7_says_that_there_is_none(hammer: "ph.Hammer", buzz: BuzzSearch) -> None:
     none = BuzzSearch(None, "no train does", buzz.best, buzz.reference_force, 1)
-    assert FIGURES[7].draw(hammer, search=none).get_suptitle().startswith("No buzz printing: no train does.")
+    remark = FIGURES[7].draw(hammer, search=none).get_suptitle().replace("\n", " ")
+    assert remark == f"No buzz printing: no train does. {buzz.best.touches_text}."
 
 
 def test_a_motion_that_stopped_says_so(hammer: "ph.Hammer") -> None:

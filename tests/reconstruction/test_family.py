@@ -9,10 +9,10 @@ import pytest
 import printhammer as ph
 from printhammer.errors import InputError
 from printhammer.reconstruction.family import family
-from printhammer.reconstruction.family.family import Member, csv_text, family_hammers, write_family
+from printhammer.reconstruction.family.family import csv_text, family_hammers, write_family
 from printhammer.reconstruction.family.picture import family_picture
 from printhammer.reconstruction.judging.judged import STATED
-from printhammer.reconstruction.results import results_in
+from printhammer.reconstruction.results import FamilyMember, results_in
 from printhammer.reconstruction.search.space import hammer_of, template
 from printhammer.units import to_si
 
@@ -185,11 +185,15 @@ def test_a_folder_without_a_family_is_told(tmp_path: Path) -> None:
 
 def test_a_constant_that_a_hammer_lacks_is_left_empty_in_the_table() -> None:
     conclusions = judged(template())["conclusions"]
-    text = csv_text([Member({"mass": 4e-4}, {}, 8, conclusions), Member({"mass": 3e-4}, {}, 9, conclusions)])
-    heading, first, second = text.splitlines()
+    first, second = (
+        FamilyMember(name=name, constants={"mass": mass}, verdicts={}, panels=panels, conclusions=conclusions)
+        for name, mass, panels in (("family-01", 4e-4, 8), ("family-02", 3e-4, 9))
+    )
+    text = csv_text([first, second])
+    heading, *rows = text.splitlines()
     assert heading.startswith("name,mass [kg],waveform.amplitude [A],panels of Fig. 11 as printed [1],")
-    assert first.startswith("family-01,0.0004,,8,")
-    assert second.startswith("family-02,0.0003,,9,")
+    assert rows[0].startswith("family-01,0.0004,,8,")
+    assert rows[1].startswith("family-02,0.0003,,9,")
 
 
 @pytest.mark.slow

@@ -56,15 +56,8 @@ class _Predicted(_Counted):
     kind: Literal["stated", "typical", "shape"] = Field(description=f"one of {', '.join(KINDS)}")
 
 
-class _Panel(_Table):
-    measured: _Count = Field(description="the number of hammers")
-    as_printed: _Count = Field(description="the number of those with the verdict of the paper")
-
-    @model_validator(mode="after")
-    def _possible(self) -> _Panel:
-        if self.as_printed > self.measured:
-            raise ValueError("expected no more panels as printed than were measured")
-        return self
+class _Panel(_Counted):
+    holds: _Count = Field(alias="as_printed", description="the number of those with the verdict of the paper")
 
 
 class BaseRates(_Table):
@@ -86,11 +79,8 @@ class BaseRates(_Table):
     @property
     def panels(self) -> dict[str, Share]:
         """How often each panel of Fig. 11 is as printed."""
-        return {
-            name: Share(panel.measured, panel.as_printed)
-            for name, panel in self.poincare_panels.items()
-            if panel.measured
-        }
+        shares = {name: _share(panel) for name, panel in self.poincare_panels.items()}
+        return {name: share for name, share in shares.items() if share is not None}
 
 
 class Predictions(_Table):
@@ -221,36 +211,24 @@ FILES: Final[dict[str, type[_Table]]] = {
 _Model = TypeVar("_Model", bound=_Table)
 
 
+def _file(name: str, model: type[_Model], meaning: str) -> cached_property[_Model | None]:
+    def read(results: Results) -> _Model | None:
+        return results.read(name, model)
+
+    read.__doc__ = meaning
+    return cached_property(read)
+
+
 @dataclass(frozen=True)
 class Results:
     """The results in a folder; each is None where its file is absent."""
 
     folder: Path | Traversable
-
-    @cached_property
-    def base_rates(self) -> BaseRates | None:
-        """How often each claim holds among random plausible hammers."""
-        return self._read("base_rates", BaseRates)
-
-    @cached_property
-    def predictions(self) -> Predictions | None:
-        """What the search on the stated claims alone predicts."""
-        return self._read("predictions", Predictions)
-
-    @cached_property
-    def search(self) -> Search | None:
-        """The search that found the shipped hammer."""
-        return self._read("search", Search)
-
-    @cached_property
-    def family(self) -> Family | None:
-        """Different hammers for which the claims hold as well."""
-        return self._read("family", Family)
-
-    @cached_property
-    def schemes(self) -> Schemes | None:
-        """What the integrators of 1983 do to verdicts."""
-        return self._read("schemes", Schemes)
+    base_rates = _file("base_rates", BaseRates, "How often each claim holds among random plausible hammers.")
+    predictions = _file("predictions", Predictions, "What the search on the stated claims alone predicts.")
+    search = _file("search", Search, "The search that found the shipped hammer.")
+    family = _file("family", Family, "Different hammers for which the claims hold as well.")
+    schemes = _file("schemes", Schemes, "What the integrators of 1983 do to verdicts.")
 
     def check(self) -> None:
         """Read all files.
@@ -263,7 +241,8 @@ class Results:
         for name in FILES:
             getattr(self, name)
 
-    def _read(self, name: str, model: type[_Model]) -> _Model | None:
+    def read(self, name: str, model: type[_Model]) -> _Model | None:
+        """Read one of `FILES`; errors as for `check`."""
         path = self.folder / f"{name}.json"
         try:
             text = path.read_text(encoding="utf-8")
@@ -301,8 +280,8 @@ def results_in(folder: str | Path) -> Results:
     return Results(path)
 
 
-def _share(found: _Counted | None) -> Share | None:
-    return Share(found.measured, found.holds) if found is not None and found.measured else None
+def _share(counted: _Counted | None) -> Share | None:
+    return Share(counted.measured, counted.holds) if counted is not None and counted.measured else None
 
 
 def _refuse(text: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.claims import claims, judge_all
+from printhammer.claims import JudgedClaim, claims, judge_all
 from printhammer.reconstruction.judging.shortlist import standing
 from printhammer.reconstruction.search.candidates import TOLERANCE
 from printhammer.reconstruction.search.space import BEYOND, CURRENT, PRINT_FORCE, hammer_of
@@ -13,7 +13,6 @@ from printhammer.units import from_si
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from printhammer.claims import JudgedClaim
     from printhammer.hammer.hammer import Hammer
 
 TITLE: Final = "The stored-energy print hammer of Hendriks (1983), reconstructed"
@@ -66,7 +65,7 @@ def search_json(
     return {
         "format": 1,
         "shipped": hammer.fingerprint,
-        "searches": [{key: one[key] for key in ("aim", "seed", "candidates")} for one in searches],
+        "searches": [{key: search[key] for key in ("aim", "seed", "candidates")} for search in searches],
         "core_hours": round(core_hours, 2),
         "tolerance": TOLERANCE,
         "waveform": "" if hammer.waveform is None else hammer.waveform.shape,
@@ -80,7 +79,7 @@ def search_json(
 def _failing(result: JudgedClaim, rows: Sequence[dict[str, Any]], held: set[str]) -> dict[str, Any]:
     name = result.claim.name
     there = [row for row in rows if row["verdicts"].get(name)]
-    found: dict[str, Any] = {
+    entry: dict[str, Any] = {
         "value": {key: (result.value or {}).get(key) for key in result.claim.band},
         "why": result.detail,
         "best": None,
@@ -94,10 +93,10 @@ def _failing(result: JudgedClaim, rows: Sequence[dict[str, Any]], held: set[str]
         value = best["values"].get(name) or {}
         if name == "poincare":
             value = {"panels_as_printed": best["panels"], "verdicts": list(best["panel_verdicts"].values())}
-        found["best"] = {
+        entry["best"] = {
             "value": value,
             "holds": bool(best["verdicts"].get(name)),
             "constants": best["constants"],
             "costs": costs,
         }
-    return found
+    return entry

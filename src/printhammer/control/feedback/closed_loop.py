@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from printhammer.control.feedback.controller import CONTACT, LEADS, WINDOW
+from printhammer.control.feedback.controller import CONTACT, LEADS, WINDOW, Controller
 from printhammer.control.feedback.estimator.sensor import PositionSensor, Samples, run_key
 from printhammer.control.feedback.loop import Loop
 from printhammer.hammer.equilibrium import rest_state
@@ -21,7 +21,6 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.control.feedback.controller import Controller
     from printhammer.drive.sequence import PulseSequence
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray

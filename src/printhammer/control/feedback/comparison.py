@@ -15,14 +15,14 @@ import numpy as np
 
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.driver import LARGEST_CURRENT, driver_of
+from printhammer.control.feedback.driver import LARGEST_CURRENT, Driver, driver_of
 from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
-from printhammer.printing.dots.nominal import WAIT
+from printhammer.printing.dots.nominal import WAIT, Nominal
 from printhammer.printing.dots.slots import slots_of
-from printhammer.printing.dots.strategy import name_of, open_loop
+from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
@@ -35,10 +35,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-    from printhammer.control.feedback.driver import Driver
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
-    from printhammer.printing.dots.strategy import Strategy
     from printhammer.results.result import Entries
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray

@@ -18,9 +18,9 @@ from printhammer.control.feedback.fronts import between_fronts, fronts
 from printhammer.control.feedback.impact_map import ALWAYS, FREE, PUSHED, force_map
 from printhammer.control.feedback.interpolation import blend_known
 from printhammer.control.feedback.launch import launch
-from printhammer.control.feedback.loop import APART, REMEMBERED, Printed, Pulse, Touched
+from printhammer.control.feedback.loop import APART, REMEMBERED, Loop, Printed, Pulse, Touched
 from printhammer.control.feedback.plant import Plant
-from printhammer.control.feedback.policy import KNOWN, Committed, Policy, between
+from printhammer.control.feedback.policy import KNOWN, Choice, Committed, Policy, between
 from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.nominal import nominal
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from printhammer.control.feedback.driver import Driver
     from printhammer.control.feedback.estimator.sensor import Samples
-    from printhammer.control.feedback.loop import Loop
-    from printhammer.control.feedback.policy import Choice
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray, IntArray
 
@@ -77,18 +75,10 @@ class Ahead(NamedTuple):
 
 
 class Controller:
-    """A controller made for one hammer.
+    """A controller made for one hammer, the nominal one, and the driver of its coil.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The nominal hammer, with a pack and a backstop.
-    driver : Driver
-        Of its coil.
-    limits : Limits, optional
-        How far a dot may be off.
-    threads : int, optional
-        By default as many as there are cores.
+    The hammer has a pack and a backstop. `limits` say how far a dot may be off; `threads` are by default as
+    many as there are cores.
 
     Raises
     ------

@@ -60,17 +60,10 @@ class BoundedSequence(PulseSequence):
 
 
 def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | None = None) -> Driver:
-    """Return a driver for a hammer.
+    """Return a driver for a hammer that is driven by a current, with a largest current, A.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        A hammer that is driven by a current.
-    current : float, optional
-        Largest current, A.
-    edge : float, optional
-        Time constant, s; by default that with which the current of the hammer's own waveform decays. Its own
-        rise is slower: that takes a supply of a higher voltage.
+    Its time constant `edge`, s, is by default that with which the current of the hammer's own waveform
+    decays. Its own rise is slower: that takes a supply of a higher voltage.
 
     Raises
     ------

@@ -14,13 +14,12 @@ import numpy as np
 
 from printhammer.control.feedback.impact_map import force_map, impact_map, released_forces
 from printhammer.control.feedback.interpolation import place_of
-from printhammer.control.feedback.soft_landing import soft_landing
+from printhammer.control.feedback.soft_landing import Landing, soft_landing
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.impact_map import ForceMap, ImpactMap
     from printhammer.control.feedback.launch import Launch
     from printhammer.control.feedback.plant import Plant
-    from printhammer.control.feedback.soft_landing import Landing
     from printhammer.support.arrays import FloatArray, IntArray
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.feedback.impact_map import AHEAD, FREE
+from printhammer.control.feedback.impact_map import AHEAD, FREE, ForceMap
 from printhammer.drive.sequence import PulseSequence
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.control.feedback.impact_map import ForceMap
     from printhammer.control.feedback.plant import Plant
 
 # Widths of pushes that are tried, in flight times of the single pulse

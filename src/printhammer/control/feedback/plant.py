@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
-from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, DotTable, Ensemble, Strobes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
-    from printhammer.run.ensemble import DotTable, Strobes
     from printhammer.support.arrays import BoolArray
 
 
@@ -52,10 +51,7 @@ class Plant:
     ) -> tuple[BoolArray, DotTable, Strobes]:
         """Run drives from rest, or from states (drives, 2), m and m/s, up to an end, s.
 
-        Returns
-        -------
-        tuple
-            Whether each run came to its end, what its firings did, and states at the instants asked for.
+        Returns whether each run came to its end, what its firings did, and states at the instants asked for.
         """
         begun = None if states is None else np.array(states)
         result = Ensemble(self.hammer, list(drives), end, states=begun, tolerance=DISPLAY_TOLERANCE).run(

@@ -16,13 +16,11 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from printhammer.control.feedback.fronts import MIDDLE, OFFSETS, between_fronts
-from printhammer.control.feedback.impact_map import FORCES
+from printhammer.control.feedback.fronts import MIDDLE, OFFSETS, Fronts, between_fronts
+from printhammer.control.feedback.impact_map import FORCES, ImpactMap
 from printhammer.control.feedback.interpolation import bilinear, blend, place_of
 
 if TYPE_CHECKING:
-    from printhammer.control.feedback.fronts import Fronts
-    from printhammer.control.feedback.impact_map import ImpactMap
     from printhammer.printing.dots.limits import Limits
     from printhammer.support.arrays import FloatArray, IntArray
 

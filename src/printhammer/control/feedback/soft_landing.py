@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.feedback.impact_map import AHEAD, PUSHED
+from printhammer.control.feedback.impact_map import AHEAD, PUSHED, ForceMap
 from printhammer.hammer.equilibrium import rest_state
 
 if TYPE_CHECKING:
-    from printhammer.control.feedback.impact_map import ForceMap
     from printhammer.control.feedback.plant import Plant
     from printhammer.support.arrays import FloatArray, IntArray
 

@@ -25,7 +25,7 @@ from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
 from printhammer.control.least_work.slot import Task
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.trains import PulseTrain
-from printhammer.drive.waveforms.shapes import Sampled
+from printhammer.drive.waveforms.shapes import Sampled, Waveform
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of
@@ -34,9 +34,9 @@ from printhammer.results import Declared, Result, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
-from printhammer.run.coil_work import coil_power
+from printhammer.run.coil_work import CoilWork, coil_power
 from printhammer.run.ensemble import Ensemble
-from printhammer.run.ledger import stored_energy
+from printhammer.run.ledger import Ledger, stored_energy
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import CYCLE, simulate
 from printhammer.units import from_si
@@ -48,13 +48,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from printhammer.drive.sequence import PulseSequence
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
     from printhammer.results.result import Entries
-    from printhammer.run.coil_work import CoilWork
     from printhammer.run.contacts import Contact
-    from printhammer.run.ledger import Ledger
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray, IntArray, TextArray
 

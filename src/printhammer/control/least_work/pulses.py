@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.least_work.descent import ARRIVAL, LOST, best_of, descend, deviations, met, sobol
-from printhammer.control.least_work.slot import SlotState, end_of
+from printhammer.control.least_work.slot import SlotState, Task, end_of
 from printhammer.control.widths import of_width, widest
 from printhammer.drive.sequence import PulseSequence
 from printhammer.errors import InputError
@@ -21,7 +21,6 @@ from printhammer.run.ensemble import Ensemble
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.control.least_work.slot import Task
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.support.arrays import FloatArray
 

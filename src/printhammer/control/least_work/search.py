@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.least_work.descent import best_of, descend, deviations, met, sobol
-from printhammer.control.least_work.slot import RELOADING, SlotState, node_times
+from printhammer.control.least_work.slot import RELOADING, Outcomes, SlotState, Task, node_times
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.hammer.equilibrium import rest_state
@@ -20,7 +20,6 @@ from printhammer.hammer.equilibrium import rest_state
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.control.least_work.slot import Outcomes, Task
     from printhammer.support.arrays import FloatArray
 
 LEAD: Final = 2.0  # Length of the first slot, from rest to the touch, in flight times of the single pulse

@@ -9,7 +9,7 @@ import numpy as np
 from printhammer.control.table.histories import histories_of
 from printhammer.control.widths import of_width, widest
 from printhammer.drive.sequence import PulseSequence
-from printhammer.drive.waveforms.shapes import Chain
+from printhammer.drive.waveforms.shapes import Chain, Waveform
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.settling import settled_from
@@ -18,7 +18,6 @@ from printhammer.printing.dots.slots import slot_times
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.table.draft import histories_of_length
-from printhammer.control.table.histories import REST, number_of
+from printhammer.control.table.histories import REST, History, number_of
 from printhammer.control.table.newton import solve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.table.draft import Cells, Draft
-    from printhammer.control.table.histories import History
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 GOOD: Final = 1e-4  # Deviation, in parts of the limits, from which on an entry is left as it is

@@ -9,9 +9,9 @@ import numpy as np
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
-from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
-from printhammer.printing.dots.strategy import open_loop
+from printhammer.printing.dots.strategy import Strategy, open_loop
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import from_rest
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from printhammer.control.table.compensation import CompensationTable
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
-    from printhammer.printing.dots.strategy import Strategy
     from printhammer.support.arrays import FloatArray
 
 PERTURBATIONS: Final = (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.control.table.drive import fading
-from printhammer.drive.trains import PulseTrain
+from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.drive.waveforms.chain import TAIL
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
@@ -21,7 +21,6 @@ from printhammer.run.simulate import simulate
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.limits import Limits

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.table.draft import blank
+from printhammer.control.table.draft import Draft, blank
 from printhammer.control.table.drive import LARGEST_CURRENT, clearance, print_pulse
 from printhammer.control.table.histories import checked_size, histories, number_of
 from printhammer.control.table.newton import ROUNDS
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from printhammer.control.table.compensation import CompensationTable
-    from printhammer.control.table.draft import Draft
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 

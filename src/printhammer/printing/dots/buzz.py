@@ -12,7 +12,6 @@ backstop once before the dots that count, and settles into the buzz afterwards.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
@@ -21,32 +20,29 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.settling import touches
+from printhammer.results import Declared, part
+from printhammer.run.ensemble import DotTable, Ensemble
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.ensemble import DotTable
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import BoolArray
 
-MAX_CURRENT: Final = 2.0
-"""Largest coil current of a train, A: the range of the paper's Fig. 2."""
+MAX_CURRENT: Final = 2.0  # Largest coil current of a train, A: the range of the paper's Fig. 2
 
-FORCES: Final = (0.3, 0.95)
-"""Peak force of a dot that counts, in units of that of a single pulse."""
+FORCES: Final = (0.3, 0.95)  # Peak force of a dot that counts, in units of that of a single pulse
 
-FEWEST: Final = 6
-"""Number of dots without a touch of the backstop that makes buzz printing."""
+FEWEST: Final = 6  # Number of dots without a touch of the backstop that makes buzz printing
 
 _PULSES: Final = 9
 _PERIODS: Final = 96
 _DELAY_STEP: Final = 2e-6
 """Step of the delays tried, s."""
 
-_DELAYS: Final = 400
-"""Most delays tried at that step; a slower hammer is tried at as many, farther apart."""
+_DELAYS: Final = 400  # Most delays tried at that step; a slower hammer is tried at as many, farther apart
 
 PATIENCE: Final = 3.0
 """How long a dot is waited for after its firing, in times of the single pulse from firing to leaving."""
@@ -54,31 +50,29 @@ PATIENCE: Final = 3.0
 _ZOOMS, _PER_ZOOM = 2, 4
 
 
-@dataclass(frozen=True)
-class BuzzTrain:
-    """One train that was tried."""
+class Run(Declared):
+    """The longest run of dots of a train that count, one for each firing.
 
-    kind: Literal["uniform", "delayed"]
-    """"uniform": pulses one period apart; "delayed": each a constant delay after leaving the pack."""
-    interval: float
-    """That period or delay, s."""
-    times: tuple[float, ...]
-    """Firing times, s."""
-    first: int
-    count: int
-    """Number of the firing that made the first dot of the longest run that counts, and number of its dots,
-    which may be 0: one for each firing, each with a peak force within limits, no touch of the backstop
-    between the first and the last."""
-    forces: tuple[float, ...]
-    """Peak forces of the dots of the run, in units of that of a single pulse."""
-    clear: bool
-    """Whether there is no lost dot and no touch of the backstop from the first dot of the train, which starts
-    from rest, to the last of the run: not only the dots that count, the whole burst stays clear."""
-    touches: tuple[int, int, int]
-    """Touches of the backstop before the first dot of the run, between its first and its last, and from there
-    to the end of the run of the train, which is still long enough for a dot after the last firing."""
-    peak_current: float
-    """Largest value of the drive, A (N under a drive that is a force)."""
+    Each has a peak force within limits, and there is no touch of the backstop between the first and the last.
+    """
+
+    first: int = part("number of the firing that made the first dot of the run")
+    forces: tuple[float, ...] = part("peak forces of its dots, in units of that of a single pulse")
+    clear: bool = part(
+        "whether there is no lost dot and no touch of the backstop from the first dot of the train, which"
+        " starts from rest, to the last of the run",
+        more="not only the dots that count, the whole burst stays clear",
+    )
+    touches: tuple[int, int, int] = part(
+        "touches of the backstop before the first dot of the run, between its first and its last, and from"
+        " there to the end of the run of the train",
+        more="which is still long enough for a dot after the last firing",
+    )
+
+    @property
+    def count(self) -> int:
+        """Number of its dots, which may be 0."""
+        return len(self.forces)
 
     @property
     def weakest(self) -> float:
@@ -95,20 +89,27 @@ class BuzzTrain:
         )
 
 
-@dataclass(frozen=True)
-class BuzzSearch:
+class BuzzTrain(Run):
+    """One train that was tried, and its longest run of dots that count."""
+
+    kind: Literal["uniform", "delayed"] = part(
+        '"uniform": pulses one period apart; "delayed": each a constant delay after leaving the pack'
+    )
+    interval: float = part("that period or delay, s")
+    times: tuple[float, ...] = part("firing times, s")
+    peak_current: float = part("largest value of the drive, A (N under a drive that is a force)")
+
+
+class BuzzSearch(Declared):
     """Result of a search for buzz printing."""
 
-    train: BuzzTrain | None
-    """The train found."""
-    reason: str
-    """Why there is none, in one sentence; empty if there is one."""
-    best: BuzzTrain | None
-    """The best attempt, which is `train` if there is one; None if no dot of any train counts."""
-    reference_force: float
-    """Peak force of the dot of a single pulse, N; 0 if it makes none."""
-    tried: int
-    """Number of trains tried."""
+    train: BuzzTrain | None = part("the train found")
+    reason: str = part("why there is none, in one sentence; empty if there is one")
+    best: BuzzTrain | None = part(
+        "the best attempt, which is `train` if there is one; None if no dot of any train counts"
+    )
+    reference_force: float = part("peak force of the dot of a single pulse, N; 0 if it makes none")
+    tried: int = part("number of trains tried")
 
 
 def find_buzz_train(
@@ -154,16 +155,6 @@ def find_buzz_train(
     return _Search(hammer, pulses, fewest, forces, max_current).result()
 
 
-@dataclass(frozen=True)
-class Run:
-    """The longest run of dots of a motion that count; its fields are those of `BuzzTrain`."""
-
-    first: int
-    forces: tuple[float, ...]
-    clear: bool
-    touches: tuple[int, int, int]
-
-
 def longest_run(motion: Motion, reference_force: float, forces: tuple[float, float] = FORCES) -> Run:
     """Return the longest run of dots whose peak forces count, in units of a reference, N.
 
@@ -200,16 +191,9 @@ def longest_run(motion: Motion, reference_force: float, forces: tuple[float, flo
 
 
 def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[float, ...]:
-    """Return firing times, s, of which each but the first follows the leaving of the pack by a delay.
+    """Return firing times, s, of which each but the first follows the leaving of the pack by a delay, s.
 
-    Parameters
-    ----------
-    hammer : Hammer
-        The hammer.
-    delay : float
-        From the leaving of the pack contact that a firing made to the next firing, s.
-    pulses : int, optional
-        Number of firings; there are fewer where a firing makes no dot, so that no leaving follows it.
+    There are fewer firings than `pulses` where one of them makes no dot, so that no leaving follows it.
 
     Raises
     ------
@@ -230,27 +214,14 @@ def delayed_trains(
     hopeless: Callable[[DotTable, list[int]], BoolArray] | None = None,
     **options: Any,
 ) -> list[tuple[float, ...]]:
-    """Return the trains of many hammers and delays, built side by side; see `delayed_train`.
+    """Return the trains of many hammers and delays, s, built side by side; see `delayed_train`.
 
-    Parameters
-    ----------
-    hammers : sequence of Hammer
-        Hammer of each train.
-    delays : sequence of float
-        Delay of each, s.
-    patience : sequence of float
-        How long after a firing the leaving of its dot is waited for, s.
-    pulses : int
-        Number of firings of a train that is not broken off.
-    states : sequence of tuple, optional
-        Displacement, m, and velocity, m/s, from which each starts; by default at rest.
-    hopeless : callable, optional
-        From the dots of trains that still grow, and their numbers, to which of them are broken off.
-    **options
-        `tolerance` of the runs and `threads`, as for `printhammer.Ensemble`.
+    `patience` is how long after a firing the leaving of its dot is waited for, s, and `pulses` the number of
+    firings of a train that is not broken off. The trains start from rest, or from `states`: displacement, m,
+    and velocity, m/s. `hopeless` is called with the dots of trains that still grow, and their numbers, and
+    returns which of them are broken off. Further `options` are the `tolerance` of the runs and `threads`, as
+    for `printhammer.Ensemble`.
     """
-    from printhammer.run.ensemble import Ensemble
-
     threads = options.pop("threads", None)
     trains = [[0.0] for _ in delays]
     growing = list(range(len(delays)))
@@ -380,11 +351,8 @@ class _Search:
             motion = _run(self.hammer, times, self.patience)
             run = longest_run(motion, self.reference, self.forces)
             if run.forces and (peak := motion.drive.peak) <= self.limit:
-                count = len(run.forces)
                 judged.append(
-                    BuzzTrain(
-                        kind, interval, times, run.first, count, run.forces, run.clear, run.touches, peak
-                    )
+                    BuzzTrain(**vars(run), kind=kind, interval=interval, times=times, peak_current=peak)
                 )
         self.best = max(judged + ([self.best] if self.best else []), key=self._merit, default=None)
         return judged

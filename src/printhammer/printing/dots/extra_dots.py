@@ -7,19 +7,19 @@ second ones, and so on.
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.results import Declared, column
-from printhammer.run.ensemble import Ensemble
+from printhammer.run.ensemble import DotTable, Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.ensemble import DotTable
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 20
@@ -125,10 +125,9 @@ def _joined(parts: Sequence[ExtraDots]) -> ExtraDots:
     """Return contacts found round by round, in the order of members, firings and times."""
     none = np.zeros(0, np.int64)
     rounds = [ExtraDots(none, none, np.zeros(0), np.zeros(0)), *parts]
-    member = np.concatenate([part.member for part in rounds])
-    firing = np.concatenate([part.firing for part in rounds])
-    touch = np.concatenate([part.touch for part in rounds])
-    force = np.concatenate([part.peak_force for part in rounds])
+    member, firing, touch, force = (
+        np.concatenate([getattr(part, entry.name) for part in rounds]) for entry in fields(ExtraDots)
+    )
     order = np.lexsort((touch, firing, member))
     return ExtraDots(member[order], firing[order], touch[order], force[order])
 

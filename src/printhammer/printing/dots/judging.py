@@ -74,28 +74,12 @@ def judge(
     limits: Limits,
     ok: BoolArray | None = None,
 ) -> Judgement:
-    """Judge dots.
+    """Judge dots by what their firings did, one firing for each dot.
 
-    Parameters
-    ----------
-    dots : DotTable
-        What the firings did, one firing for each dot.
-    wanted : bool array, shape (members, firings)
-        Which dots to judge; those of a lead-in, for instance, are not.
-    slot_times : array, shape (members, firings)
-        Time of the slot of each firing, s, which need not be that of the firing; of no matter where no dot is
-        judged.
-    nominal : SinglePulse or sequence of SinglePulse
-        The dot of the single pulse: one for all members, or one for each.
-    limits : Limits
-        How far a dot may be off.
-    ok : bool array, shape (members,), optional
-        Which runs reached their ends. The last dot of one that did not is not run: its contact may be open.
-
-    Returns
-    -------
-    Judgement
-        With the deviations.
+    `wanted` (members, firings) says which dots to judge; those of a lead-in, for instance, are not.
+    `slot_times` (members, firings), s, need not be those of the firings, and are of no matter where no dot is
+    judged. The `nominal` dot, of the single pulse, is one for all members, or one for each. `ok` (members,)
+    says which runs reached their ends: the last dot of one that did not is not run, its contact may be open.
 
     Raises
     ------

@@ -69,10 +69,7 @@ def single_pulses(
 ) -> list[SinglePulse | None]:
     """Fire many hammers that have packs once each from rest, their own waveforms or others.
 
-    Returns
-    -------
-    list of SinglePulse or None
-        None where there is no dot, or the run ended early.
+    Where there is no dot, or the run ended early, None is returned.
 
     Raises
     ------

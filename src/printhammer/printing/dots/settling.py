@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 SETTLED: Final = 0.01
 """Distance from rest, in parts of the stroke, within which the armature counts as settled."""
 
-CYCLE: Final = 20e-3
-"""Duration of the run, s."""
+CYCLE: Final = 20e-3  # Duration of the run, s
 
 _SPACING: Final = 1e-6
 _BISECTIONS: Final = 40

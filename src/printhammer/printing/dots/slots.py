@@ -16,11 +16,9 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-SLOTS: Final = 8
-"""Number of slots of a pattern from rest, and order of the cycle."""
+SLOTS: Final = 8  # Number of slots of a pattern from rest, and order of the cycle
 
-LEAD_IN: Final = 64
-"""Slots of the cycle that are run before the first one that is judged."""
+LEAD_IN: Final = 64  # Slots of the cycle that are run before the first one that is judged
 
 FIRST_SLOT: Final = 1e-3
 """Time of slot 0 in a run, s: a drive may fire ahead of a slot, and no drive fires before time 0."""
@@ -28,12 +26,9 @@ FIRST_SLOT: Final = 1e-3
 
 @cache
 def eight_slot_patterns() -> BoolArray:
-    """Return the 255 patterns of eight slots in which at least one dot is wanted.
+    """Return the 255 patterns of eight slots in which at least one dot is wanted, (255, 8), read-only.
 
-    Returns
-    -------
-    bool array, shape (255, 8)
-        Row n holds the binary digits of n + 1, the most significant one in slot 0; read-only.
+    Row n holds the binary digits of n + 1, the most significant one in slot 0.
     """
     numbers = np.arange(1, 2**SLOTS)
     rows: BoolArray = (numbers[:, np.newaxis] >> np.arange(SLOTS - 1, -1, -1)) & 1 == 1
@@ -46,17 +41,8 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
     """Return a binary de Bruijn cycle: read around, it holds every word of `order` slots exactly once.
 
     It is the least one in the order of a dictionary: the Lyndon words whose length divides the order, one
-    after another (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207).
-
-    Parameters
-    ----------
-    order : int, optional
-        Length of the words, from 1 to 16.
-
-    Returns
-    -------
-    bool array, shape (2**order,)
-        Read-only.
+    after another (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207). The order is from 1 to 16,
+    the shape (2**order,); read-only.
 
     Raises
     ------
@@ -85,12 +71,8 @@ def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> BoolArray:
     """Return once around the de Bruijn cycle of an order, its own last slots before it.
 
     The run begins at rest, `lead_in` slots before the cycle does, with what the cycle ends with. So at every
-    slot that is judged the past is that of a cycle without end, for `lead_in` slots at least.
-
-    Returns
-    -------
-    bool array, shape (lead_in + 2**order,)
-        The slots from number `lead_in` on are to be judged.
+    slot that is judged, from number `lead_in` on, the past is that of a cycle without end, for `lead_in`
+    slots at least.
     """
     cycle = de_bruijn(order)
     return np.concatenate([np.resize(cycle[::-1], lead_in)[::-1], cycle])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from printhammer.drive.trains import PulseTrain
+from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.slots import slot_times
@@ -12,7 +12,6 @@ from printhammer.printing.dots.slots import slot_times
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
 
 

@@ -6,23 +6,19 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from printhammer.printing.dots.judging import judge
-from printhammer.printing.dots.nominal import WAIT
+from printhammer.printing.dots.judging import Judgement, judge
+from printhammer.printing.dots.nominal import WAIT, SinglePulse
 from printhammer.printing.dots.slots import FIRST_SLOT
-from printhammer.printing.dots.strategy import checked_drives, open_loop
+from printhammer.printing.dots.strategy import Strategy, checked_drives, open_loop
 from printhammer.results import Declared, column, part
-from printhammer.run.ensemble import Ensemble
+from printhammer.run.ensemble import DotTable, Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.judging import Judgement
     from printhammer.printing.dots.limits import Limits
-    from printhammer.printing.dots.nominal import SinglePulse
-    from printhammer.printing.dots.strategy import Strategy
-    from printhammer.run.ensemble import DotTable
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
 

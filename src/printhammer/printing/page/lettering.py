@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import BoolArray
 
-COLUMNS: Final = 40
-"""Characters of a print line by default."""
+COLUMNS: Final = 40  # Characters of a print line by default
 
 _NAMED: Final = 8
 

@@ -80,19 +80,14 @@ def _opened(path: Path, size: int) -> FreeTypeFont:
         raise InputError(f"{path}: expected {what}") from None
 
 
-def _span(font: FreeTypeFont, marks: str) -> tuple[int, int]:
-    """Return how many wires the characters reach above the base line and below it."""
-    boxes = [font.getbbox(mark, mode="1", anchor="ls") for mark in marks]
-    up = max(0, *(math.ceil(-box[1]) for box in boxes))
-    return up, max(0, *(math.ceil(box[3]) for box in boxes))
-
-
 @lru_cache(maxsize=16)
 def _fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
     """Return the font at the largest size that fits, and the wires above the base line."""
     for size in range(_LARGER * wires, 0, -1):
         font = _opened(path, size)
-        up, down = _span(font, marks)
+        boxes = [font.getbbox(mark, mode="1", anchor="ls") for mark in marks]
+        up = max(0, *(math.ceil(-box[1]) for box in boxes))
+        down = max(0, *(math.ceil(box[3]) for box in boxes))
         if up + down <= wires:
             return font, up
     raise InputError(f"{path}: {wires} wires are too few for this font, expected more")

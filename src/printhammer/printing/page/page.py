@@ -191,16 +191,7 @@ class Page(Result, rows="dot"):
 
         What counts is the sum, over some slots in a row of a print line, of what is off: a lost dot counts 1,
         another one its placement error in slots and its deviation in density, an extra contact its density.
-
-        Parameters
-        ----------
-        slots : int
-            Number of slots in a row.
-
-        Returns
-        -------
-        line, first : int
-            Print line and first slot, counted from 0; the first such place where there are several.
+        The place is a print line and the first of its slots, counted from 0; of several the first.
         """
         off = np.abs(self.placement_error) / self.head.pitch + np.abs(self.density - self.head.density)
         worth = np.where(self.printed, np.nan_to_num(off), 1.0)

@@ -37,8 +37,7 @@ from printhammer.support.texts import read_text
 if TYPE_CHECKING:
     from printhammer.support.arrays import BoolArray
 
-FORMAT: Final = 1
-"""Version of the pattern file format."""
+FORMAT: Final = 1  # Version of the pattern file format
 
 BITMAPS: Final = {".png": "PNG", ".pbm": "PPM", ".bmp": "BMP"}
 SUFFIXES: Final = (".toml", *BITMAPS)

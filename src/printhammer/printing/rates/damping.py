@@ -16,7 +16,7 @@ import numpy as np
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
-from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
+from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of, single_pulses
 from printhammer.printing.dots.settling import settle
 from printhammer.printing.rates.materials import Material, materials
 from printhammer.printing.rates.perturbation import changed
@@ -29,15 +29,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import FloatArray, TextArray
     from printhammer.support.threads import Progress
 
-CURRENT: Final = 2.0
-"""Largest current by default, A."""
+CURRENT: Final = 2.0  # Largest current by default, A
 
-STEP: Final = 25.0
-"""Step of the grid of rates by default, Hz."""
+STEP: Final = 25.0  # Step of the grid of rates by default, Hz
 
 LEAST: Final = 0.6
 MOST: Final = 1.6
@@ -241,12 +238,8 @@ def tuned(
     """Return factors on the amplitudes of waveforms with which single pulses print with a force.
 
     The factor is looked for from `LEAST` to `MOST` on a grid, then on ever finer ones: where the force first
-    rises through that wanted, of several such places the one nearest to 1.
-
-    Returns
-    -------
-    array, shape (hammers,)
-        NaN where there is none; good to 1e-6.
+    rises through that wanted, of several such places the one nearest to 1. It is good to 1e-6; NaN where
+    there is none.
     """
     scales = np.tile(np.linspace(LEAST, MOST, _COARSE), (len(hammers), 1))
     factors = np.full(len(hammers), np.nan)

@@ -30,14 +30,11 @@ ELASTOMERS: Final = (8e7, 8e8)
 """Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about what the paper says of them, and ten times
 that."""
 
-RELAXATIONS: Final = (0.0, 10e-6, 30e-6, 100e-6, 300e-6)
-"""Relaxation times of the elastomers, s."""
+RELAXATIONS: Final = (0.0, 10e-6, 30e-6, 100e-6, 300e-6)  # Relaxation times of the elastomers, s
 
-PACKS: Final = (0.5, 2.0)
-"""Factors on the stiffness of the pack."""
+PACKS: Final = (0.5, 2.0)  # Factors on the stiffness of the pack
 
-PACK_DAMPINGS: Final = (0.1, 0.4)
-"""Damping ratios of packs of a spring and a dashpot."""
+PACK_DAMPINGS: Final = (0.1, 0.4)  # Damping ratios of packs of a spring and a dashpot
 
 
 class Material(Declared):

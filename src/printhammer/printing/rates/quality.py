@@ -11,11 +11,11 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.judging import FAULTS, judge
 from printhammer.printing.dots.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
-from printhammer.printing.dots.nominal import WAIT
+from printhammer.printing.dots.nominal import WAIT, Nominal
 from printhammer.printing.dots.nominal import nominal as single_pulse
-from printhammer.printing.dots.settling import wear_of
+from printhammer.printing.dots.settling import Wear, wear_of
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
-from printhammer.printing.dots.strategy import checked_drives, name_of, open_loop
+from printhammer.printing.dots.strategy import Strategy, checked_drives, name_of, open_loop
 from printhammer.results import Declared, Result, column, derived, part, scalar
 from printhammer.run.coil_work import squared_current
 from printhammer.run.ensemble import DotTable
@@ -29,20 +29,15 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
-    from printhammer.printing.dots.settling import Wear
-    from printhammer.printing.dots.strategy import Strategy
     from printhammer.run.contacts import Dot
     from printhammer.run.ledger import Ledger
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-PITCH: Final = 25.4e-3 / 60.0
-"""Distance of neighbouring slots on the paper by default, m: sixty to the inch."""
+PITCH: Final = 25.4e-3 / 60.0  # Distance of neighbouring slots on the paper by default, m: sixty to the inch
 
 _SPREADS: Final = {"flight_time": "s", "force": "N", "indentation": "m", "arrival": "s", "placement": "m"}
 
-MOST_SLOTS: Final = 20_000
-"""Number of slots above which a pattern is refused."""
+MOST_SLOTS: Final = 20_000  # Number of slots above which a pattern is refused
 
 
 class Spread(Declared):

@@ -21,8 +21,8 @@ from printhammer.printing.dots.judging import FAULTS
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.slots import LEAD_IN, SLOTS, cycle_with_lead_in, eight_slot_patterns, slots_of
-from printhammer.printing.dots.strategy import name_of, open_loop
-from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
+from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.run.problem import TOLERANCE
 
@@ -33,22 +33,16 @@ if TYPE_CHECKING:
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import SinglePulse
-    from printhammer.printing.dots.strategy import Strategy
-    from printhammer.printing.dots.trial import Trial
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
 
-FIRST: Final = 100.0
-"""First rate of the grid, Hz."""
+FIRST: Final = 100.0  # First rate of the grid, Hz
 
-LAST: Final = 4000.0
-"""Last rate of the grid, Hz."""
+LAST: Final = 4000.0  # Last rate of the grid, Hz
 
-STEP: Final = 5.0
-"""Step of the grid, Hz."""
+STEP: Final = 5.0  # Step of the grid, Hz
 
-MOST_RATES: Final = 10_000
-"""Number of rates above which a grid is refused."""
+MOST_RATES: Final = 10_000  # Number of rates above which a grid is refused
 
 _AT_ONCE: Final = 16  # Number of rates of one ensemble
 _HAMMERS_AT_ONCE: Final = 32
@@ -378,12 +372,8 @@ def safe_rates(
     """Return the safe rates of some hammers on a grid of ascending rates, Hz; arguments as for `all_pass`.
 
     Each hammer is judged by its own one of `singles`; `progress` is called with the number of hammers whose
-    rate is found, and of all.
-
-    Returns
-    -------
-    array, shape (hammers,)
-        NaN where not even the first rate of the grid passes; its last one where all pass.
+    rate is found, and of all. The rate is NaN where not even the first one of the grid passes, and the last
+    one where all pass.
     """
     rates = np.full(len(hammers), np.nan)
     alive = np.arange(len(hammers))

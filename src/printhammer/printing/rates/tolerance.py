@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
@@ -13,7 +13,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.names import unknown
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.dots.nominal import nominal, single_pulses
-from printhammer.printing.dots.strategy import name_of, open_loop
+from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
 from printhammer.printing.dots.trial import Case
 from printhammer.printing.rates.perturbation import changed
 from printhammer.printing.rates.safe_rate import FIRST, LAST, all_pass, grid_notes, rate_grid, safe_rates
@@ -21,21 +21,15 @@ from printhammer.results import Result, column, derived, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.strategy import Strategy
     from printhammer.support.arrays import BoolArray, FloatArray, TextArray
     from printhammer.support.threads import Progress
 
-SPREAD: Final = 0.01
-"""Relative spread of a constant, to either side, by default."""
+SPREAD: Final = 0.01  # Relative spread of a constant, to either side, by default
 
-STEP: Final = 25.0
-"""Step of the grid of rates by default, Hz: coarser than that of one safe rate."""
+STEP: Final = 25.0  # Step of the grid of rates by default, Hz: coarser than that of one safe rate
 
-MOST: Final = 100_000
-"""Number of hammers above which a yield is refused."""
+MOST: Final = 100_000  # Number of hammers above which a yield is refused
 
 Judged = Literal["own", "design"]
 GAP: Final = "pack.front"
@@ -269,12 +263,9 @@ def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, 
 
 
 def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
-    """Draw factors on constants, evenly within their spreads to either side.
+    """Draw factors on constants, (number, constants), evenly within their spreads to either side.
 
-    Returns
-    -------
-    array, shape (number, constants)
-        From a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
+    They come from a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
 
     Raises
     ------

@@ -19,11 +19,9 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import FloatArray
 
-APART: Final = 0.1
-"""Distance from which on two values of a constant count as different."""
+APART: Final = 0.1  # Distance from which on two values of a constant count as different
 
-CONSTANTS_APART: Final = 3
-"""Number of constants in which two hammers are that far apart at least."""
+CONSTANTS_APART: Final = 3  # Number of constants in which two hammers are that far apart at least
 
 FORCE_POWERS: Final[dict[str, float]] = {
     "kg": 1.0,
@@ -67,14 +65,14 @@ def at_gauge(
     return scaled(constants, units, PRINT_FORCE / print_force, CURRENT / amplitude)
 
 
-def distances(one: FloatArray, others: FloatArray) -> FloatArray:
+def distances(constants: FloatArray, others: FloatArray) -> FloatArray:
     """Return how far a hammer is from others, shape (n,): its third largest distance of a constant.
 
-    Two hammers are clearly different where this is at least `APART`. The constants of the one have shape
-    (k,), those of the others (n, k).
+    Two hammers are clearly different where this is at least `APART`. The `constants` of the one have
+    shape (k,), those of the others (n, k).
     """
-    least = np.minimum(np.abs(one), np.abs(others))
-    apart = np.abs(others - one)
+    least = np.minimum(np.abs(constants), np.abs(others))
+    apart = np.abs(others - constants)
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = np.where(apart == 0.0, 0.0, apart / least)
     return np.asarray(np.sort(relative, axis=1)[:, -CONSTANTS_APART], dtype=np.float64)
@@ -87,24 +85,13 @@ def choose(
     *,
     wide: bool = True,
 ) -> list[int]:
-    """Choose hammers, any two of them clearly different.
+    """Choose hammers, `count` at most, any two of them clearly different; return their numbers.
 
-    Parameters
-    ----------
-    tables : sequence of arrays, shape (n, k)
-        Constants of the candidates, the best candidates first, in each way in which they are compared.
-    count : int
-        Largest number to choose.
-    accept : callable, optional
-        Asked of a candidate that would be chosen; where it says no, another one is.
-    wide : bool, optional
-        Whether the next one is the farthest from all chosen so far, for a wide family; or else the nearest
-        of those that are far enough, for a large one.
-
-    Returns
-    -------
-    list of int
-        Numbers of the chosen, the first candidate that is accepted first; the same for the same tables.
+    The `tables` (n, k) hold the constants of the candidates, the best candidates first, in each way in which
+    they are compared. `accept` is asked of a candidate that would be chosen; where it says no, another one
+    is. The next one is the farthest from all chosen so far, for a `wide` family, or else the nearest of those
+    that are far enough, for a large one. The first candidate that is accepted comes first, and the choice is
+    the same for the same tables.
     """
     total = len(tables[0]) if tables else 0
     nearest: FloatArray = np.full(total, np.inf)

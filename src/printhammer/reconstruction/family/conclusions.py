@@ -7,7 +7,7 @@ same; which of them can be trusted is seen where they are compared over a family
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.chaos.strobe.scan import scan
@@ -19,100 +19,80 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.dots.settling import SETTLED, rebounds
 from printhammer.printing.rates.safe_rate import safe_rate
+from printhammer.results import Declared, scalar
+from printhammer.results.declare import columns_of
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
-ONSET_STEP: Final = 5e-6
-"""Step of the strobe times at which chaos is looked for, s."""
+ONSET_STEP: Final = 5e-6  # Step of the strobe times at which chaos is looked for, s
 
-GRID: Final = (100, 3000, 5)
-"""First and last rate and step of the grid of the safe rate, Hz."""
+GRID: Final = (100, 3000, 5)  # First and last rate and step of the grid of the safe rate, Hz
 
 RATES: Final = (500, 1250, 5)
 """First and last rate and step of the grid of bursts, Hz: from where dots are independent into the erratic
 band."""
 
-_TOGETHER: Final = 40
+_AT_ONCE: Final = 40
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """What a conclusion is."""
+class Conclusions(Declared):
+    """The conclusions about one hammer; their units end their names. None: it has none."""
 
-    title: str
-    """A few words."""
-    unit: str
-    """SI unit; "1" for a pure number."""
-    meaning: str
-    """One sentence."""
-
-
-QUANTITIES: Final[dict[str, Quantity]] = {
-    "safe_rate_Hz": Quantity(
-        "safe rate",
+    safe_rate_Hz: float | None = scalar(
         "Hz",
-        "Largest rate up to which every pattern of eight slots prints with the force of the single pulse"
-        " within a tenth and its flight time within 50 us, on a grid of 5 Hz.",
-    ),
-    "chaos_onset_s": Quantity(
-        "chaos onset", "s", "Longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms."
-    ),
-    "flight_time_spread_s": Quantity(
-        "flight-time spread",
+        "largest rate up to which every pattern of eight slots prints with the force of the single pulse"
+        " within a tenth and its flight time within 50 us, on a grid of 5 Hz",
+        name="safe rate",
+    )
+    chaos_onset_s: float | None = scalar(
         "s",
-        "Largest difference of flight times within a burst of nine pulses, over rates from 500 to 1250 Hz"
-        " on a grid of 5 Hz; lost dots have none.",
-    ),
-    "engraved_limit_Hz": Quantity(
-        "spread exceeds 30 us from",
-        "Hz",
-        "Lowest of these rates at which that difference exceeds 30 us, what engraved characters tolerate.",
-    ),
-    "dot_matrix_limit_Hz": Quantity(
-        "spread exceeds 200 us from",
-        "Hz",
-        "Lowest of these rates at which that difference exceeds 200 us, what dot-matrix printing tolerates.",
-    ),
-    "energy_per_dot_J": Quantity(
-        "energy per dot", "J", "Work of the coil on the armature in the cycle of a single pulse."
-    ),
-    "pack_loss_J": Quantity("pack loss", "J", "What the pack keeps of it."),
-    "backstop_loss_J": Quantity("backstop loss", "J", "What the backstop takes of it."),
-    "settle_out_s": Quantity(
-        "settle-out",
+        "longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms",
+        name="chaos onset",
+    )
+    flight_time_spread_s: float = scalar(
         "s",
-        "Time from the firing of a single pulse to the end of the last rebound higher than a hundredth of the"
-        " stroke.",
-    ),
-    "print_force_N": Quantity(
-        "print force",
+        "largest difference of flight times within a burst of nine pulses, over rates from 500 to 1250 Hz on"
+        " a grid of 5 Hz",
+        more="lost dots have none",
+        name="flight-time spread",
+    )
+    engraved_limit_Hz: float | None = scalar(
+        "Hz",
+        "lowest of these rates at which that difference exceeds 30 us, what engraved characters tolerate",
+        name="spread exceeds 30 us from",
+    )
+    dot_matrix_limit_Hz: float | None = scalar(
+        "Hz",
+        "lowest of these rates at which that difference exceeds 200 us, what dot-matrix printing tolerates",
+        name="spread exceeds 200 us from",
+    )
+    energy_per_dot_J: float = scalar(
+        "J", "work of the coil on the armature in the cycle of a single pulse", name="energy per dot"
+    )
+    pack_loss_J: float = scalar("J", "what the pack keeps of it", name="pack loss")
+    backstop_loss_J: float = scalar("J", "what the backstop takes of it", name="backstop loss")
+    settle_out_s: float = scalar(
+        "s",
+        "time from the firing of a single pulse to the end of the last rebound higher than a hundredth of the"
+        " stroke",
+        name="settle-out",
+    )
+    print_force_N: float = scalar(
         "N",
-        "Peak force of the single-pulse dot. Mass and all forces scale together without a change of the"
-        " motion; it sets that scale.",
-    ),
-}
-"""Every conclusion, by the name of its field in `Conclusions`; the unit is the end of the name."""
-
-
-@dataclass(frozen=True)
-class Conclusions:
-    """The conclusions about one hammer; what they are is said by `QUANTITIES`. None: it has none."""
-
-    safe_rate_Hz: float | None
-    chaos_onset_s: float | None
-    flight_time_spread_s: float
-    engraved_limit_Hz: float | None
-    dot_matrix_limit_Hz: float | None
-    energy_per_dot_J: float
-    pack_loss_J: float
-    backstop_loss_J: float
-    settle_out_s: float
-    print_force_N: float
+        "peak force of the single-pulse dot",
+        more="mass and all forces scale together without a change of the motion; it sets that scale",
+        name="print force",
+    )
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values by name, for JSON."""
         return asdict(self)
+
+
+QUANTITIES: Final = columns_of(Conclusions)
+"""Every conclusion, by the name of its field in `Conclusions`: its `unit`, its `meaning`, and as `name` a few
+words."""
 
 
 def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
@@ -152,7 +132,7 @@ def rate_from_rest(context: Context) -> float | None:
     force, flight = context.print_force, context.dot.flight_time
     assert flight is not None
     first, last, step = GRID
-    found = safe_rate(
+    rate = safe_rate(
         context.hammer,
         nominal=SinglePulse(force, flight),
         first=first,
@@ -160,8 +140,8 @@ def rate_from_rest(context: Context) -> float | None:
         step=step,
         cycle=False,
         tolerance=context.tolerance,
-    )
-    return None if math.isnan(found.rate) else found.rate
+    ).rate
+    return None if math.isnan(rate) else rate
 
 
 def settle_out(context: Context) -> float:
@@ -187,8 +167,8 @@ def chaos_onset(context: Context) -> float | None:
     periods: list[float] = [
         round(first - ONSET_STEP * k, 12) for k in range(round((first - last) / ONSET_STEP) + 1)
     ]
-    for start in range(0, len(periods), _TOGETHER):
-        some = periods[start : start + _TOGETHER]
+    for start in range(0, len(periods), _AT_ONCE):
+        some = periods[start : start + _AT_ONCE]
         for period, verdict in zip(
             some, scan(context.hammer, some, tolerance=context.tolerance), strict=True
         ):
@@ -200,13 +180,9 @@ def chaos_onset(context: Context) -> float | None:
 def flight_times(context: Context) -> tuple[float, dict[str, float | None]]:
     """Return the largest flight-time spread of bursts, s, and the rates, Hz, at which it exceeds limits.
 
-    Returns
-    -------
-    largest : float
-        Largest peak-to-peak flight time of the struck dots of a burst, s.
-    limits : dict
-        By "engraved_s" and "dot_matrix_s" the lowest rate at which it exceeds that limit of the claim
-        `flight_time_spread`; None where it never does.
+    The spread is that of the struck dots of a burst, peak to peak. For "engraved_s" and "dot_matrix_s" the
+    rate is the lowest at which it exceeds that limit of the claim `flight_time_spread`; None where it never
+    does.
 
     Raises
     ------
@@ -223,7 +199,7 @@ def flight_times(context: Context) -> tuple[float, dict[str, float | None]]:
         for times, struck in zip(dots.flight_time, dots.struck, strict=True)
     ]
     limits = {
-        name: next((rate for rate, found in zip(rates, spreads, strict=True) if found > settings[name]), None)
+        name: next((rate for rate, wide in zip(rates, spreads, strict=True) if wide > settings[name]), None)
         for name in ("engraved_s", "dot_matrix_s")
     }
     return float(max(spreads)), limits

@@ -10,7 +10,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -27,7 +26,14 @@ from printhammer.reconstruction.family.log import LEAST_PANELS, Logged, read_log
 from printhammer.reconstruction.family.robustness import robustness
 from printhammer.reconstruction.family.shelf import Shelf
 from printhammer.reconstruction.judging.judged import FIGURE_11, STATED
-from printhammer.reconstruction.results import Family, Results, results_in, shipped_results
+from printhammer.reconstruction.results import (
+    Conclusion,
+    Family,
+    FamilyMember,
+    Results,
+    results_in,
+    shipped_results,
+)
 from printhammer.reconstruction.search.space import hammer_of, template
 from printhammer.run.ensemble import Ensemble
 from printhammer.support.outputs import make_folder, write_file
@@ -39,31 +45,15 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-LEAST: Final = 20
-"""Number of hammers that make a family at least."""
+LEAST: Final = 20  # Number of hammers that make a family at least
 
-COUNT: Final = 24
-"""Number of hammers of the family unless told otherwise."""
+COUNT: Final = 24  # Number of hammers of the family unless told otherwise
 
 FORMAT: Final = 1
 
 _PRINTED: Final = 2e-3
 _CELL: Final = 0.02
 _MOST: Final = 2000
-
-
-@dataclass(frozen=True)
-class Member:
-    """A hammer of the family, judged."""
-
-    constants: Mapping[str, float]
-    """Key of a hammer file to value, SI."""
-    verdicts: Mapping[str, str]
-    """Claim to "holds" or "fails": of kind "stated" as judged here, others as the log has them."""
-    panels: int
-    """Verdicts of Fig. 11 that are as printed."""
-    conclusions: Mapping[str, Any]
-    """See `printhammer.reconstruction.family.conclusions`."""
 
 
 def family_hammers(folder: str | Path | None = None) -> list[Hammer]:
@@ -110,7 +100,7 @@ def write_family(
     *,
     count: int = COUNT,
     least: int = LEAST,
-) -> list[Member]:
+) -> list[FamilyMember]:
     """Choose a family from logs of judged candidates, judge it, and write `family.json` and `family.csv`.
 
     What is judged is kept in `family.part.jsonl` in the folder until the family is complete, so that work
@@ -138,22 +128,22 @@ def write_family(
     tell = progress or (lambda _: None)
     paths = list(logs)
     logged = read_logs(paths)
-    found = promising(logged)
-    tell(f"{len(logged)} hammers in the logs, {len(found)} of them promising")
-    hammers = [hammer_of(row.constants) for row in found]
+    candidates = promising(logged)
+    tell(f"{len(logged)} hammers in the logs, {len(candidates)} of them promising")
+    hammers = [hammer_of(row.constants) for row in candidates]
     forces = print_forces(hammers)
     printing = np.flatnonzero(np.isfinite(forces)).tolist()
-    found, hammers = [found[i] for i in printing], [hammers[i] for i in printing]
-    if not found:
+    candidates, hammers = [candidates[i] for i in printing], [hammers[i] for i in printing]
+    if not candidates:
         raise InputError(_too_few(paths, 0, least))
-    tables = compared([row.constants for row in found], forces[printing].tolist())
+    tables = compared([row.constants for row in candidates], forces[printing].tolist())
     place = make_folder(folder)
     shelf = Shelf(place / "family.part.jsonl")
-    members: dict[int, Member] = {}
+    members: dict[int, FamilyMember] = {}
 
     def accept(number: int) -> bool:
-        member = _judged(found[number], hammers[number], shelf)
-        tell(f"{found[number].source}: {_described(member)}")
+        member = _judged(candidates[number], hammers[number], shelf)
+        tell(f"{candidates[number].source}: {_described(member)}")
         if member is not None:
             members[number] = member
         return member is not None
@@ -164,9 +154,12 @@ def write_family(
         chosen = max(chosen, choose(tables, count, accept, wide=False), key=len)
     if len(chosen) < least:
         raise InputError(_too_few(paths, len(chosen), least))
-    family = [members[number] for number in chosen]
+    family = [
+        members[number].model_copy(update={"name": f"family-{place:02d}"})
+        for place, number in enumerate(chosen, 1)
+    ]
     rows = [
-        dict(zip(_keys([row.constants for row in found]), tables[1][number], strict=True))
+        dict(zip(_keys([row.constants for row in candidates]), tables[1][number], strict=True))
         for number in chosen
     ]
     write_file(place / "family.csv", csv_text(family))
@@ -185,17 +178,17 @@ def promising(logged: Sequence[Logged], most: int = _MOST) -> list[Logged]:
 
     From `most` on, nearly equal hammers count once.
     """
-    found = sorted(
+    rows = sorted(
         (row for row in logged if row.promising),
         key=lambda row: (-(row.panels or 0), -sum(row.verdicts.values())),
     )
     cell = _CELL
-    while len(found) > most:
+    while len(rows) > most:
         cells: dict[tuple[tuple[str, float, int], ...], Logged] = {}
-        for row in found:
+        for row in rows:
             cells.setdefault(_cell(row.constants, cell), row)
-        found, cell = list(cells.values()), 1.5 * cell
-    return found
+        rows, cell = list(cells.values()), 1.5 * cell
+    return rows
 
 
 def _cell(constants: Mapping[str, float], width: float) -> tuple[tuple[str, float, int], ...]:
@@ -235,12 +228,15 @@ def compared(constants: Sequence[Mapping[str, float]], forces: Sequence[float]) 
 
 def _keys(constants: Sequence[Mapping[str, float]]) -> list[str]:
     """Return the keys that any of some hammers gives, and the amplitude, in the order of the hammer file."""
-    given = {key for row in constants for key in row} | {"waveform.amplitude"}
-    return [key for key in template().constants if key in given]
+    named = {key for row in constants for key in row} | {"waveform.amplitude"}
+    return [key for key in template().constants if key in named]
 
 
-def _judged(row: Logged, hammer: Hammer, shelf: Shelf) -> Member | None:
-    """Return a hammer of a log as a member of the family; None if it is none."""
+def _judged(row: Logged, hammer: Hammer, shelf: Shelf) -> FamilyMember | None:
+    """Return a hammer of a log as a member of the family, still without a name; None if it is none.
+
+    Verdicts of kind "stated" are as judged here, others as the log has them.
+    """
     known = shelf.get(hammer)
     if known is None:
         known = _judge(hammer)
@@ -249,11 +245,12 @@ def _judged(row: Logged, hammer: Hammer, shelf: Shelf) -> Member | None:
         return None
     logged = {name: "holds" if holds else "fails" for name, holds in row.verdicts.items()}
     verdicts = {**logged, **known["verdicts"]}
-    return Member(
-        row.constants,
-        {name: verdicts[name] for name in claims() if name in verdicts},
-        known["panels"],
-        known["conclusions"],
+    return FamilyMember(
+        name="",
+        constants=dict(row.constants),
+        verdicts={name: verdicts[name] for name in claims() if name in verdicts},
+        panels=known["panels"],
+        conclusions=known["conclusions"],
     )
 
 
@@ -261,25 +258,25 @@ def _judge(hammer: Hammer) -> dict[str, Any]:
     """Judge the stated claims, those that take longest last, and draw the conclusions if all is well."""
     context = Context(hammer)
     verdicts: dict[str, str] = {}
-    found: dict[str, Any] = {"member": False, "verdicts": verdicts, "panels": 0, "conclusions": {}}
+    judged: dict[str, Any] = {"member": False, "verdicts": verdicts, "panels": 0, "conclusions": {}}
     for name in STATED:
         verdicts[name] = judge(context, claims()[name]).verdict
         if verdicts[name] != "holds":
-            return found
+            return judged
     result = judge(context, claims()[FIGURE_11])
     verdicts[FIGURE_11] = result.verdict
-    found["panels"] = result.value["panels_as_printed"] if result.value is not None else 0
-    if found["panels"] < LEAST_PANELS:
-        return found
+    judged["panels"] = result.value["panels_as_printed"] if result.value is not None else 0
+    if judged["panels"] < LEAST_PANELS:
+        return judged
     try:
-        found["conclusions"] = conclude(hammer, context).as_dict()
+        judged["conclusions"] = conclude(hammer, context).as_dict()
     except NotMeasurableError:
-        return found
-    found["member"] = True
-    return found
+        return judged
+    judged["member"] = True
+    return judged
 
 
-def _described(member: Member | None) -> str:
+def _described(member: FamilyMember | None) -> str:
     if member is None:
         return "no member"
     rate, onset = member.conclusions["safe_rate_Hz"], member.conclusions["chaos_onset_s"]
@@ -288,30 +285,15 @@ def _described(member: Member | None) -> str:
     return f"a member, {member.panels} panels of Fig. 11 as printed, {safe}, {strange}"
 
 
-def named(number: int) -> str:
-    """Return the name of a member, the first one being number 0."""
-    return f"family-{number + 1:02d}"
-
-
-def json_text(family: Sequence[Member], gauged: Sequence[Mapping[str, float]]) -> str:
+def json_text(family: Sequence[FamilyMember], gauged: Sequence[Mapping[str, float]]) -> str:
     """Return the text of `family.json`, see `printhammer.reconstruction.results.Family`.
 
     `gauged` are the constants of the members at the common gauge, key to value, SI.
     """
-    told = robustness([dict(member.conclusions) for member in family], gauged)
-    rows = [
-        {
-            "name": named(number),
-            "constants": dict(member.constants),
-            "verdicts": dict(member.verdicts),
-            "panels": member.panels,
-            "conclusions": dict(member.conclusions),
-        }
-        for number, member in enumerate(family)
-    ]
-    hammers = ",\n".join(f"  {_table(row, 3)}" for row in rows)
+    hammers = ",\n".join(f"  {_table(member.model_dump(), 3)}" for member in family)
+    held = robustness([member.conclusions for member in family], gauged)
     conclusions = _table(
-        {name: {key: row[key] for key in ("low", "high", "robust", "text")} for name, row in told.items()}, 2
+        {name: {key: row[key] for key in Conclusion.model_fields} for name, row in held.items()}, 2
     )
     return f'{{\n "format": {FORMAT},\n "hammers": [\n{hammers}\n ],\n "conclusions": {conclusions}\n}}\n'
 
@@ -325,7 +307,7 @@ def _table(table: Mapping[str, Any], indent: int) -> str:
     return "{\n" + ",\n".join(lines) + f"\n{' ' * (indent - 1)}}}"
 
 
-def csv_text(family: Sequence[Member]) -> str:
+def csv_text(family: Sequence[FamilyMember]) -> str:
     """Return the text of `family.csv`: a row for each member, constants and conclusions with their units."""
     units = {key: constant.si_unit for key, constant in template().constants.items()}
     keys = _keys([member.constants for member in family])
@@ -341,10 +323,10 @@ def csv_text(family: Sequence[Member]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(heading)
-    for number, member in enumerate(family):
+    for member in family:
         writer.writerow(
             [
-                named(number),
+                member.name,
                 *(repr(member.constants[key]) if key in member.constants else "" for key in keys),
                 member.panels,
                 *("" if (value := member.conclusions[name]) is None else repr(value) for name in conclusions),

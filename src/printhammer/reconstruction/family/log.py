@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.reconstruction.judging.judged import STATED
 from printhammer.reconstruction.judging.log import Key, joined, key_of, read_judged
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -16,18 +16,13 @@ LEAST_PANELS: Final = 8
 """Number of verdicts of Fig. 11, of twelve, that a member of the family has as printed at least."""
 
 
-@dataclass(frozen=True)
-class Logged:
+class Logged(Declared):
     """A hammer of a log."""
 
-    constants: Mapping[str, float]
-    """Key of a hammer file to value, SI."""
-    verdicts: Mapping[str, bool]
-    """Claim to whether it holds, as far as it was judged."""
-    panels: int | None
-    """Verdicts of Fig. 11 that are as printed."""
-    source: str
-    """File, and place in it."""
+    constants: Mapping[str, float] = part("key of a hammer file to value, SI")
+    verdicts: Mapping[str, bool] = part("claim to whether it holds, as far as it was judged")
+    panels: int | None = part("verdicts of Fig. 11 that are as printed")
+    source: str = part("file, and place in it")
 
     @property
     def promising(self) -> bool:
@@ -47,12 +42,12 @@ def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
     InputError
         A file cannot be read, is no such log, or has no candidates.
     """
-    found: dict[Key, tuple[dict[str, Any], str]] = {}
+    hammers: dict[Key, tuple[dict[str, Any], str]] = {}
     for path in map(Path, paths):
         for number, row in enumerate(read_judged(path, some=True), 1):
             key = key_of(row["constants"])
-            before, source = found.get(key, (None, f"{path}, candidate {number}"))
-            found[key] = joined(before, row), source
+            before, source = hammers.get(key, (None, f"{path}, candidate {number}"))
+            hammers[key] = joined(before, row), source
     return [
         Logged(
             {key: float(value) for key, value in row["constants"].items()},
@@ -60,5 +55,5 @@ def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
             row.get("panels"),
             source,
         )
-        for row, source in found.values()
+        for row, source in hammers.values()
     ]

@@ -8,13 +8,12 @@ from printhammer.errors import InputError
 from printhammer.reconstruction.family.choice import at_gauge
 from printhammer.reconstruction.family.family import family_table, print_forces
 from printhammer.reconstruction.family.robustness import robustness
-from printhammer.reconstruction.results import shipped_results
+from printhammer.reconstruction.results import Results, shipped_results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.reconstruction.results import Results
 
 
 def family_picture(hammer: Hammer, results: Results | None = None) -> Figure:
@@ -55,6 +54,6 @@ def family_picture(hammer: Hammer, results: Results | None = None) -> Figure:
         for row in table.hammers
     ]
     conclusions = [row.conclusions for row in table.hammers]
-    told = robustness(conclusions, members)
-    shown = {name: entry for name, entry in told.items() if entry["kind"] == "quantity"}
+    held = robustness(conclusions, members)
+    shown = {name: entry for name, entry in held.items() if entry["kind"] == "quantity"}
     return family(hammer, [own, *members], conclusions, shown)

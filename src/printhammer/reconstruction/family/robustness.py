@@ -9,40 +9,36 @@ random sample: ranges are those of its members, and correlations hold among them
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from statistics import median
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims.definition import claims
 from printhammer.claims.shapes import rank_correlation
 from printhammer.reconstruction.family.conclusions import QUANTITIES
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 Values = dict[str, Any]
 
-ROBUST: Final = 0.1
-"""Spread over median below which a conclusion is robust."""
+ROBUST: Final = 0.1  # Spread over median below which a conclusion is robust
 
-SIGNIFICANT: Final = 0.05
-"""Probability with which any constant would seem to decide a conclusion by chance."""
+SIGNIFICANT: Final = 0.05  # Probability with which any constant would seem to decide a conclusion by chance
 
 _FEWEST: Final = 4
 _SCALING: Final = ("J", "N")
 
 
-@dataclass(frozen=True)
-class Statement:
+class Statement(Declared):
     """Something that the paper says in general, as a margin by which it is true of a hammer."""
 
-    text: str
-    """The statement."""
-    source: str
-    """Where the paper says it."""
-    unit: str
-    """SI unit of the margin."""
-    margin: Callable[[Values], float]
-    """Conclusions of a hammer to the margin; the statement is true where it is positive."""
+    text: str = part("the statement")
+    source: str = part("where the paper says it")
+    unit: str = part("SI unit of the margin")
+    margin: Callable[[Values], float] = part(
+        "conclusions of a hammer to the margin", more="the statement is true where it is positive"
+    )
 
 
 def _tolerated(name: str) -> float:
@@ -112,36 +108,31 @@ def robustness(
         rank correlation), of a statement `held` (number of members of which it is true) and `source`. The
         values of a statement are its margins.
     """
-    found: dict[str, dict[str, Any]] = {}
+    rows: dict[str, dict[str, Any]] = {}
     for name, quantity in QUANTITIES.items():
         values = [row[name] for row in conclusions]
-        found[name] = {
+        rows[name] = {
             "kind": "quantity",
-            "title": quantity.title,
+            "title": quantity.name,
             "unit": quantity.unit,
             **_quantity(values, constants, quantity.unit in _SCALING),
         }
     for name, statement in STATEMENTS.items():
-        found[name] = {
+        rows[name] = {
             "kind": "statement",
             "title": statement.text,
             "unit": statement.unit,
             **_statement(statement, conclusions),
         }
-    return found
+    return rows
 
 
 def _range(values: Sequence[float]) -> dict[str, Any]:
-    ordered = sorted(values)
-    middle = len(ordered) // 2
-    median = None
-    if ordered:
-        median = ordered[middle] if len(ordered) % 2 else 0.5 * (ordered[middle - 1] + ordered[middle])
     return {
-        "known": len(ordered),
-        "low": ordered[0] if ordered else None,
-        "high": ordered[-1] if ordered else None,
-        "median": median,
+        "known": len(values),
+        "low": min(values, default=None),
+        "high": max(values, default=None),
+        "median": median(values) if values else None,
     }
 
 
@@ -155,21 +146,23 @@ def _quantity(
     close = len(known) == len(values) and spread is not None and spread < ROBUST
     robust = bool(values) and (close or not known)
     correlations = {
-        key: found
+        key: correlation
         for key in constants[0]
-        if (found := rank_correlation([constants[i][key] for i in rows], known)) is not None
+        if (correlation := rank_correlation([constants[i][key] for i in rows], known)) is not None
     }
-    decisive = decisive_constants(correlations, len(known))
+    decisive = list(decisive_constants(correlations, len(known)).items())[:3]
+    named = ", ".join(f"{key} (rank correlation {value:+.2f})" for key, value in decisive)
     if not known:
         text = "Robust: no member of the family has it."
     elif robust:
         text = f"Robust: within {spread:.1%} over the family."
     else:
         share = f"varies by {spread:.0%} of its median" if spread is not None else "varies"
+        deciding = f"most with {named}" if named else "no single constant decides"
         missing = (
             f" and {len(values) - len(known)} members do not have it" if len(known) < len(values) else ""
         )
-        text = f"Depends on what the paper did not print: it {share}{missing}; {_decided(decisive)}."
+        text = f"Depends on what the paper did not print: it {share}{missing}; {deciding}."
     if scaling:
         text += " It scales with the print force, which is the same for all members by choice."
     return {**ends, "spread": spread, "robust": robust, "text": text, "correlations": correlations}
@@ -187,15 +180,8 @@ def decisive_constants(correlations: Mapping[str, float], count: int) -> dict[st
         return {}
     bound = float(student.isf(0.5 * SIGNIFICANT / len(correlations), count - 2))
     least = bound / math.sqrt(count - 2 + bound * bound)
-    strong = {key: found for key, found in correlations.items() if abs(found) > least}
+    strong = {key: value for key, value in correlations.items() if abs(value) > least}
     return dict(sorted(strong.items(), key=lambda item: -abs(item[1])))
-
-
-def _decided(decisive: Mapping[str, float]) -> str:
-    if not decisive:
-        return "no single constant decides"
-    told = [f"{key} (rank correlation {value:+.2f})" for key, value in list(decisive.items())[:3]]
-    return f"most with {', '.join(told)}"
 
 
 def _statement(statement: Statement, conclusions: Sequence[Values]) -> dict[str, Any]:

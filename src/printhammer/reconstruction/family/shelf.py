@@ -23,7 +23,7 @@ class Shelf:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._found: dict[str, dict[str, Any]] = {}
+        self._judged: dict[str, dict[str, Any]] = {}
         for line in read_text(path).split("\n"):
             row = read_object(line) or {}
             if (
@@ -31,11 +31,11 @@ class Shelf:
                 and isinstance(row.get("fingerprint"), str)
                 and "judged" in row
             ):
-                self._found[row["fingerprint"]] = row["judged"]
+                self._judged[row["fingerprint"]] = row["judged"]
 
     def get(self, hammer: Hammer) -> dict[str, Any] | None:
         """Return what is known of a hammer; None if nothing is."""
-        return self._found.get(hammer.fingerprint)
+        return self._judged.get(hammer.fingerprint)
 
     def put(self, hammer: Hammer, judged: dict[str, Any]) -> None:
         """Keep what was found about a hammer.
@@ -45,7 +45,7 @@ class Shelf:
         InputError
             The file cannot be written.
         """
-        self._found[hammer.fingerprint] = judged
+        self._judged[hammer.fingerprint] = judged
         row = {"version": __version__, "fingerprint": hammer.fingerprint, "judged": judged}
         append(self._path, "\n" + json.dumps(row))
 

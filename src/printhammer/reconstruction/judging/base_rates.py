@@ -22,10 +22,9 @@ from printhammer.reconstruction.search.losses import run_all
 from printhammer.reconstruction.search.space import VARIABLES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
     from concurrent.futures import Executor
 
-    from printhammer.reconstruction.search.candidates import Candidate
 
 STROKE: Final = "single_pulse_stroke"
 MASSES: Final = (0.05e-3, 2e-3)
@@ -38,23 +37,19 @@ _NEAR: Final = 1e-6
 def draw(count: int, seed: int) -> list[dict[str, float]]:
     """Return the constants of so many random hammers with the printed stroke, SI."""
     rng = np.random.default_rng([seed, 0])
-    found: list[dict[str, float]] = []
-    while len(found) < count:
+    drawn: list[dict[str, float]] = []
+    while len(drawn) < count:
         points = [rng.random(len(VARIABLES)) for _ in range(_BATCH)]
         printing = [candidate for candidate in candidates(points) if candidate is not None]
-        back = _back(printing)
-        found += [one.constants for one, returns in zip(printing, back, strict=True) if returns]
-    return found[:count]
-
-
-def _back(printing: Sequence[Candidate]) -> list[bool]:
-    """Tell which hammers are back at the backstop, all but at rest, some time after a single pulse."""
-    drives = [PulseTrain(candidate.waveform) for candidate in printing]
-    ends = [CYCLE] * len(printing)
-    table = run_all(printing, drives, ends, 1, strobes=[np.array([end]) for end in ends]).strobes
-    assert table is not None
-    rests = np.array([candidate.rest for candidate in printing])
-    return [bool(near) for near in np.abs(table.x[:, 0] - rests) < _NEAR]
+        drives = [PulseTrain(candidate.waveform) for candidate in printing]
+        ends = [CYCLE] * len(printing)
+        table = run_all(printing, drives, ends, 1, strobes=[np.array([end]) for end in ends]).strobes
+        assert table is not None
+        # Those that are back at the backstop, all but at rest, some time after a single pulse.
+        for candidate, x in zip(printing, table.x[:, 0].tolist(), strict=True):
+            if abs(x - candidate.rest) < _NEAR:
+                drawn.append(candidate.constants)
+    return drawn[:count]
 
 
 def _judged(task: tuple[dict[str, float], float, bool]) -> dict[str, Any]:

@@ -34,10 +34,10 @@ def plain_panels(hammer: Hammer, tolerance: float = TOLERANCE) -> dict[str, tupl
     """
     printed = printed_verdicts()
     periods = list(printed)
-    found = strobes(hammer, periods, points=1, threads=1, tolerance=tolerance)
+    strobed = strobes(hammer, periods, points=1, threads=1, tolerance=tolerance)
     return {
-        panel_name(period): ("" if one.verdict is None else one.verdict.name, printed[period])
-        for period, one in zip(periods, found, strict=True)
+        panel_name(period): ("" if strobe.verdict is None else strobe.verdict.name, printed[period])
+        for period, strobe in zip(periods, strobed, strict=True)
     }
 
 
@@ -60,11 +60,11 @@ def row_of(constants: Mapping[str, float], names: Iterable[str], *, panels: bool
                 key: (result.value or {}).get(key) for key in known[name].band if result.value is not None
             }
     if panels:
-        found = plain_panels(hammer)
-        right = sum(name == printed for name, printed in found.values())
+        verdicts = plain_panels(hammer)
+        right = sum(name == printed for name, printed in verdicts.values())
         row["panels"] = right
-        row["panel_verdicts"] = {panel: name for panel, (name, _printed) in found.items()}
-        whole = right == len(found) and judge(context, known[FIGURE_11]).verdict == "holds"
+        row["panel_verdicts"] = {panel: name for panel, (name, _printed) in verdicts.items()}
+        whole = right == len(verdicts) and judge(context, known[FIGURE_11]).verdict == "holds"
         row["verdicts"][FIGURE_11] = whole
     return row
 

@@ -34,14 +34,14 @@ def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
     InputError
         The file cannot be read, is no such log, or has no candidates where there must be some.
     """
-    found: dict[Key, dict[str, Any]] = {}
+    candidates: dict[Key, dict[str, Any]] = {}
     for number, line in enumerate(read_text(path).split("\n")[:-1], 1):
         row = _row(line, f"{path}, line {number}")
         key = key_of(row["constants"])
-        found[key] = joined(found.get(key), row)
-    if some and not found:
+        candidates[key] = joined(candidates.get(key), row)
+    if some and not candidates:
         raise InputError(f"{path}: expected judged candidates, and there are none")
-    return list(found.values())
+    return list(candidates.values())
 
 
 def joined(before: dict[str, Any] | None, row: dict[str, Any]) -> dict[str, Any]:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import sqrt
 from statistics import NormalDist
 from typing import Any, Final
 
-CONFIDENCE: Final = 0.95
-"""Of the interval of a share."""
+from printhammer.results import Declared, part
+
+CONFIDENCE: Final = 0.95  # Of the interval of a share
 
 _Z: Final = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)
 
 
-@dataclass(frozen=True)
-class Share:
+class Share(Declared):
     """Of `measured` hammers something holds for `holds`."""
 
-    measured: int
-    """Number of hammers, at least one."""
-    holds: int
-    """Number of those for which it holds."""
+    measured: int = part("number of hammers, at least one")
+    holds: int = part("number of those for which it holds")
 
     @property
     def rate(self) -> float:

@@ -17,11 +17,9 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
-APART: Final = 0.01
-"""Least distance of two candidates of a shortlist in one variable, in shares of its range."""
+APART: Final = 0.01  # Least distance of two candidates of a shortlist in one variable, in shares of its range
 
-DIGITS: Final = 6
-"""Digits of the constants that are judged and shipped."""
+DIGITS: Final = 6  # Digits of the constants that are judged and shipped
 
 _TOGETHER: Final = 8
 
@@ -71,15 +69,15 @@ def judge_candidates(
     known = {key_of(row["constants"]): row for row in read_judged(path)}
     mend(path)
     tasks = []
-    for key, constants in {key_of(one): one for one in wanted}.items():
+    for key, constants in {key_of(candidate): candidate for candidate in wanted}.items():
         there = known[key]["verdicts"] if key in known else {}
         missing = tuple(name for name in names if name not in there and name != FIGURE_11)
         if missing or FIGURE_11 not in there:
             tasks.append((constants, missing, FIGURE_11 not in there))
     for start in range(0, len(tasks), _TOGETHER):
         some = tasks[start : start + _TOGETHER]
-        found = map(_judge, some) if pool is None else pool.map(_judge, some)
-        for done, row in enumerate(found, start + 1):
+        rows = map(_judge, some) if pool is None else pool.map(_judge, some)
+        for done, row in enumerate(rows, start + 1):
             append(path, text_of(row))
             key = key_of(row["constants"])
             known[key] = joined(known.get(key), row)

@@ -24,8 +24,7 @@ CHEAP: Final = (
 )
 """Claims that make the region, as far as they lead the search."""
 
-MOST: Final = 3000
-"""Points of the region that are remembered."""
+MOST: Final = 3000  # Points of the region that are remembered
 
 _FEW: Final = 24
 _NEARLY: Final = 0.3
@@ -34,15 +33,7 @@ _TRIES: Final = 4
 
 
 class Explorer:
-    """Points of the region, and proposals for more.
-
-    Parameters
-    ----------
-    weights : mapping
-        Of the claims that lead.
-    rng : Generator
-        Decides.
-    """
+    """Points of the region, and proposals for more; `weights` are those of the claims that lead."""
 
     def __init__(self, weights: dict[str, float], rng: np.random.Generator) -> None:
         self._names = [name for name in CHEAP if name in weights]
@@ -67,7 +58,7 @@ class Explorer:
     def ask(self, count: int) -> list[FloatArray]:
         """Return points to try."""
         known = self._inside if len(self._inside) >= _FEW else [*self._inside, *self._nearest]
-        found = []
+        proposed = []
         for _ in range(count):
             few = self._rng.integers(len(known), size=_TRIES)
             base = min((known[i] for i in few), key=lambda row: float(row["total"]))
@@ -77,7 +68,7 @@ class Explorer:
             noise = _NOISE * self._rng.standard_normal(len(change))
             point = np.array(base["point"]) + change + noise
             # What leaves the ranges comes back from their ends.
-            found.append(
+            proposed.append(
                 np.clip(np.where(point < 0.0, -point, np.where(point > 1.0, 2.0 - point, point)), 0, 1)
             )
-        return found
+        return proposed

@@ -79,8 +79,8 @@ class Log:
             raise InputError(f"{path}: expected JSON lines of a search, each an object")
         for key, value in heading.items():
             if rows[0].get(key) != value:
-                told = f"{key} = {_short(rows[0].get(key))}, expected {_short(value)}"
-                raise InputError(f"{path}: the log of another search: {told}")
+                before, wanted = (shown(json.dumps(v), quotes=False) for v in (rows[0].get(key), value))
+                raise InputError(f"{path}: the log of another search: {key} = {before}, expected {wanted}")
         if broken:
             append(path, "", "log", kept=whole + "\n")
         self._rows = rows[1:]
@@ -104,8 +104,3 @@ class Log:
             if not np.array_equal(row.get("point", ()), point):
                 raise InputError(f"{self.path}: candidate {number} is not the one of this search")
         return there
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -6,25 +6,23 @@ on where it was: what the log holds is not computed again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import load
-from printhammer.reconstruction.search.evaluation import AIMS, WEIGHTS, losses_digest, scored
+from printhammer.reconstruction.search.evaluation import AIMS, WEIGHTS, Aim, losses_digest, scored
 from printhammer.reconstruction.search.explorer import Explorer
 from printhammer.reconstruction.search.log import Log, read_search
-from printhammer.reconstruction.search.space import SHAPES, VARIABLES, point_of, values_of
+from printhammer.reconstruction.search.space import SHAPES, VARIABLES, Shape, point_of, values_of
+from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from concurrent.futures import Executor
     from pathlib import Path
 
-    from printhammer.reconstruction.search.evaluation import Aim
-    from printhammer.reconstruction.search.space import Shape
     from printhammer.support.arrays import FloatArray
 
 FORMAT: Final = 1
@@ -39,11 +37,9 @@ POPULATION: Final = 16
 SIGMA: Final = 0.08
 """Largest first step length of an island, in shares of the ranges."""
 
-PATIENCE: Final = 30
-"""Generations without gain after which an island begins anew."""
+PATIENCE: Final = 30  # Generations without gain after which an island begins anew
 
-_SEEDS: Final = 200
-"""Best points known from which islands begin."""
+_SEEDS: Final = 200  # Best points known from which islands begin
 
 _FAVOUR: Final = 2.0
 _TOGETHER: Final = 128
@@ -53,20 +49,16 @@ STARTS: Final = 64
 """Points taken over from another search."""
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(Declared):
     """What decides on a search."""
 
-    aim: Aim
-    """Which claims lead, one of `AIMS`."""
-    seed: int
-    """Of everything random."""
-    sample: int = SAMPLE
-    """Points of the wide sample."""
-    starts: tuple[tuple[float, ...], ...] = ()
-    """Further points from which islands may begin, such as the best of another search."""
-    shape: Shape = "rectangle"
-    """Waveform of the hammers."""
+    aim: Aim = part("which claims lead, one of `AIMS`")
+    seed: int = part("of everything random")
+    sample: int = part("points of the wide sample", default=SAMPLE)
+    starts: tuple[tuple[float, ...], ...] = part(
+        "further points from which islands may begin, such as the best of another search", default=()
+    )
+    shape: Shape = part("waveform of the hammers", default="rectangle")
 
     def heading(self) -> dict[str, Any]:
         """Return the first line of the log."""
@@ -138,6 +130,8 @@ def search(
     InputError
         The log is that of another search, or the package that searches is not installed.
     """
+    from scipy.stats import qmc
+
     _strategies()
     log = Log(path, plan.heading())
     place, best = 0, None
@@ -147,18 +141,21 @@ def search(
         there = log.known(place, points)
         fresh = scored(points[len(there) :], plan.aim, pool, plan.shape) if len(there) < len(points) else []
         log.append(fresh)
-        found = [*there, *fresh]
-        place += len(found)
-        for row in found:
+        rows = [*there, *fresh]
+        place += len(rows)
+        for row in rows:
             if best is None or row["total"] < best["total"]:
                 best = row
         if tell is not None and best is not None:
             tell(place, best["total"], best)
-        return found
+        return rows
 
     rng = np.random.default_rng([plan.seed, AIMS.index(plan.aim), SHAPES.index(plan.shape)])
     start: list[dict[str, Any]] = []
-    points = [*(np.array(point) for point in plan.starts), *_wide(plan, rng)]
+    points = [
+        *(np.array(point) for point in plan.starts),
+        *qmc.Sobol(len(VARIABLES), seed=rng).random(plan.sample),
+    ]
     for first in range(0, len(points), _TOGETHER):
         for row in batch(points[first : first + _TOGETHER]):
             start.append(row)
@@ -169,24 +166,17 @@ def search(
     islands = [_Island(start, rng) for _ in range(ISLANDS)]
     while True:
         asked = [point for island in islands for point in island.ask()]
-        found = batch(asked + explorer.ask(EXPLORED))
-        yield from found
-        explorer.note(found)
+        rows = batch(asked + explorer.ask(EXPLORED))
+        yield from rows
+        explorer.note(rows)
         for number, island in enumerate(islands):
-            own = found[number * POPULATION : (number + 1) * POPULATION]
+            own = rows[number * POPULATION : (number + 1) * POPULATION]
             island.tell(own)
             if island.done:
                 # What it found may be where another begins.
                 start.append(island.best)
                 start.sort(key=lambda row: row["total"])
                 islands[number] = _Island(start, rng)
-
-
-def _wide(plan: Plan, rng: np.random.Generator) -> list[FloatArray]:
-    from scipy.stats import qmc
-
-    sampler = qmc.Sobol(len(VARIABLES), seed=rng)
-    return list(sampler.random(plan.sample))
 
 
 def _strategies() -> Any:
@@ -219,9 +209,9 @@ class _Island:
     def ask(self) -> list[FloatArray]:
         return [self._strategy.ask() for _ in range(POPULATION)]
 
-    def tell(self, found: list[dict[str, Any]]) -> None:
-        self._strategy.tell([(np.array(row["point"]), row["total"]) for row in found])
-        best = min(found, key=lambda row: float(row["total"]))
+    def tell(self, rows: list[dict[str, Any]]) -> None:
+        self._strategy.tell([(np.array(row["point"]), row["total"]) for row in rows])
+        best = min(rows, key=lambda row: float(row["total"]))
         self._since = 0 if best["total"] < self._least - _GAIN else self._since + 1
         if best["total"] < self._least:
             self._least, self.best = best["total"], best
