@@ -8,7 +8,7 @@ from measured import MOTION, Cell, Column, write
 
 from printhammer.reconstruction.results import shipped_results
 
-ROOMS = (*MOTION, "chaos/strobe", "reconstruction/judging/schemes", "reconstruction/search/space")
+ROOMS = (*MOTION, "chaos", "claims", "derivatives", "maps", "printing", "reconstruction")
 
 
 def main() -> None:
