@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.figures.elements.style import BLUE, INK, MUTED, ORANGE, SMALL, THIN, foot, new_figure, styled
 
@@ -40,9 +40,8 @@ def plot(front: Front) -> Figure:
             ax.scatter(x, y, s=area, facecolor=face, edgecolor=BLUE, lw=THIN, label=name, zorder=2.0)
     best = sorted({(int(p), int(o)) for p, o in zip(front.panels, front.others, strict=True)})
     corners = [(p, o) for p, o in best if not any(q >= p and r >= o and (q, r) != (p, o) for q, r in best)]
-    ax.plot(
-        *zip(*corners, strict=True), color=ORANGE, lw=THIN, ds="steps-pre", label="Pareto front", zorder=1.0
-    )
+    ring: dict[str, Any] = {"marker": "o", "ms": 9.0, "mfc": "none", "label": "Pareto front"}
+    ax.plot(*zip(*corners, strict=True), color=ORANGE, lw=THIN, ds="steps-pre", **ring)
     ax.margins(0.08)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
