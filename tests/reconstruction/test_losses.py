@@ -210,18 +210,25 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
     chosen = some_candidates(5, 5, 9)[-5:]
     scores = [Score() for _ in chosen]
     panels(chosen, scores)
-    right, off = 0, []
+    right, seen, off = 0, 0, []
     for candidate, score in zip(chosen, scores, strict=True):
         found = [name for name, _printed in plain_panels(candidate.hammer).values()]
-        right += sum(mine == name for mine, name in zip(score.measured["verdicts"], found, strict=True))
+        # Where the hard panels do badly the others are not looked at.
+        looked_at = [
+            (mine, name) for mine, name in zip(score.measured["verdicts"], found, strict=True) if mine
+        ]
+        right += sum(mine == name for mine, name in looked_at)
+        seen += len(looked_at)
         assert 0.0 <= score.losses["poincare"] <= 1.0
         share = (judge(Context(candidate.hammer), claims()["poincare_window"]).value or {}).get(
             "least_share_inside"
         )
         assert share is not None
-        off.append(abs(score.measured["least_share"] - share))
+        if len(looked_at) == len(found):
+            off.append(abs(score.measured["least_share"] - share))
     # Where a strange train goes depends on the tolerance, and the search looks at fewer firings than the
     # claim: within two standard errors of a share among so many.
     assert np.median(off) < 2.0 * math.sqrt(0.25 / FIRINGS)
     # A short train tells period from chaos in most panels; the claim alone decides.
-    assert right > 0.75 * 12 * len(chosen)
+    assert right > 0.75 * seen
+    assert seen > 12
