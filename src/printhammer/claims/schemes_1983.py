@@ -12,11 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.strobe.schemes_1983 import scheme_strobes
 from printhammer.claims.context import TAIL, Context
-from printhammer.claims.definition import claims
 from printhammer.claims.judging import JudgedClaim, judge_all
-from printhammer.claims.verdicts import PANELS, printed_verdicts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -63,7 +60,4 @@ def judge_as_in_1983(
     hammer: Hammer, scheme: Scheme = "runge-kutta-4", progress: Callable[[str], None] | None = None
 ) -> list[JudgedClaim]:
     """Judge the claims in `COMPUTED` from what a scheme of 1983 computes; `progress` as for `judge_all`."""
-    context = SchemeContext(hammer, scheme=scheme)
-    points = claims()["poincare_window"].settings["points"]
-    context.once(PANELS, lambda: scheme_strobes(hammer, [*printed_verdicts()], scheme, points=points))
-    return judge_all(hammer, COMPUTED, progress, context)
+    return judge_all(hammer, COMPUTED, progress, SchemeContext(hammer, scheme=scheme))

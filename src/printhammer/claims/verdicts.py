@@ -31,8 +31,7 @@ _CHANGED: Final[dict[str, Callable[[int], int]]] = {
 """How all constants of a hammer are changed at once: sign of the change by the number of the constant."""
 
 _APERIODIC: Final = "no period"
-PANELS: Final = "panels of Fig. 11"
-"""Under what name a context keeps the strobe points of Fig. 11."""
+_PANELS: Final = "panels of Fig. 11"
 
 
 def printed_verdicts() -> dict[float, str]:
@@ -61,7 +60,7 @@ def panel_strobes(context: Context) -> list[Strobe]:
     """Return the first points of the trains of Fig. 11, judged; those of the claim if it has been judged."""
     points = claims()["poincare_window"].settings["points"]
     return context.once(
-        PANELS,
+        _PANELS,
         lambda: strobes(context.hammer, [*printed_verdicts()], points=points, tolerance=context.tolerance),
     )
 
@@ -77,7 +76,7 @@ def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]
     )
     fine = strobes(context.hammer, periods, tolerance=_TIGHTER * context.tolerance)
     # For the figure, which shows the same trains.
-    context.once(PANELS, lambda: every[: len(periods)])
+    context.once(_PANELS, lambda: every[: len(periods)])
     by_variant = {}
     for number, name in enumerate((_PLAIN, *_CHANGED)):
         by_variant[name] = _verdicts(every[number * len(periods) : (number + 1) * len(periods)])

@@ -282,3 +282,17 @@ def test_from_the_search_to_the_hammer(cli: Callable, here: Path, monkeypatch: p
     assert Predictions.model_validate_json((here / "p.json").read_text()).hammers == int(
         all(row["verdicts"][name] for name in STATED)
     )
+
+
+def test_words_of_options_are_those_of_the_library() -> None:
+    from printhammer.cli.registry import VERBS
+    from printhammer.reconstruction.search.evaluation import AIMS
+    from printhammer.reconstruction.search.space import SHAPES
+    from printhammer.run.scheme_runs import READINGS
+
+    verbs = {verb.name: verb for verb in VERBS}
+    known = {("reconstruct search", "aim"): AIMS, ("reconstruct search", "waveform"): SHAPES}
+    for (name, option), words in {**known, ("figure", "reading"): READINGS}.items():
+        metavar = verbs[name].options[option].metavar
+        assert metavar is not None
+        assert sorted(metavar.split("|")) == sorted(words)
