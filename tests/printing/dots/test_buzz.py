@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
+from printhammer.printing.dots import buzz as module
 from printhammer.printing.dots.buzz import BuzzTrain, delayed_train, find_buzz_train, longest_run
 
 
@@ -56,6 +57,12 @@ def test_the_shipped_hammer(hammer: "ph.Hammer") -> None:
     else:
         assert_it_prints(hammer, found.train)
     assert found == find_buzz_train(hammer)
+
+
+def test_an_armature_that_is_back_at_once_has_delays_to_try(hammer: "ph.Hammer") -> None:
+    search = module._Search(hammer, 9, 6, module.FORCES, module.MAX_CURRENT)
+    search.back = search.leaving + 1e-6
+    assert search.result().tried >= module._PERIODS + 2
 
 
 def test_delayed_pulses_follow_the_leaving_of_the_pack(hammer: "ph.Hammer") -> None:

@@ -124,10 +124,10 @@ def find_buzz_train(
 
     Even trains come first, since they need no sensor: periods from half the flight time of a single pulse up
     to its return to the backstop, ever more finely around the best. If none does and stays clear from its
-    first dot on, delays from the leaving of the pack up to that return, every 2 us, each train built pulse by
-    pulse. A dot may come late: it is waited for three times as long as a single pulse takes from firing to
-    leaving the pack. Of several, a train that stays clear is preferred, then one with more dots, then the one
-    whose weakest dot is strongest. Same hammer, same result.
+    first dot on, delays from the leaving of the pack up to that return, every 2 us or four hundred of them,
+    each train built pulse by pulse. A dot may come late: it is waited for three times as long as a single
+    pulse takes from firing to leaving the pack. Of several, a train that stays clear is preferred, then one
+    with more dots, then the one whose weakest dot is strongest. Same hammer, same result.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[
     Raises
     ------
     InputError
-        The hammer has no waveform, no rest state, or its single pulse makes no dot.
+        The hammer has no waveform or no rest state.
     """
     leaving = _leaving(_run(hammer, [0.0], None))
     return (0.0,) if leaving is None else delayed_trains([hammer], [delay], [PATIENCE * leaving], pulses)[0]
@@ -297,7 +297,9 @@ class _Search:
         self._scan(np.linspace(0.5 * self.flight, self.back, _PERIODS, endpoint=False), self._even)
         if not self._done:
             way = self.back - self.leaving
-            self._scan(np.arange(0.0, way, max(_DELAY_STEP, way / _DELAYS)), self._delayed)
+            # At least two delays, where the armature is back at once.
+            step = min(max(_DELAY_STEP, way / _DELAYS), 0.5 * way)
+            self._scan(np.arange(0.0, way, step), self._delayed)
         if self.best is not None and self.best.count >= self.fewest:
             return BuzzSearch(self.best, "", self.best, self.reference, self.tried)
         count = self.best.count if self.best is not None else 0
