@@ -101,7 +101,7 @@ class Predictions(_Table):
 class Searched(_Table):
     """One search, by what decides on it and how far it came."""
 
-    aim: Literal["stated", "all", "panels", "buzz"] = Field(description="the claims that led")
+    aim: Literal["stated", "all", "panels", "buzz", "claims"] = Field(description="the claims that led")
     seed: int = Field(description="the seed of the search")
     candidates: _Count = Field(description="the number of hammers tried")
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 from printhammer.reconstruction.search.buzz_losses import buzz
 from printhammer.reconstruction.search.candidates import candidates
 from printhammer.reconstruction.search.losses import Score, hung, pairs, single_pulse, statics
+from printhammer.reconstruction.search.map_losses import sensitivity
 from printhammer.reconstruction.search.panel_losses import panels
 
 if TYPE_CHECKING:
@@ -21,9 +22,10 @@ if TYPE_CHECKING:
     from printhammer.reconstruction.search.space import Shape
     from printhammer.support.arrays import FloatArray
 
-Aim = Literal["stated", "all", "panels", "buzz"]
+Aim = Literal["stated", "all", "panels", "buzz", "claims"]
 """Which claims lead a search: those of kind "stated" alone; those of kind "shape" too; with these, a panel of
-Fig. 11 as much as a claim; or with these, buzz printing before all."""
+Fig. 11 as much as a claim; with these, buzz printing before all; or all of these and what Figs. 8, 9 and 11
+look like."""
 
 AIMS: Final[tuple[Aim, ...]] = get_args(Aim)
 
@@ -51,6 +53,14 @@ WEIGHTS: Final[dict[str, dict[str, float]]] = {
     "all": {**STATED, **SHAPE},
     "panels": {**STATED, **_FIRMER, "poincare": 9.0},
     "buzz": {**STATED, **_FIRMER, "poincare": 6.0, "buzz_printing": 8.0},
+    "claims": {
+        **STATED,
+        **_FIRMER,
+        "poincare": 9.0,
+        "buzz_printing": 3.0,
+        "successive_points_apart": 1.5,
+        "map_sensitivity": 1.5,
+    },
 }
 """Weights of the losses: first come the stated claims outside Fig. 11, which are conditions of all else; a
 claim of kind "shape" counts for as much as three panels of Fig. 11, or two where the panels lead. Buzz
@@ -62,13 +72,15 @@ PIECE: Final = 64
 _WORST_SINGLE: Final = 1.6
 _WORST_PAIRS: Final = 3.0
 _WORST_BUZZ: Final = 4.0
+_FEWEST_PANELS: Final = 5
+"""Panels of Fig. 11 as printed from which on a map is looked at."""
 
 
 @cache
 def losses_digest() -> str:
     """Return a digest of the sources that decide on the losses, so that logs of different ones do not mix."""
     digest = hashlib.sha256()
-    for name in ("space", "candidates", "losses", "buzz_losses", "panel_losses", "evaluation"):
+    for name in ("space", "candidates", "losses", "buzz_losses", "panel_losses", "map_losses", "evaluation"):
         digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
     return digest.hexdigest()[:16]
 
@@ -115,6 +127,9 @@ def evaluate(
     look(panels)
     if aim != "stated":
         look(hung)
+    if "map_sensitivity" in weights:
+        chosen = [i for i in chosen if scores[i].measured["panels"] >= _FEWEST_PANELS]
+        look(sensitivity)
     return list(zip(found, scores, strict=True))
 
 

@@ -38,6 +38,15 @@ HARD: Final = (1.35e-3, 1.2e-3, 1.1e-3, 0.9e-3)
 _WORST_HARD: Final = 2.6
 """Sum of their losses beyond which the others are not looked at."""
 
+PATIENT: Final = 2000
+"""Firings after which a panel has settled, as the claim has it."""
+
+_PROMISING: Final = 7
+"""Panels as printed from which on those that wander are looked at patiently: many settle late."""
+
+_POINTS: Final = 200
+"""Points of a panel whose successive ones are to be apart."""
+
 _AGREE: Final = 1e-8
 """Distance, in half-widths of the window, from which on a train counts as settled."""
 
@@ -62,19 +71,25 @@ def panels(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
         losses: list[dict[float, float]] = [{} for _ in some]
         names: list[dict[float, str]] = [{} for _ in some]
         shares: list[list[float]] = [[] for _ in some]
+        ratios: list[dict[float, float]] = [{} for _ in some]
         open_ = list(range(len(some)))
         for periods in (hard, rest):
             if open_:
                 looked_at = _looked_at([some[k] for k in open_], periods)
-                for k, (loss, name, share) in zip(open_, looked_at, strict=True):
+                for k, (loss, name, share, ratio) in zip(open_, looked_at, strict=True):
                     losses[k] |= dict(zip(periods, loss, strict=True))
                     names[k] |= dict(zip(periods, name, strict=True))
                     shares[k] += share
+                    ratios[k] |= dict(zip(periods, ratio, strict=True))
             open_ = [k for k in open_ if sum(losses[k].values()) <= _WORST_HARD]
+        for k in open_:
+            if sum(names[k][period] == wanted for period, wanted in printed.items()) >= _PROMISING:
+                _wait(some[k], losses[k], names[k])
         for k, score in enumerate(own):
             score.losses["poincare"] = sum(losses[k].get(period, 1.0) for period in printed) / len(printed)
             if len(losses[k]) == len(printed):
                 score.losses["poincare_window"] = hinge(_least_share() - min(shares[k]), _least_share())
+                score.losses["successive_points_apart"] = _successive(ratios[k])
             score.measured |= {
                 "panels": sum(names[k].get(period) == wanted for period, wanted in printed.items()),
                 "verdicts": [names[k].get(period, "") for period in printed],
@@ -82,34 +97,65 @@ def panels(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
             }
 
 
+def _wait(candidate: Candidate, losses: dict[float, float], names: dict[float, str]) -> None:
+    """Look for longer at panels that are strange as printed; what settles after all takes another loss."""
+    periods = [
+        period for period, wanted in printed_verdicts().items() if names[period] == wanted == "strange"
+    ]
+    if periods:
+        ((loss, name, _share, _ratio),) = _looked_at([candidate], periods, PATIENT)
+        losses |= dict(zip(periods, loss, strict=True))
+        names |= dict(zip(periods, name, strict=True))
+
+
+def _successive(ratios: dict[float, float]) -> float:
+    """Return how far the panels that should be strange are from points that jump about."""
+    claim = claims()["successive_points_apart"]
+    wanted = claim.settings["least_ratio"]
+    strange = sorted(
+        (ratios[period] for period, name in printed_verdicts().items() if name == "strange"), reverse=True
+    )
+    return hinge(wanted - strange[claim.band["panels_apart"]["at_least"] - 1], wanted)
+
+
+def _ratio(states: FloatArray) -> float:
+    """Return the median distance of successive points over that of any two; 0 where all are the same."""
+    from scipy.spatial.distance import pdist
+
+    points = states[:_POINTS, :2] / _scales()[:2]
+    pairs = float(np.median(pdist(points)))
+    return float(np.median(np.linalg.norm(np.diff(points, axis=0), axis=1))) / pairs if pairs > 0.0 else 0.0
+
+
 def _looked_at(
-    some: Sequence[Candidate], periods: Sequence[float]
-) -> list[tuple[list[float], list[str], list[float]]]:
-    """Return for each candidate the losses of panels, the verdicts, and the shares inside the window."""
+    some: Sequence[Candidate], periods: Sequence[float], firings: int = FIRINGS
+) -> list[tuple[list[float], list[str], list[float], list[float]]]:
+    """Return for each candidate losses and verdicts of panels, shares inside the window, and `_ratio`."""
     printed = printed_verdicts()
     drives = [
-        PulseTrain(candidate.waveform, period=period, pulses=FIRINGS + 1)
+        PulseTrain(candidate.waveform, period=period, pulses=firings + 1)
         for candidate in some
         for period in periods
     ]
-    ends = [period * FIRINGS for _ in some for period in periods]
+    ends = [period * firings for _ in some for period in periods]
     table = run_all(some, drives, ends, len(periods), strobes="firings").strobes
     assert table is not None
     wandering: list[tuple[int, int, int, FloatArray]] = []
-    looked_at: list[tuple[list[float], list[str], list[float]]] = []
+    looked_at: list[tuple[list[float], list[str], list[float], list[float]]] = []
     for k in range(len(some)):
-        losses, names, shares = [], [], []
+        losses, names, shares, ratios = [], [], [], []
         for j, period in enumerate(periods):
             row = k * len(periods) + j
-            states = np.column_stack([table.x[row], table.v[row], table.memory[row]])[:FIRINGS]
-            branch = np.where(states[:, 0] > geometry()["xp"], table.branch[row, :FIRINGS], 0)
+            states = np.column_stack([table.x[row], table.v[row], table.memory[row]])[:firings]
+            branch = np.where(states[:, 0] > geometry()["xp"], table.branch[row, :firings], 0)
             shares.append(_share(states))
+            ratios.append(_ratio(states))
             loss, name, wanted = _panel(states, branch, printed[period])
             losses.append(loss)
             names.append(name)
             if wanted:
                 wandering.append((k, j, wanted, _closest(states, wanted)))
-        looked_at.append((losses, names, shares))
+        looked_at.append((losses, names, shares, ratios))
     for (k, j, _q, _state), multiplier in zip(wandering, _multipliers(some, periods, wandering), strict=True):
         looked_at[k][0][j] = 1.0 if math.isnan(multiplier) else _repelled(multiplier)
     return looked_at

@@ -44,8 +44,9 @@ def _json(table: dict[str, Any]) -> str:
 def search(
     job: Job,
     aim: str = opt.choice(
-        "stated|all|panels|buzz",
-        "Claims that lead: stated ones alone; shapes too; these, panels of Fig. 11 or buzz printing first.",
+        "stated|all|panels|buzz|claims",
+        "Claims that lead: stated ones alone; shapes too; these, panels of Fig. 11 or buzz printing first;"
+        " these and the looks of Figs. 8, 9 and 11.",
         default="all",
     ),
     waveform: str = opt.choice(
