@@ -66,6 +66,10 @@ WEIGHTS: Final[dict[str, dict[str, float]]] = {
 claim of kind "shape" counts for as much as three panels of Fig. 11, or two where the panels lead. Buzz
 printing counts for the two claims that are about it."""
 
+STEPS: Final[dict[Aim, float]] = {"stated": 0.0, "all": 0.0, "panels": 0.0, "buzz": 0.0, "claims": 0.4}
+"""What a claim that just fails counts, in parts of its weight: where the number of claims is to be the largest,
+two that nearly hold are worth less than one that does."""
+
 PIECE: Final = 64
 """Points that one process looks at together."""
 
@@ -140,7 +144,7 @@ def rows(points: Sequence[FloatArray], aim: Aim, shape: Shape = "rectangle") -> 
         found.append(
             {
                 "point": [float(share) for share in point],
-                "total": score.total(WEIGHTS[aim]),
+                "total": score.total(WEIGHTS[aim], STEPS[aim]),
                 "losses": {name: round(loss, 6) for name, loss in score.losses.items()},
                 "measured": score.measured,
                 "constants": None if candidate is None else candidate.constants,

@@ -89,9 +89,12 @@ class Score:
     measured: dict[str, Any] = field(default_factory=dict)
     """Numbers behind them, for the log."""
 
-    def total(self, weights: dict[str, float]) -> float:
-        """Return the weighted sum; what was not looked at counts in full."""
-        return sum(weight * self.losses.get(name, 1.0) for name, weight in weights.items())
+    def total(self, weights: dict[str, float], step: float = 0.0) -> float:
+        """Return the weighted sum; what was not looked at counts in full, what just fails at least the `step`."""
+        return sum(
+            weight * (step + (1.0 - step) * loss if (loss := self.losses.get(name, 1.0)) > 0.0 else 0.0)
+            for name, weight in weights.items()
+        )
 
 
 def run_all(
