@@ -67,8 +67,8 @@ claim of kind "shape" counts for as much as three panels of Fig. 11, or two wher
 printing counts for the two claims that are about it."""
 
 STEPS: Final[dict[Aim, float]] = {"stated": 0.0, "all": 0.0, "panels": 0.0, "buzz": 0.0, "claims": 0.4}
-"""What a claim that just fails counts, in parts of its weight: where the number of claims is to be the largest,
-two that nearly hold are worth less than one that does."""
+"""What a claim that just fails counts, in parts of its weight: where the number of claims is to be large, two
+that nearly hold are worth less than one that does."""
 
 PIECE: Final = 64
 """Points that one process looks at together."""

@@ -90,7 +90,7 @@ class Score:
     """Numbers behind them, for the log."""
 
     def total(self, weights: dict[str, float], step: float = 0.0) -> float:
-        """Return the weighted sum; what was not looked at counts in full, what just fails at least the `step`."""
+        """Return the weighted sum; what is not known counts in full, what just fails the `step` or more."""
         return sum(
             weight * (step + (1.0 - step) * loss if (loss := self.losses.get(name, 1.0)) > 0.0 else 0.0)
             for name, weight in weights.items()
