@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TypeVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
+from numba.core.registry import CPUDispatcher
+
+from printhammer.kernel.compile.linking import KeptCompiler, PartCompiler, WholeCompiler
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from numba.core.compiler import Compiler
 
 Function = TypeVar("Function", bound="Callable[..., Any]")
 
@@ -17,10 +23,32 @@ Function = TypeVar("Function", bound="Callable[..., Any]")
 # references to the drive's arrays at every call made a run thirty times slower.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True, "_nrt": False}
 
+# A function first met in one that is inlined would inherit that, and be inlined wherever it is called.
+_CALLED: dict[str, Any] = {**_OPTIONS, "forceinline": False}
+
+
+class _Helper(CPUDispatcher):
+    """A function of which compiled callers take the module; Python calls one compiled by itself."""
+
+    @cached_property
+    def alone(self) -> Any:
+        """The function as an entry point."""
+        return numba.njit(pipeline_class=WholeCompiler, **_CALLED)(self.py_func)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.alone(*arguments)
+
+
+def _helper(function: Function, compiler: type[Compiler], options: dict[str, Any]) -> Function:
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return function
+    options = {"nopython": True, "boundscheck": None, **options}
+    return cast("Function", _Helper(function, targetoptions=options, pipeline_class=compiler))
+
 
 def inlined(function: Function) -> Function:
     """Compile a scalar helper lazily, always as part of the machine code of whatever calls it."""
-    return numba.njit(forceinline=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+    return _helper(function, PartCompiler, {**_OPTIONS, "forceinline": True})
 
 
 _inline_all = False
@@ -41,7 +69,14 @@ def compiled(function: Function) -> Function:
     """Compile a scalar helper lazily, as part of whatever calls it."""
     if _inline_all:
         return inlined(function)
-    return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
+    return _helper(function, PartCompiler, _CALLED)
+
+
+def called(function: Function) -> Function:
+    """Compile a long helper lazily, once for all that call it, unless everything is to be inlined."""
+    if _inline_all:
+        return inlined(function)
+    return _helper(function, KeptCompiler, _CALLED)
 
 
 def entry(function: Function) -> Function:
@@ -51,4 +86,4 @@ def entry(function: Function) -> Function:
     sources, that :mod:`printhammer.kernel.compile.specialise` defines in a template module, keeps them apart.
     """
     function.__qualname__ += "_" + function.__globals__["DIGEST"]
-    return numba.njit(cache=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+    return numba.njit(cache=True, pipeline_class=WholeCompiler, **_CALLED)(function)  # type: ignore[no-any-return]

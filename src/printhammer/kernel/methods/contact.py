@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.compile.compiling import called, compiled, inlined
 from printhammer.kernel.methods.hermite import position_root, rises_through
 from printhammer.kernel.methods.landing import FAILED, step_factor
 from printhammer.kernel.model import modes as M
@@ -51,7 +51,7 @@ def contact_scales(w: float, v: float, h: float, control: Control) -> tuple[floa
     return control[0] / control[1], control[0] / (2.0 * max(w, abs(v) * h)), control[1]
 
 
-@compiled
+@called
 def leave(
     start: ContactState,
     h: float,
@@ -82,7 +82,7 @@ def leave(
     return t1, 0.0, v1, 0.0, fraction
 
 
-@compiled
+@called
 def reach_time(
     start: ContactState, h: float, upper: float, t_upper: float, target: float, hammer: Hammer, drive: Drive
 ) -> ContactState:
@@ -111,7 +111,7 @@ def reach_time(
     return target, max(w1, 0.0), v1, kv1
 
 
-@compiled
+@called
 def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive: Drive) -> ContactState:
     """Return the state at which the backstop lets go, inside `upper` of a step of `h`, found by bisection."""
     t, w, v, kv = start

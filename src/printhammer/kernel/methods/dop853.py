@@ -20,7 +20,6 @@ from printhammer.kernel.methods import dop853_tableau as T
 if TYPE_CHECKING:
     Numbers = tuple[float, ...]
     Three = tuple[float, float, float]
-    Slopes = tuple[Three, ...]
 
     from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
     from printhammer.kernel.model.layout import ForceLaw
@@ -42,26 +41,62 @@ def plus(total: Three, c: float, k: Three) -> Three:
 
 
 @inlined
-def sum1(c: Numbers, k: Slopes) -> Three:
+def _sum1(c: Numbers, k1: Three) -> Three:
     """Return the first slope times its weight; the functions that follow add up more."""
-    return c[0] * k[0][0], c[0] * k[0][1], c[0] * k[0][2]
+    return c[0] * k1[0], c[0] * k1[1], c[0] * k1[2]
 
 
-def _longer(fewer: Any, last: int) -> Any:
-    def total(c: Numbers, k: Slopes) -> Three:
-        return plus(fewer(c, k), c[last], k[last])
-
-    return inlined(total)
+@inlined
+def _sum2(c: Numbers, k1: Three, k2: Three) -> Three:
+    return plus(_sum1(c, k1), c[1], k2)
 
 
-sum2 = _longer(sum1, 1)
-sum3 = _longer(sum2, 2)
-sum4 = _longer(sum3, 3)
-sum5 = _longer(sum4, 4)
-sum6 = _longer(sum5, 5)
-sum7 = _longer(sum6, 6)
-sum8 = _longer(sum7, 7)
-sum9 = _longer(sum8, 8)
+@inlined
+def _sum3(c: Numbers, k1: Three, k2: Three, k3: Three) -> Three:
+    return plus(_sum2(c, k1, k2), c[2], k3)
+
+
+@inlined
+def _sum4(c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three) -> Three:
+    return plus(_sum3(c, k1, k2, k3), c[3], k4)
+
+
+@inlined
+def _sum5(c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three, k5: Three) -> Three:
+    return plus(_sum4(c, k1, k2, k3, k4), c[4], k5)
+
+
+@inlined
+def _sum6(c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three, k5: Three, k6: Three) -> Three:
+    return plus(_sum5(c, k1, k2, k3, k4, k5), c[5], k6)
+
+
+@inlined
+def _sum7(c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three, k5: Three, k6: Three, k7: Three) -> Three:
+    return plus(_sum6(c, k1, k2, k3, k4, k5, k6), c[6], k7)
+
+
+@inlined
+def _sum8(
+    c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three, k5: Three, k6: Three, k7: Three, k8: Three
+) -> Three:
+    return plus(_sum7(c, k1, k2, k3, k4, k5, k6, k7), c[7], k8)
+
+
+@inlined
+def _sum9(
+    c: Numbers,
+    k1: Three,
+    k2: Three,
+    k3: Three,
+    k4: Three,
+    k5: Three,
+    k6: Three,
+    k7: Three,
+    k8: Three,
+    k9: Three,
+) -> Three:
+    return plus(_sum8(c, k1, k2, k3, k4, k5, k6, k7, k8), c[8], k9)
 
 
 @inlined
@@ -84,7 +119,7 @@ def contact_slope(y: Three, hammer: Hammer, drive: Drive) -> Three:
     return pace, -y[2], pace * backstop_acceleration(y[0], y[1], y[2], hammer, drive)
 
 
-@compiled
+@inlined
 def time_step(
     t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
@@ -96,37 +131,36 @@ def time_step(
         Position [m], velocity [m/s] and acceleration [m/s^2] at the end, and their error estimates.
     """
     y, k1 = (t0, x0, v0), (1.0, v0, a0)
-    y2 = along(y, h, sum1(T.A02, (k1,)))
+    y2 = along(y, h, _sum1(T.A02, k1))
     k2 = time_slope(t0 + T.C02 * h, y2, law)
-    y3 = along(y, h, sum2(T.A03, (k1, k2)))
+    y3 = along(y, h, _sum2(T.A03, k1, k2))
     k3 = time_slope(t0 + T.C03 * h, y3, law)
-    y4 = along(y, h, sum2(T.A04, (k1, k3)))
+    y4 = along(y, h, _sum2(T.A04, k1, k3))
     k4 = time_slope(t0 + T.C04 * h, y4, law)
-    y5 = along(y, h, sum3(T.A05, (k1, k3, k4)))
+    y5 = along(y, h, _sum3(T.A05, k1, k3, k4))
     k5 = time_slope(t0 + T.C05 * h, y5, law)
-    y6 = along(y, h, sum3(T.A06, (k1, k4, k5)))
+    y6 = along(y, h, _sum3(T.A06, k1, k4, k5))
     k6 = time_slope(t0 + T.C06 * h, y6, law)
-    y7 = along(y, h, sum4(T.A07, (k1, k4, k5, k6)))
+    y7 = along(y, h, _sum4(T.A07, k1, k4, k5, k6))
     k7 = time_slope(t0 + T.C07 * h, y7, law)
-    y8 = along(y, h, sum5(T.A08, (k1, k4, k5, k6, k7)))
+    y8 = along(y, h, _sum5(T.A08, k1, k4, k5, k6, k7))
     k8 = time_slope(t0 + T.C08 * h, y8, law)
-    y9 = along(y, h, sum6(T.A09, (k1, k4, k5, k6, k7, k8)))
+    y9 = along(y, h, _sum6(T.A09, k1, k4, k5, k6, k7, k8))
     k9 = time_slope(t0 + T.C09 * h, y9, law)
-    y10 = along(y, h, sum7(T.A10, (k1, k4, k5, k6, k7, k8, k9)))
+    y10 = along(y, h, _sum7(T.A10, k1, k4, k5, k6, k7, k8, k9))
     k10 = time_slope(t0 + T.C10 * h, y10, law)
-    y11 = along(y, h, sum8(T.A11, (k1, k4, k5, k6, k7, k8, k9, k10)))
+    y11 = along(y, h, _sum8(T.A11, k1, k4, k5, k6, k7, k8, k9, k10))
     k11 = time_slope(t0 + T.C11 * h, y11, law)
-    y12 = along(y, h, sum9(T.A12, (k1, k4, k5, k6, k7, k8, k9, k10, k11)))
+    y12 = along(y, h, _sum9(T.A12, k1, k4, k5, k6, k7, k8, k9, k10, k11))
     k12 = time_slope(t0 + h, y12, law)
-    k = (k1, k6, k7, k8, k9, k10, k11, k12)
-    _t, x, v = along(y, h, sum8(T.B, k))
+    _t, x, v = along(y, h, _sum8(T.B, k1, k6, k7, k8, k9, k10, k11, k12))
     a = time_slope(t0 + h, (t0, x, v), law)[2]
-    e5, e3 = sum8(T.E5, k), sum8(T.E3, k)
+    e5, e3 = _sum8(T.E5, k1, k6, k7, k8, k9, k10, k11, k12), _sum8(T.E3, k1, k6, k7, k8, k9, k10, k11, k12)
     error_x = combined_error(h * e5[1], h * e3[1])
     return x, v, a, error_x, combined_error(h * e5[2], h * e3[2])
 
 
-@compiled
+@inlined
 def contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float]:
@@ -139,21 +173,20 @@ def contact_step(
         time, w and velocity in units of `scales`.
     """
     y, k1 = (t0, w0, v0), (2.0 * w0, -v0, kv0)
-    k2 = contact_slope(along(y, h, sum1(T.A02, (k1,))), hammer, drive)
-    k3 = contact_slope(along(y, h, sum2(T.A03, (k1, k2))), hammer, drive)
-    k4 = contact_slope(along(y, h, sum2(T.A04, (k1, k3))), hammer, drive)
-    k5 = contact_slope(along(y, h, sum3(T.A05, (k1, k3, k4))), hammer, drive)
-    k6 = contact_slope(along(y, h, sum3(T.A06, (k1, k4, k5))), hammer, drive)
-    k7 = contact_slope(along(y, h, sum4(T.A07, (k1, k4, k5, k6))), hammer, drive)
-    k8 = contact_slope(along(y, h, sum5(T.A08, (k1, k4, k5, k6, k7))), hammer, drive)
-    k9 = contact_slope(along(y, h, sum6(T.A09, (k1, k4, k5, k6, k7, k8))), hammer, drive)
-    k10 = contact_slope(along(y, h, sum7(T.A10, (k1, k4, k5, k6, k7, k8, k9))), hammer, drive)
-    k11 = contact_slope(along(y, h, sum8(T.A11, (k1, k4, k5, k6, k7, k8, k9, k10))), hammer, drive)
-    k12 = contact_slope(along(y, h, sum9(T.A12, (k1, k4, k5, k6, k7, k8, k9, k10, k11))), hammer, drive)
-    k = (k1, k6, k7, k8, k9, k10, k11, k12)
-    end = along(y, h, sum8(T.B, k))
+    k2 = contact_slope(along(y, h, _sum1(T.A02, k1)), hammer, drive)
+    k3 = contact_slope(along(y, h, _sum2(T.A03, k1, k2)), hammer, drive)
+    k4 = contact_slope(along(y, h, _sum2(T.A04, k1, k3)), hammer, drive)
+    k5 = contact_slope(along(y, h, _sum3(T.A05, k1, k3, k4)), hammer, drive)
+    k6 = contact_slope(along(y, h, _sum3(T.A06, k1, k4, k5)), hammer, drive)
+    k7 = contact_slope(along(y, h, _sum4(T.A07, k1, k4, k5, k6)), hammer, drive)
+    k8 = contact_slope(along(y, h, _sum5(T.A08, k1, k4, k5, k6, k7)), hammer, drive)
+    k9 = contact_slope(along(y, h, _sum6(T.A09, k1, k4, k5, k6, k7, k8)), hammer, drive)
+    k10 = contact_slope(along(y, h, _sum7(T.A10, k1, k4, k5, k6, k7, k8, k9)), hammer, drive)
+    k11 = contact_slope(along(y, h, _sum8(T.A11, k1, k4, k5, k6, k7, k8, k9, k10)), hammer, drive)
+    k12 = contact_slope(along(y, h, _sum9(T.A12, k1, k4, k5, k6, k7, k8, k9, k10, k11)), hammer, drive)
+    end = along(y, h, _sum8(T.B, k1, k6, k7, k8, k9, k10, k11, k12))
     kv = contact_slope(end, hammer, drive)[2]
-    e5, e3 = sum8(T.E5, k), sum8(T.E3, k)
+    e5, e3 = _sum8(T.E5, k1, k6, k7, k8, k9, k10, k11, k12), _sum8(T.E3, k1, k6, k7, k8, k9, k10, k11, k12)
     error5 = abs(h * e5[0]) / scales[0] + abs(h * e5[1]) / scales[1] + abs(h * e5[2]) / scales[2]
     error3 = abs(h * e3[0]) / scales[0] + abs(h * e3[1]) / scales[1] + abs(h * e3[2]) / scales[2]
     return end[0], end[1], end[2], kv, combined_error(error5, error3)

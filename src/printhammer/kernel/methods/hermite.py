@@ -9,7 +9,7 @@ located with the integrator.
 
 from __future__ import annotations
 
-from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.model.modes import NEAR_TOUCH, NO_SWITCH, REACHED_FRONT, UNRESOLVED
 
 MARGIN = 1e-3
@@ -41,7 +41,7 @@ def control_points(
     return p1, p2, p3, p4
 
 
-@compiled
+@inlined
 def rises_through(
     x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float, level: float
 ) -> int:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.compile.compiling import called, compiled, inlined
 from printhammer.kernel.methods.hermite import position_root, rises_through, turns_down, velocity_root
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control, ForceLaw
@@ -76,7 +76,7 @@ def step_factor(ratio: float) -> float:
     return min(5.0, max(0.2, 0.85 / math.sqrt(math.sqrt(math.sqrt(max(ratio, 1e-7))))))
 
 
-@compiled
+@called
 def land_on_level(
     start: State,
     h: float,
@@ -110,7 +110,7 @@ def land_on_level(
     return t + step, level, v1, a1
 
 
-@compiled
+@called
 def land_on_reversal(
     start: State, h: float, fraction: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, float]:
@@ -136,7 +136,7 @@ def land_on_reversal(
     return t + step, x1, 0.0, a1, fraction
 
 
-@compiled
+@called
 def longest_still_step(start: State, law: ForceLaw, control: Control) -> float:
     """Return the longest step [s] that is stable for small oscillations about the present place.
 
@@ -169,7 +169,7 @@ def lets_go_or_takes_hold(x: float, v: float, mode: int, hammer: Hammer) -> bool
     return number > 0.0 if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else number < 0.0
 
 
-@compiled
+@called
 def land_on_push(start: State, h: float, upper: float, law: ForceLaw, control: Control) -> State:
     """Return the state at which the contact begins or ends to push, inside `upper` of a step of `h`."""
     t, x, v, a = start

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.compile.compiling import inlined
 from printhammer.kernel.methods import nystrom8_tableau as T
 
 if TYPE_CHECKING:
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.layout import ForceLaw
 
 
-@compiled
+@inlined
 def nystrom_step(
     t0: float, x0: float, v0: float, a1: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:

@@ -65,7 +65,7 @@ def piece_change(row: Any, i: int, s: float, changes: Any, j: int) -> float:
     return float(d0 + d1 * math.sin(turn) + p1 * math.cos(turn) * (d2 * s + d3))
 
 
-@compiled
+@inlined
 def sum_of_pulses(t: float, drive: Drive) -> float:
     """Return the sum of at least one pulse under way."""
     total = 0.0

@@ -1,0 +1,159 @@
+"""Compilers for the functions of a kernel: helpers stay parts, an entry point is made a whole of them, once.
+
+Numba compiles each function to machine code of its own, with all that it calls, and then links and optimises
+the same functions again in whatever calls it: a helper five calls deep is compiled five times over, and the
+machine code of four is never run. Here the module of a helper is kept as it was lowered, and an entry point
+links all of its helpers before anything is optimised.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite.binding import Linkage
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, _LowerResult
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
+
+
+class _Part(JITCodeLibrary):
+    """The module of a helper, not optimised and never run by itself."""
+
+    kept = False
+    """Whether the helper stays a function in what calls it."""
+
+    def finalize(self) -> None:
+        """Let nothing be added any more."""
+        self._finalized = True
+
+    def own_module(self) -> Any:
+        """Return the module of the helper alone, its functions such that several modules may have them."""
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = "linkonce_odr"
+                if self.kept:
+                    function.add_function_attribute("noinline")
+        return self._final_module
+
+    def link_callees(self, module: Any) -> None:
+        """Link all that this library calls, directly or through others, into a module."""
+        ordered: dict[Any, None] = {}
+        self._add_callees(ordered)
+        # The linker takes a function only if what is there already calls it: callers come first.
+        for library in reversed(ordered):
+            alone = isinstance(library, _Part) and not isinstance(library, _Whole)
+            module.link_in(
+                library.own_module() if alone else library._get_module_for_linking(), preserve=True
+            )
+
+    def _add_callees(self, ordered: dict[Any, None]) -> None:
+        """Add the libraries that this one calls, directly or through others, each after those it calls."""
+        for library in self._linking_libraries:
+            if library not in ordered:
+                if isinstance(library, _Part) and not isinstance(library, _Whole):
+                    library._add_callees(ordered)
+                ordered[library] = None
+
+    def _get_module_for_linking(self) -> Any:
+        # What numba's own compiler makes of a caller links this and nothing else.
+        if self._shared_module is None:
+            self._shared_module = self.own_module().clone()
+            self.link_callees(self._shared_module)
+        return self._shared_module
+
+
+class _Kept(_Part):
+    """The module of a helper that stays a function."""
+
+    kept = True
+
+
+class _Whole(_Part):
+    """The module of an entry point, with all that it calls."""
+
+    def finalize(self) -> None:
+        """Link, optimise and make machine code."""
+        self.link_callees(self._final_module)
+        self._linking_libraries = []
+        JITCodeLibrary.finalize(self)  # type: ignore[no-untyped-call]
+
+    def _verify_declare_only_symbols(self) -> None:
+        # The engine would call what is missing at address zero.
+        for function in self._final_module.functions:
+            if function.is_declaration and function.name.startswith("_ZN"):
+                raise AssertionError(f"{function.name} is called but was not linked")
+
+    def _get_module_for_linking(self) -> Any:
+        return JITCodeLibrary._get_module_for_linking(self)  # type: ignore[no-untyped-call]
+
+
+def _library(state: Any, kind: type[_Part]) -> None:
+    state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
+    state.library.enable_object_caching()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
+class _LowerPart(NativeLowering):
+    _name = "lower_part"
+    kind: type[_Part] = _Part
+
+    def run_pass(self, state: Any) -> bool:
+        _library(state, self.kind)
+        state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = state.flags.no_compile = True
+        super().run_pass(state)  # type: ignore[no-untyped-call]
+        lowered = state["cr"]
+        # Callers know a function by its entry point, which has to be a built-in; nobody calls this one.
+        key = dict[str, str]().__getitem__
+        state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
+        state["cr"] = _LowerResult(lowered.fndesc, lowered.call_helper, cfunc=key, env=lowered.env)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
+class _LowerKept(_LowerPart):
+    _name = "lower_kept"
+    kind = _Kept
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
+class _LowerWhole(NativeLowering):
+    _name = "lower_whole"
+
+    def run_pass(self, state: Any) -> bool:
+        _library(state, _Whole)
+        state.flags.no_cfunc_wrapper = True
+        return bool(super().run_pass(state))  # type: ignore[no-untyped-call]
+
+
+class _Lowered(Compiler):
+    """The compiler of numba with another way to lower a function."""
+
+    lowering: type[NativeLowering]
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the pipelines of numba, the lowering replaced."""
+        pipelines = super().define_pipelines()  # type: ignore[no-untyped-call]
+        for pipeline in pipelines:
+            pipeline.passes = [
+                (self.lowering if stage is NativeLowering else stage, why) for stage, why in pipeline.passes
+            ]
+        return list(pipelines)
+
+
+class PartCompiler(_Lowered):
+    """Compiler of helpers, which other compiled functions call."""
+
+    lowering = _LowerPart
+
+
+class KeptCompiler(_Lowered):
+    """Compiler of long helpers with several callers: their machine code is made once for all of these."""
+
+    lowering = _LowerKept
+
+
+class WholeCompiler(_Lowered):
+    """Compiler of entry points, which Python calls."""
+
+    lowering = _LowerWhole
