@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
 
+from printhammer.kernel.compile.cache import keep
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -51,4 +53,4 @@ def entry(function: Function) -> Function:
     sources, that :mod:`printhammer.kernel.compile.specialise` defines in a template module, keeps them apart.
     """
     function.__qualname__ += "_" + function.__globals__["DIGEST"]
-    return numba.njit(cache=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+    return keep(numba.njit(**_OPTIONS)(function))  # type: ignore[no-any-return]
