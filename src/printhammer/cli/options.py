@@ -221,7 +221,8 @@ def read_plain(written: str, name: str) -> float:
     try:
         return float(written)
     except ValueError:
-        raise InputError(f"{name} = {written!r}: expected a number") from None
+        point = " with a decimal point" if "," in written else ""
+        raise InputError(f"{name} = {written!r}: expected a number{point}") from None
 
 
 def read_share(written: str, name: str) -> float:

@@ -15,6 +15,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from rich.markup import escape
+
 from printhammer.cli import progress
 from printhammer.cli.options import FORCE, Files, Option
 from printhammer.cli.screen import heading
@@ -177,7 +179,7 @@ class Job:
 
     def wrote(self, path: Path | str) -> None:
         """Tell that a file was written."""
-        self.screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+        self.screen.print(f"[dim]wrote[/dim] {escape(str(path))}", soft_wrap=True)
 
     def end(self, answer: Answer) -> int:
         """Show, write and complain; return the exit status."""

@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from rich.markup import escape
+
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
 from printhammer.cli.screen import Column, table
@@ -265,8 +267,8 @@ def family(
 
     job.check_new(out / name for name in WRITTEN)
     announce_compiling()
-    members = write_family(judged, out, lambda text: job.show(f"[dim]{text}[/dim]"))
-    return Answer([f"{len(members)} hammers; [dim]wrote[/dim] {out}"])
+    members = write_family(judged, out, lambda text: job.show(f"[dim]{escape(text)}[/dim]"))
+    return Answer([f"{len(members)} hammers; [dim]wrote[/dim] {escape(str(out))}"])
 
 
 @verb("reconstruct ship", "printhammer reconstruct ship judged.jsonl all.jsonl --out build/hammer")
