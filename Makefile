@@ -58,7 +58,7 @@ docs: $(INSTALLED) ## the documentation, into build/docs; says which measured ta
 	$(BIN)/sphinx-build -W --keep-going -b html docs build/docs
 
 bench: $(INSTALLED) ## the benchmark table (PEERS=folder of another environment's programs)
-	$(PEERS)/printhammer bench --peers benchmarks/peers --markdown docs/benchmarks.md
+	$(PEERS)/printhammer bench --peers benchmarks/peers --out docs/benchmarks.md --force
 
 # Resolve again; the files name versions and hashes only, never an address.
 LOCK := build/lock-venv/bin/uv pip compile --quiet --universal --fork-strategy fewest --python-version 3.11 \

@@ -173,8 +173,8 @@ def test_markdown_has_all_rows(report: Report) -> None:
         (["--threads", "0"], "threads = 0"),
         (["--peers", "nowhere"], "peers = nowhere, expected a folder"),
         (["--threads", "many"], "whole number"),
-        (["--json", "nowhere/at/all.json"], "folder that exists"),
-        (["--json", "x.json", "--markdown", "x.json"], "written twice"),
+        (["--out", "nowhere/at/all.json"], "folder that exists"),
+        (["--out", "x.json", "--json", "x.json"], "written twice"),
     ],
 )
 def test_bad_input_is_refused_before_any_work(
@@ -194,7 +194,7 @@ def test_the_benchmark_runs(tmp_path: Path) -> None:
     done = subprocess.run(
         [
             *(sys.executable, "-m", "printhammer", "bench", "--quick", "--peers", str(PEERS)),
-            *("--json", str(tmp_path / "figures.json"), "--markdown", str(tmp_path / "page.md")),
+            *("--out", str(tmp_path / "figures.json"), "--out", str(tmp_path / "page.md")),
         ],
         check=True,
         capture_output=True,

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
 
 class PrinthammerError(Exception):
@@ -28,3 +28,15 @@ def located(where: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
+    """Return the known name that comes closest to one, in quotes, for a message.
+
+    Where none comes close, `otherwise`, by default all of them.
+    """
+    from difflib import get_close_matches
+
+    names = list(known)
+    close = get_close_matches(name, names, 1)
+    return repr(close[0]) if close else otherwise or f"one of {', '.join(names)}"

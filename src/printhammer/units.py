@@ -131,6 +131,8 @@ def split(text: str, si_unit: str) -> tuple[float, str]:
     if match is None or not math.isfinite(value):
         raise InputError(f"{text!r} is not a finite number with a unit, expected {describe(si_unit)}")
     unit = match[2].strip()
+    if re.match(r",\s*\d", unit):
+        raise InputError(f"{text!r} has a comma, expected a number with a decimal point, such as '1.2 kHz'")
     if not unit and si_unit != "1":
         raise InputError(f"{text!r} has no unit, expected {describe(si_unit)}")
     return value, unit or "1"

@@ -85,7 +85,7 @@ def bad_file(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 @pytest.mark.parametrize("verb", [["run"], ["figure", "3"], ["paper"], ["hammer", "check"]], ids=" ".join)
 def test_bad_hammer(cli, verb: list[str], bad_file: Path, expected: tuple[str, ...]) -> None:
     out = bad_file.parent / "out"
-    options = {"run": ["--json", out.with_suffix(".json")], "figure": ["--out", out], "paper": ["--out", out]}
+    options = {"run": ["--out", out.with_suffix(".json")], "figure": ["--out", out], "paper": ["--out", out]}
     before = {path: path.read_bytes() for path in bad_file.parent.iterdir()}
     outcome = cli(*verb, bad_file, *options.get(verb[0], []))
     assert outcome.status == 2
@@ -126,11 +126,10 @@ BAD_OPTIONS = {
     "unknown option": (["--rte", "1 kHz"], ("--rte",)),
     "no such drive": (["--drive", "none.toml"], ("none.toml",)),
     "drive and rate": (["--drive", "d.toml", "--rate", "1 kHz"], ("--rate", "--drive")),
-    "no such folder": (["--csv", "none/motion.csv"], ("none/motion.csv", "folder that exists")),
-    "a folder for a file": (["--json", "."], ("folder",)),
+    "no such folder": (["--out", "none/motion.csv"], ("none/motion.csv", "folder that exists")),
     "no such format": (["--dots", "dots.xls"], ("dots.xls", ".csv")),
-    "no such picture": (["--plot", "motion.gif"], ("motion.gif", ".svg")),
-    "written twice": (["--csv", "a.csv", "--dots", "a.csv"], ("a.csv", "twice")),
+    "no such picture": (["--out", "motion.gif"], ("motion.gif", ".svg")),
+    "written twice": (["--out", "a.csv", "--dots", "a.csv"], ("a.csv", "twice")),
 }
 
 
@@ -165,12 +164,12 @@ def test_bad_arguments(cli, arguments: list[str], expected: tuple[str, ...]) -> 
 
 
 def test_input_is_never_written_over(cli, hammer: "ph.Hammer", tmp_path: Path) -> None:
-    mine, drive = tmp_path / "mine.toml", tmp_path / "drive.toml"
+    mine, drive = tmp_path / "mine.json", tmp_path / "drive.csv"
     mine.write_text(hammer.to_toml(), "utf-8")
     drive.write_text('format = 1\n[train]\nrate = "1 kHz"\npulses = 2\n', "utf-8")
     for path in (mine, drive):
         before = path.read_bytes()
-        outcome = cli("run", mine, "--drive", drive, "--json", path)
+        outcome = cli("run", mine, "--drive", drive, "--out", path)
         assert outcome.status == 2
         assert_one_sentence(outcome.err, path.name, "this one is read")
         assert path.read_bytes() == before
@@ -183,7 +182,7 @@ def test_a_table_is_never_written_over(cli, hammer: "ph.Hammer", tmp_path: Path)
     drive.write_text('format = 1\n[times]\nat = ["0 us"]\n' + SAMPLED, "utf-8")
     before = (tmp_path / "pulse.csv").read_bytes()
     for arguments in ([mine], ["hendriks-1983", "--drive", drive]):
-        outcome = cli("run", *arguments, "--csv", tmp_path / "pulse.csv")
+        outcome = cli("run", *arguments, "--out", tmp_path / "pulse.csv", "--force")
         assert outcome.status == 2
         assert_one_sentence(outcome.err, "pulse.csv", "this one is read")
     assert (tmp_path / "pulse.csv").read_bytes() == before

@@ -12,7 +12,7 @@ import typer
 
 import printhammer as ph
 from printhammer.cli.main import app
-from printhammer.cli.options import read_plain, read_whole
+from printhammer.cli.options import Files, read_plain, read_whole
 from printhammer.cli.registry import VERBS
 from printhammer.cli.runner import Verb
 
@@ -90,7 +90,7 @@ def test_the_example_in_the_help_runs(
         outcome = cli(*shlex.split(verb.example)[1:])
         assert outcome.status == 0, outcome.err
         assert outcome.out
-    wanted = any(f" --{name} " in verb.example for name in ("out", "json", "plot"))
+    wanted = " --out " in verb.example
     assert (set(tmp_path.iterdir()) > before) == wanted
 
 
@@ -132,6 +132,41 @@ def test_a_file_that_cannot_be_written_is_refused(
         refused(*words_of(verb, flag, name, flag, name), said=(name, "twice"))
     (tmp_path / name).mkdir()
     refused(*words_of(verb, flag, name), said=(name, "folder"))
+
+
+def places() -> Iterator[Any]:
+    for verb in VERBS:
+        for name, files in verb.files.items():
+            if not files.continued:
+                yield pytest.param(verb, name, files, id=f"{verb.name} {name}")
+
+
+@pytest.mark.parametrize(("verb", "name", "files"), list(places()))
+def test_a_file_that_is_there_is_not_written_over(
+    refused: Callable[..., None], verb: Verb, name: str, files: Files, tmp_path: Path
+) -> None:
+    path = "new.json" if files.argument else f"result{(*files.endings, '.png')[0]}"
+    (tmp_path / path).write_text("mine", "utf-8")
+    flagged = [] if files.argument else [f"--{name}", path]
+    refused(
+        *words_of(verb, *flagged),
+        said=f"{path}: expected a new file, this one is there; --force writes over it",
+    )
+
+
+def test_what_is_gone_on_with_needs_no_force() -> None:
+    going_on = {verb.name for verb in VERBS if any(files.continued for files in verb.files.values())}
+    assert going_on == {"reconstruct search", "reconstruct judge"}
+
+
+@pytest.mark.parametrize(
+    "verb", [verb for verb in VERBS if verb.files or "out" in verb.options], ids=lambda v: v.name
+)
+def test_force_is_offered_where_new_files_are_written(cli: Callable[..., Any], verb: Verb) -> None:
+    shown = cli(*verb.name.split(), "--help").out
+    assert ("Write over files" in shown) == (
+        verb.name not in {"sweep", "reconstruct search", "reconstruct judge"}
+    )
 
 
 HAMMERED = [verb for verb in VERBS if any(option.hammer for option in verb.options.values())]

@@ -223,9 +223,19 @@ def test_replace_the_waveform_and_take_parts_away(hammer: ph.Hammer) -> None:
 def test_replace_refuses_in_one_sentence(hammer: ph.Hammer, key: str, value: object, sentence: str) -> None:
     with pytest.raises(ph.InputError) as caught:
         hammer.replace(key, value)
-    assert str(caught.value).startswith(f"{CRUDE}: ")
+    # The file is as it should be.
+    assert str(caught.value).startswith(f"{CRUDE}, changed: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_hammer_in_memory_is_not_called_its_file(hammer: ph.Hammer) -> None:
+    assert hammer.path == str(CRUDE)
+    assert hammer.replace("mass", 4e-4).replace("mass", 5e-4).path == f"{CRUDE}, changed"
+    made = ph.Hammer.build(4e-4, name="ball")
+    assert made.path == "ball"
+    with pytest.raises(ph.InputError, match=r"^ball: the hammer has no \[waveform\]"):
+        ph.quality(made, 900.0)
 
 
 def test_a_table_held_in_memory_cannot_be_written_to_a_file(hammer: ph.Hammer) -> None:
@@ -352,7 +362,7 @@ def test_a_hammer_that_flies_off_its_backstop_is_refused(hammer: ph.Hammer) -> N
     # At 0.002 in, Am^2 / sqrt(x) is 26.8 N against F0 + Bs = 16.8 N; a spring of 30 N overcomes it.
     for force in ("30 N", 0.437407904**2 / 50.8e-6**0.5 - 2.47161892 + 1e-9):
         with pytest.raises(
-            ph.InputError, match=r"hendriks-1983\.toml: .* has no rest state: at the backstop"
+            ph.InputError, match=r"hendriks-1983\.toml, changed: .* has no rest state: at the backstop"
         ):
             hammer.replace("spring.Bs", force).check()
     with pytest.raises(ph.InputError, match="expected a negative force"):

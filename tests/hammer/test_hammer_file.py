@@ -165,7 +165,9 @@ def test_bad_input_is_one_sentence(tmp_path: Path, text: str, parts: list[str]) 
 
 def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ph.InputError, match=r"no such file, expected a path or one of .*hendriks-1983"):
-        ph.load("hendriks-1984")
+        ph.load("nobody")
+    with pytest.raises(ph.InputError, match=r"no such file, expected a path or 'hendriks-1983'$"):
+        ph.load("hendriks-1893")
     with pytest.raises(ph.InputError, match="cannot be read"):
         ph.load(tmp_path)
     with pytest.raises(ph.InputError, match="cannot be read"):

@@ -242,6 +242,7 @@ BAD: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         r"does not touch the backstop after the shot, expected one that does for backstop.damping",
     ),
     "unknown": ({}, {"free": ["weight"]}, r"free: 'weight' is no constant of .*hendriks-1983\.toml"),
+    "misspelt": ({}, {"free": ["backstop.dampng"]}, r"expected 'backstop.damping'$"),
     "platen": ({}, {"free": ["platen"]}, r"free: 'platen' is no constant .* that moves the armature"),
     "twice": ({}, {"free": ["mass", "mass"]}, r"free: mass is given twice"),
     "nothing": ({}, {"free": []}, r"free: no constants are given"),

@@ -14,7 +14,7 @@ import typer
 from printhammer import __version__
 from printhammer.cli.registry import GROUPS, VERBS
 from printhammer.cli.runner import INTERRUPTED
-from printhammer.cli.terminal import complain
+from printhammer.cli.terminal import allow_any_text, complain
 from printhammer.errors import PrinthammerError
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ app: Final = _built()
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line, by default that of the process, and exit."""
+    allow_any_text()
     try:
         status = app(
             None if arguments is None else list(arguments), prog_name="printhammer", standalone_mode=False

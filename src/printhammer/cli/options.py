@@ -48,6 +48,10 @@ class Option:
     """Whether it stands without a flag."""
     is_input: bool = False
     """Whether it names files that are read, which no output may be."""
+    writes: bool = False
+    """Whether it names a place to write new files to."""
+    hidden: bool = False
+    """Whether the help does not show it."""
     hammer: Literal["named", "loaded", "fired"] | None = None
     """Of the hammer that is worked on: "named", "loaded" with its warnings shown, or "fired", which has a
     waveform too."""
@@ -62,6 +66,7 @@ class Option:
         type_: Any = str if read else self.type
         type_ = list[type_] if self.many else type_
         texts: dict[str, Any] = {"metavar": self.metavar, "help": self.help, "rich_help_panel": self.panel}
+        texts["hidden"] = self.hidden
         if self.argument:
             entry = typer.Argument(**texts, show_default=self.hammer is not None)
         else:
@@ -85,6 +90,10 @@ class Files(Option):
     """How names may end beside those of pictures; empty if the end does not matter."""
     pictures: bool = True
     """Whether names may be those of pictures."""
+    continued: bool = False
+    """Whether the work goes on with a file that is there, and writes nothing over."""
+    older: tuple[str, ...] = ()
+    """Names that the option had in earlier versions, which are understood still."""
 
 
 def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
@@ -92,16 +101,16 @@ def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
     return Files(what, "FILE", type=Path, many=many, endings=endings, **more)
 
 
-def results(what: str, *more: str) -> Files:
+def results(what: str, *more: str, **options: Any) -> Files:
     """Return the option `--out` of a verb that has a result: data, a picture, or what else it can be."""
     endings = (*DATA, *more)
     kinds = f"{what} ({', '.join(endings)}; SI)"
-    return files(f"{kinds} or picture (.svg, .png, .pdf); may be given repeatedly.", *endings)
+    return files(f"{kinds} or picture (.svg, .png, .pdf); may be given repeatedly.", *endings, **options)
 
 
 def file(what: str, *endings: str, **more: Any) -> Files:
-    """Return an option for one file that is no picture."""
-    return files(what, *endings, many=False, pictures=False, **more)
+    """Return an option for one file that is no picture, unless `many` are allowed."""
+    return files(what, *endings, **{"many": False, "pictures": False, **more})
 
 
 # What follows stands as a default of parameters of all types, and therefore returns none in particular. Every
@@ -196,7 +205,7 @@ def source(what: str, **more: Any) -> Any:
 
 def folder(what: str, **more: Any) -> Any:
     """Return an option that names a folder to write to, or what else lies in one place."""
-    return Option(what, more.pop("metavar", "FOLDER"), type=Path, **more)
+    return Option(what, **{"metavar": "FOLDER", "type": Path, "writes": True, **more})
 
 
 def read_whole(written: str, name: str) -> int:
@@ -212,7 +221,8 @@ def read_plain(written: str, name: str) -> float:
     try:
         return float(written)
     except ValueError:
-        raise InputError(f"{name} = {written!r}: expected a number") from None
+        point = " with a decimal point" if "," in written else ""
+        raise InputError(f"{name} = {written!r}: expected a number{point}") from None
 
 
 def read_share(written: str, name: str) -> float:
@@ -271,4 +281,4 @@ HIGHEST: Final = text("VALUE", "Largest value, with its unit.", flag="--to")
 TOLERANCE: Final = number("Error allowed in one step.")
 THREADS: Final = whole("Threads (as many as cores).")
 UNITS: Final = text("si|inch", "Unit system on the terminal.", default=Units.SI, type=Units)
-FORCE: Final = switch("Write over files that are there.")
+FORCE: Final = switch("Write over files that are there.", flag="--force")

@@ -36,7 +36,7 @@ def telling(first: str = "…") -> Iterator[Callable[[str], None]]:
     """Show a line while something is done whose end is not known; yield a function of what it says next."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    with _shown(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()) as line:
+    with _shown(SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()) as line:
         task = line.add_task(first, total=None)
         yield lambda text: line.update(task, description=text)
 

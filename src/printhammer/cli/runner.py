@@ -1,22 +1,24 @@
 """The one way in which every verb runs.
 
 A verb is a function of its options, and of a `Job` where it asks for one, declared with `verb`. The runner
-reads the options, checks before any work that every file can be written, loads the hammer, and has compiling
-announced; the verb computes and returns an `Answer`; the runner shows it, writes the files, complains, and
-sets the exit status.
+reads the options, checks before any work that every file can be written and writes over none, loads the
+hammer, and has compiling announced; the verb computes and returns an `Answer`; the runner shows it, writes
+the files, complains, and sets the exit status.
 """
 
 from __future__ import annotations
 
 import inspect
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from rich.markup import escape
+
 from printhammer.cli import progress
-from printhammer.cli.options import Files, Option
+from printhammer.cli.options import FORCE, Files, Option
 from printhammer.cli.screen import heading
 from printhammer.cli.terminal import complain, console, say, warn
 from printhammer.errors import InputError
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 Shown = TypeVar("Shown")
 
 INTERRUPTED: Final = 130
+_FORCE: Final = "write_over"
 PICTURES: Final = (".svg", ".png", ".pdf")
 """Endings of the names of pictures."""
 
@@ -90,13 +93,17 @@ class Answer:
 class Job:
     """One call of a verb."""
 
-    def __init__(self, declared: Mapping[str, Files], wanted: Mapping[str, list[Path]]) -> None:
+    def __init__(
+        self, declared: Mapping[str, Files], wanted: Mapping[str, list[Path]], *, force: bool = False
+    ) -> None:
         self.hammer: Hammer | None = None
         """The hammer that is worked on."""
         self.declared, self.wanted = declared, dict(wanted)
         """Options that name files to write, and these files, by the name of the option."""
         self.inputs: list[Path] = []
         """Files that are read."""
+        self.force = force
+        """Whether files that are there may be written over."""
         self.screen = console()
         """The standard output."""
         self.seconds = 0.0
@@ -109,9 +116,9 @@ class Job:
         return [path for paths in self.wanted.values() for path in paths]
 
     def check(self, *inputs: Path) -> None:
-        """Make sure, before any work, that all files can be written, and are none that is read.
+        """Make sure, before any work, that all files can be written, are new, and are none that is read.
 
-        Errors as for `check_endings` and `check_outputs`.
+        Errors as for `check_endings`, `check_outputs` and `check_new`.
         """
         from printhammer.results.files import need_for
         from printhammer.support.outputs import check_outputs
@@ -130,6 +137,15 @@ class Job:
             if path.suffix.lower() == ".zarr" and path.is_dir()
         }
         check_outputs([stores.get(path, path) for path in self.outputs], self.inputs)
+        for name, paths in self.wanted.items():
+            if not self.declared[name].continued:
+                self.check_new(paths)
+
+    def check_new(self, paths: Iterable[Path]) -> None:
+        """Make sure, before any work, that no file is there yet, unless with --force; else InputError."""
+        for path in paths:
+            if not self.force and (path.exists() or path.is_symlink()):
+                raise InputError(f"{path}: expected a new file, this one is there; --force writes over it")
 
     def counting(
         self, name: str, *, remaining: bool = True
@@ -163,7 +179,7 @@ class Job:
 
     def wrote(self, path: Path | str) -> None:
         """Tell that a file was written."""
-        self.screen.print(f"[dim]wrote[/dim] {path}", soft_wrap=True)
+        self.screen.print(f"[dim]wrote[/dim] {escape(str(path))}", soft_wrap=True)
 
     def end(self, answer: Answer) -> int:
         """Show, write and complain; return the exit status."""
@@ -204,7 +220,7 @@ def verb(
     The function has options as defaults of its parameters, and gets the `Job` too where it has a parameter
     `job`. Options that are `passed` are those that the library takes under the same name: the function gets
     those that are given as further keywords, to pass them on; the others have the defaults of the library.
-    `files` name files to write, in the order of writing.
+    `files` name files to write, in the order of writing; a verb that writes new ones has the option --force.
     """
 
     def made(function: Callable[..., Answer]) -> Verb:
@@ -212,10 +228,23 @@ def verb(
         own = [name for name, each in signature.parameters.items() if isinstance(each.default, Option)]
         on = passed or {}
         options: dict[str, Option] = {**{name: signature.parameters[name].default for name in own}, **on}
-        every = {**options, **files}
+        older = {
+            former: replace(each, flag=None, panel=None, hidden=True)
+            for each in files.values()
+            for former in each.older
+        }
+        new = [
+            *(each for each in files.values() if not each.continued),
+            *(o for o in options.values() if o.writes),
+        ]
+        every = {**options, **files, **older, **({_FORCE: FORCE} if new else {})}
 
         def call(**texts: Any) -> int:
-            job = Job(files, {option: _listed(texts.pop(option)) for option in files})
+            wanted = {
+                option: [path for name in (option, *each.older) for path in _listed(texts.pop(name))]
+                for option, each in files.items()
+            }
+            job = Job(files, wanted, force=texts.pop(_FORCE, False))
             values = _values(job, options, texts)
             words = {name: values[name] for name in own}
             words |= {name: values[name] for name in on if values[name] is not None}
@@ -302,13 +331,6 @@ def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "
     for path in paths:
         if endings and path.suffix.lower() not in endings:
             raise InputError(f"{option} {path}: expected a name that ends in one of {', '.join(endings)}")
-
-
-def check_new(paths: Iterable[Path], *, force: bool) -> None:
-    """Make sure that no file is there yet, unless it may be written over; else InputError."""
-    for path in paths:
-        if path.exists() and not force:
-            raise InputError(f"--out {path}: expected a new file, this one is there; --force writes over it")
 
 
 def ended_early(statuses: Iterable[object], total: int | None = None) -> list[str]:

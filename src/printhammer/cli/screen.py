@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
+from rich.cells import cell_len
 from rich.markup import escape
 from rich.table import Table
 
@@ -13,6 +15,9 @@ from printhammer.cli.units import Units, shown, unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
+
+    from rich.console import Console, ConsoleOptions, RenderResult
+    from rich.table import Column as TableColumn
 
     from printhammer.hammer.hammer import Hammer
 
@@ -50,6 +55,43 @@ class Column(Generic[Row]):
         return shown(value, self.kind, units) if self.kind else format(value, self.format)
 
 
+class Sheet(Table):
+    """A table that a terminal too narrow for it shows in parts, so that no digit is cut off.
+
+    The parts stand one below the other, and each begins with the first column. Columns to the right are
+    numbers, which are never broken; texts to the left are, between words.
+    """
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Render the parts, with an empty line between them."""
+        for number, columns in enumerate(self._parts(console, options.max_width)):
+            part = copy(self)
+            part.columns = [replace(column, _index=place) for place, column in enumerate(columns)]
+            if number:
+                part.title = None
+                yield ""
+            yield from Table.__rich_console__(part, console, options)
+
+    def _parts(self, console: Console, width: int) -> list[list[TableColumn]]:
+        if not self.columns:
+            return [[]]
+        first, *others = self.columns
+        parts, room = [[first]], width - self._least(console, first)
+        for column in others:
+            room -= 2 + self._least(console, column)
+            if room < 0 and len(parts[-1]) > 1:
+                parts.append([first])
+                room = width - self._least(console, first) - 2 - self._least(console, column)
+            parts[-1].append(column)
+        return parts
+
+    def _least(self, console: Console, column: TableColumn) -> int:
+        """Return the least width of a column: of its longest number, or of its longest word."""
+        texts = [console.render_str(text) for text in (column.header, *column.cells) if isinstance(text, str)]
+        lines = [line for text in texts for line in text.plain.split(None if not column.no_wrap else "\n")]
+        return max(map(cell_len, lines), default=0)
+
+
 def table(
     columns: Sequence[Column[Row]],
     rows: Iterable[Row],
@@ -58,13 +100,15 @@ def table(
     most: int | None = None,
 ) -> Table:
     """Return a table without frame; of more than `most` rows the first and the last."""
-    made = Table(box=None, pad_edge=False, title=title, title_justify="left", title_style="bold")
+    made = Sheet(box=None, pad_edge=False, title=title, title_justify="left", title_style="bold")
     for column in columns:
         made.add_column(
             column.head(units),
             justify="left" if column.left else "right",
             header_style="bold",
             vertical="bottom",
+            no_wrap=not column.left,
+            overflow="fold",
         )
     cells = [[column.cell(row, units) for column in columns] for row in rows]
     hidden = 0 if most is None else len(cells) - most
@@ -79,8 +123,8 @@ def table(
 def facts(rows: Iterable[tuple[str, str | None]], title: str = "") -> Table:
     """Return names and what there is to say of them, a row each; what is None is left out."""
     made = Table(box=None, pad_edge=False, show_header=bool(title))
-    made.add_column(title, style="dim", header_style="bold")
-    made.add_column()
+    made.add_column(title, style="dim", header_style="bold", overflow="fold")
+    made.add_column(overflow="fold")
     for name, said in rows:
         if said is not None:
             made.add_row(name, said)

@@ -6,10 +6,9 @@ In the text everything else stays as it is, comments and layout too.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, MutableMapping
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
-from printhammer.errors import InputError, located
+from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.file import SELECTORS, TEXTS, Body, file_options, kinds_of, model_of, si_unit_of
 from printhammer.support.constants import Constant, quantities, shown
 
@@ -52,8 +51,7 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     if model is None or (note is None and name not in file_options(model) and name not in texts):
         tables = [name for name in SELECTORS if isinstance(document.get(name), Mapping)]
         known = [*document, *(f"{table}.{entry}" for table in tables for entry in document[table])]
-        close = get_close_matches(key, known, 1)
-        expected = repr(close[0]) if close else "one such as 'pack.stiffness'"
+        expected = nearest(key, known, "one such as 'pack.stiffness'")
         raise InputError(f"the key {shown(key)} is not known, expected {expected}")
     if note is None or value is None:
         return key, value

@@ -13,14 +13,13 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from difflib import get_close_matches
 from importlib import import_module
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from printhammer.errors import InputError, located
+from printhammer.errors import InputError, located, nearest
 from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
 from printhammer.support.constants import (
     STATUSES,
@@ -194,9 +193,9 @@ def _only(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
     known = list(known)
     for key in table:
         if key not in known:
-            close = get_close_matches(key, known, 1)
-            hint = f"expected {close[0]!r}" if close else f"expected one of {', '.join(known)}"
-            raise InputError(f"the key {shown(prefix + key, quotes=False)} is not known, {hint}")
+            raise InputError(
+                f"the key {shown(prefix + key, quotes=False)} is not known, expected {nearest(key, known)}"
+            )
 
 
 def _read(

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.errors import InputError, located
+from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from printhammer.drive.waveforms.shapes import Waveform
+
+_CHANGED: Final = ", changed"
 
 REPLACED: Final = "replaced"
 """Source of a constant that `Hammer.replace` has set, unless another is given."""
@@ -62,8 +64,9 @@ def load(name_or_path: str | Path) -> Hammer:
     except UnicodeDecodeError:
         raise InputError(f"{path}: expected a TOML file in UTF-8") from None
     except FileNotFoundError:
-        names = ", ".join(shipped())
-        raise InputError(f"{path}: there is no such file, expected a path or one of {names}") from None
+        raise InputError(
+            f"{path}: there is no such file, expected a path or {nearest(str(path), shipped())}"
+        ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: the hammer file cannot be read ({reason})") from None
@@ -135,8 +138,8 @@ class Hammer:
             As for `replace`.
         """
         constant = 'mass = { value = 1.0, unit = "kg", status = "assumed", source = "to be replaced" }'
-        bare = cls.from_toml(f'format = {FORMAT}\nname = "hammer"\n\n{constant}\n', name=name)
-        return bare.replace({"name": name, "mass": mass, **parts}, status=status, source=source)
+        bare = cls.from_toml(f'format = {FORMAT}\nname = "hammer"\n\n{constant}\n')
+        return bare._with({"name": name, "mass": mass, **parts}, status, source, name)
 
     @property
     def name(self) -> str:
@@ -155,7 +158,7 @@ class Hammer:
 
     @property
     def path(self) -> str:
-        """File that it was read from, as messages name it."""
+        """File that it was read from, as messages name it; of a hammer that was changed they say so."""
         return self._where
 
     @property
@@ -274,15 +277,19 @@ class Hammer:
             The key is not known, or the hammer would not be one.
         """
         wanted = {key: value} if isinstance(key, str) else dict(key)
+        return self._with(wanted, status, source, f"{self._where.removesuffix(_CHANGED)}{_CHANGED}")
+
+    def _with(self, wanted: Mapping[str, Any], status: str, source: str, where: str) -> Hammer:
+        """Return a new hammer with keys replaced; `where` is what messages call it."""
         document = dict(self._document)
         edits: list[Edit] = []
-        with located(self._where):
+        with located(where):
             for name, entry in wanted.items():
                 edit = edit_of(document, name, entry, status, source)
                 document = changed(document, [edit])
                 edits.append(edit)
-        contents = build(document, self._where, self._folder)
-        return Hammer(contents, document, self._text, (*self._edits, *edits), self._where, self._folder)
+        contents = build(document, where, self._folder)
+        return Hammer(contents, document, self._text, (*self._edits, *edits), where, self._folder)
 
     def to_toml(self) -> str:
         """Return the text of the hammer file: as it was read, with what was replaced."""

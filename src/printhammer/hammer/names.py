@@ -18,10 +18,9 @@ whether evenly or by factors, is that of `range_of`.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Final
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, nearest
 from printhammer.hammer.file import SELECTORS, Body, model_of
 from printhammer.support.constants import Quantity, quantities, shown
 
@@ -116,6 +115,4 @@ def in_unit_of_drive(note: Quantity, unit: str) -> Quantity:
 
 def unknown(name: str, known: Collection[str], where: str = "") -> InputError:
     """Return the error that says that a constant is not known, with the nearest name or all of them."""
-    close = get_close_matches(name, known, 1)
-    expected = repr(close[0]) if close else f"one of {', '.join(known)}"
-    return InputError(f"{where or 'constant'} = {shown(name)} is not known, expected {expected}")
+    return InputError(f"{where or 'constant'} = {shown(name)} is not known, expected {nearest(name, known)}")

@@ -201,7 +201,11 @@ def motion_series() -> Callable[..., None]:
     """Compile `_motion_series` (cached on disk by numba)."""
     import numba
 
-    compiled: Any = numba.njit(cache=True)(_motion_series)
+    try:
+        compiled: Any = numba.njit(cache=True)(_motion_series)
+    except RuntimeError:
+        # No folder for machine code can be written to.
+        compiled = numba.njit(_motion_series)
     return compiled  # type: ignore[no-any-return]
 
 

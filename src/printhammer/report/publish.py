@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tempfile
 from contextlib import contextmanager
@@ -20,6 +21,41 @@ CLAIMS: Final = "claims.json"
 PDF: Final = "report.pdf"
 
 _PICTURE: Final = re.compile(r"figure\d\d\.(svg|pdf|png)")
+
+
+def check_place(out: str | Path) -> None:
+    """Make sure that a report writes over nothing in a folder but an earlier report, which it replaces.
+
+    Raises
+    ------
+    InputError
+        A file is there that is no part of an earlier report.
+    """
+    folder = Path(out)
+    pictures = folder / PICTURES
+    drawn = sorted(pictures.iterdir()) if pictures.is_dir() else []
+    places = [*(folder / name for name in (PAGE, CLAIMS, PDF)), *filter(_is_picture, drawn)]
+    there = [path for path in places if path.exists()]
+    if there and not _is_report(folder):
+        raise InputError(
+            f"{there[0]}: expected a new folder or an earlier report, this file is of neither; --force writes"
+            " over it"
+        )
+
+
+def _is_report(folder: Path) -> bool:
+    """Tell whether a folder holds a report, even one that was not published to its end."""
+    try:
+        claims = json.loads((folder / CLAIMS).read_bytes())
+    except (OSError, ValueError):
+        return False
+    return isinstance(claims, list) and all(
+        isinstance(c, dict) and {"name", "verdict"} <= c.keys() for c in claims
+    )
+
+
+def _is_picture(path: Path) -> bool:
+    return _PICTURE.fullmatch(path.name) is not None
 
 
 @contextmanager
@@ -58,7 +94,7 @@ def _publish(draft: Path, folder: Path) -> None:
     (folder / PAGE).unlink(missing_ok=True)
     # Pictures of an earlier report that this one does not have would pass for its own.
     for path in pictures.iterdir():
-        if _PICTURE.fullmatch(path.name) and path.relative_to(folder) not in made:
+        if _is_picture(path) and path.relative_to(folder) not in made:
             path.unlink()
     for name in (CLAIMS, PDF):
         if Path(name) not in made:

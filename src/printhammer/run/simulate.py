@@ -100,10 +100,13 @@ def simulate(
 
 
 def announce_compiling(callback: Callable[[str], None] | None) -> None:
-    """Have `callback` called with one sentence before machine code is made that is not kept on disk yet."""
-    from printhammer.kernel.compile import specialise
+    """Have `callback` called with one sentence before machine code is made that is not kept on disk yet.
 
-    specialise.announce = callback
+    And, once, where it cannot be kept there.
+    """
+    from printhammer.kernel.compile import cache, specialise
+
+    specialise.announce = cache.announce = callback
 
 
 def end_of_run(drive: Drive, duration: float | str | None) -> float:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from difflib import get_close_matches
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, nearest
 from printhammer.hammer.file import kinds_of, model_of
 from printhammer.hammer.names import FORCE, PERIOD, RATE, TIMING, in_unit_of_drive, quantity_of
 from printhammer.results import Declared, part
@@ -127,8 +126,7 @@ def _resolved(
     known += [f"waveforms.{name}.amplitude" for name in named]
     fired = own_waveform is None and not named
     known += [name for name in hammer.constants if fired or not name.startswith("waveform.")]
-    close = get_close_matches(key, known, 1)
-    hint = f"{close[0]!r}" if close else "one such as 'pack.stiffness', 'drive.rate' or 'state.x'"
+    hint = nearest(key, known, "one such as 'pack.stiffness', 'drive.rate' or 'state.x'")
     raise InputError(
         f"{where}.key = {shown(key)} names no constant of {hammer.name} or its drive, expected {hint}"
     )

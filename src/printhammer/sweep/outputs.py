@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, nearest
 from printhammer.results import Declared, part
 from printhammer.support.constants import shown
 from printhammer.sweep.quantities import read_quantity
@@ -177,8 +176,7 @@ def _chosen(names: Sequence[str] | str, known: Mapping[str, Output], where: str)
         return list(known.values())
     for name in names:
         if name not in known:
-            close = get_close_matches(name, known, 1)
-            hint = repr(close[0]) if close else f'some of {", ".join(known)}, or "all"'
+            hint = nearest(name, known, f'some of {", ".join(known)}, or "all"')
             raise InputError(f"outputs.{where}: {shown(name)} is not known, expected {hint}")
     if len(set(names)) < len(names):
         raise InputError(f"outputs.{where}: expected different names")

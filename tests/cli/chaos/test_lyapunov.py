@@ -56,7 +56,7 @@ def test_a_run_that_stops_is_told(cli: Callable, tmp_path: Path) -> None:
     ph.load("hendriks-1983").replace("magnet.range_max", "250 um").save(path)
     points = tmp_path / "exponents.csv"
     for periods, said in (("1 ms", "1 of 1 runs"), ("1 ms, 1.1 ms", "2 of 2 runs")):
-        done = cli("lyapunov", path, "--period", periods, *FEW, "--out", points)
+        done = cli("lyapunov", path, "--period", periods, *FEW, "--out", points, "--force")
         assert done.status == 1
         assert said in done.err
         assert "range left" in done.err

@@ -96,7 +96,7 @@ def test_a_law_that_is_rejected(cli: Callable, tmp_path: Path) -> None:
     columns = lab.rebounds()
     columns["rebound speed"] = 0.7 * columns["impact speed"]
     table = write(tmp_path / "r.csv", noisy(columns, "rebound speed", 0.005))
-    done = cli("fit", "backstop", table, "--plot", tmp_path / "r.svg")
+    done = cli("fit", "backstop", table, "--out", tmp_path / "r.svg")
     assert done.status == 0
     assert "rejected, p" in done.out
     assert "not rejected" not in done.out
@@ -121,8 +121,8 @@ def test_a_law_that_is_rejected(cli: Callable, tmp_path: Path) -> None:
         ("magnet {spring}", ("spring.csv", "'current' is missing")),
         ("magnet {magnet} --zero here", ("--zero", "'here'")),
         ("magnet {magnet} --hammer nobody", ("nobody", "no such file")),
-        ("magnet {magnet} --plot picture.txt", ("picture.txt", ".svg")),
-        ("magnet {magnet} --out {magnet}", ("magnet.csv", "this one is read")),
+        ("magnet {magnet} --out picture.txt", ("picture.txt", ".svg")),
+        ("magnet {magnet} --covariance {magnet}", ("magnet.csv", "this one is read")),
         ("backstop", ("expected a table of rebounds, or the geometry",)),
         ("backstop --radius '2 mm'", ("Young's modulus: 0 given",)),
         ("backstop {backstop} --poisson x", ("--poisson", "'x'")),

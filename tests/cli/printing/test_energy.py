@@ -18,7 +18,7 @@ def unsearched(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_burst_and_its_files(cli: Callable, tmp_path: Path, unsearched: None) -> None:
     paths = {kind: tmp_path / f"burst.{kind}" for kind in ("csv", "nc", "png", "svg")}
     out = [word for path in paths.values() for word in ("--out", path)]
-    words = ("--rate", "400 Hz", "--dots", "2", "--force", "0.3", "--supply", *out)
+    words = ("--rate", "400 Hz", "--dots", "2", "--least-force", "0.3", "--supply", *out)
     done = cli("energy", CRUDE, *words)
     assert done.status == 0
     assert "2 of 2 adequate at 400 Hz" in done.out
@@ -30,7 +30,7 @@ def test_a_burst_and_its_files(cli: Callable, tmp_path: Path, unsearched: None) 
 
 
 def test_inadequate_dots_end_with_status_1(cli: Callable, unsearched: None) -> None:
-    words = ("--rate", "400 Hz", "--dots", "2", "--force", "2", "--largest", "1.2 A", "--units", "inch")
+    words = ("--rate", "400 Hz", "--dots", "2", "--least-force", "2", "--largest", "1.2 A", "--units", "inch")
     done = cli("energy", CRUDE, *words)
     assert done.status == 1
     assert "0 of 2 dots are adequate" in done.err
@@ -57,7 +57,7 @@ def test_bad_input_is_one_sentence(refused: Callable, words: tuple[str, ...], sa
 
 def test_several_rates(cli: Callable, tmp_path: Path, unsearched: None) -> None:
     out, picture = tmp_path / "rates.nc", tmp_path / "rates.png"
-    words = ("--rates", "300 Hz, 400 Hz, 2", "--dots", "2", "--force", "0.3")
+    words = ("--rates", "300 Hz, 400 Hz, 2", "--dots", "2", "--least-force", "0.3")
     done = cli("energy", CRUDE, *words, "--out", out, "--out", picture)
     assert done.status == 0
     assert done.out.count("2 of 2") == 2

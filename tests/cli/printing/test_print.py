@@ -58,7 +58,7 @@ def test_a_pattern_and_a_head_of_ones_own(cli: Callable, tmp_path: Path) -> None
 
 def test_a_drawing_goes_on_from_line_to_line(cli: Callable, tmp_path: Path) -> None:
     Pattern("bar", np.ones((18, 2), dtype=bool)).save(tmp_path / "bar.PNG")
-    words = ("--pattern", tmp_path / "bar.PNG", "--rate", "500 Hz", "--out", tmp_path / "dots.nc")
+    words = ("--pattern", tmp_path / "bar.PNG", "--rate", "500 Hz", "--out", tmp_path / "dots.nc", "--force")
     for more, gap in (((), 0.0), (("--line-gap", "0.5"), 0.5)):
         assert cli("print", *HAMMER, *words, *more).status == 0
         attributes = xr.load_dataset(tmp_path / "dots.nc").attrs

@@ -64,16 +64,20 @@ def test_bad_input_is_one_sentence(refused: Callable, words: str, sentence: str)
 def test_a_page_is_printed_with_a_table(cli: Callable, quick: Path, tmp_path: Path) -> None:
     table, dots = tmp_path / "table.json", tmp_path / "dots.csv"
     ph.tune(ph.load(quick), rate=1850.0, history=1).save(table)
-    words = ("print", "HI", "--hammer", quick, "--rate", "1.85kHz", "--out", dots)
+    words = ("print", "HI", "--hammer", quick, "--rate", "1.85kHz", "--out", dots, "--force")
     done, without = cli(*words, "--table", table), cli(*words)
     assert done.status == without.status == 0
     good, plain = (re.search(r"within limits +(\d+) of (\d+) dots", one.out) for one in (done, without))
     assert good is not None
     assert plain is not None
     assert int(good[1]) == int(good[2]) > int(plain[1])
-    refused = cli("print", "HI", "--hammer", CRUDE, "--rate", "1.85kHz", "--out", dots, "--table", table)
+    refused = cli(
+        "print", "HI", "--hammer", CRUDE, "--rate", "1.85kHz", "--out", dots, "--table", table, "--force"
+    )
     assert refused.status == 2
     assert "the table is made for another hammer" in refused.err
-    beyond = cli("print", "HI", "--hammer", quick, "--rate", "2kHz", "--out", dots, "--table", table)
+    beyond = cli(
+        "print", "HI", "--hammer", quick, "--rate", "2kHz", "--out", dots, "--table", table, "--force"
+    )
     assert beyond.status == 2
     assert "is made for 1850 Hz" in beyond.err

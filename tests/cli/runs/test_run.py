@@ -61,7 +61,7 @@ def test_a_lost_dot_is_told(cli) -> None:
 def test_a_run_that_stops_early_ends_with_status_1(cli, hammer: "ph.Hammer", tmp_path: Path) -> None:
     path = tmp_path / "short.toml"
     hammer.replace("magnet.range_max", "0.009 in").save(path)
-    outcome = cli("run", path, "--json", tmp_path / "out.json")
+    outcome = cli("run", path, "--out", tmp_path / "out.json")
     assert outcome.status == 1
     assert "range left" in outcome.out
     assert "left the range" in outcome.err
@@ -107,7 +107,7 @@ def test_files(cli, hammer: "ph.Hammer", tmp_path: Path) -> None:
 def test_a_drive_file(cli, tmp_path: Path) -> None:
     path = tmp_path / "drive.toml"
     path.write_text('format = 1\n[burst]\nrate = "1 kHz"\npulses = 2\nbursts = 2\ngap = "3 ms"\n', "utf-8")
-    outcome = cli("run", "--drive", path, "--json", tmp_path / "out.json")
+    outcome = cli("run", "--drive", path, "--out", tmp_path / "out.json")
     assert outcome.status == 0
     dots = json.loads((tmp_path / "out.json").read_text())["dots"]
     assert [dot["fired_at_s"] for dot in dots] == pytest.approx([0.0, 1e-3, 4e-3, 5e-3])
@@ -122,7 +122,7 @@ def test_a_long_train_shows_its_ends(cli) -> None:
 
 @pytest.mark.parametrize("scheme", ["trapezoid", "runge-kutta-4"])
 def test_the_schemes_of_1983(cli, scheme: str, tmp_path: Path) -> None:
-    outcome = cli("run", "--scheme", scheme, "--json", tmp_path / "out.json")
+    outcome = cli("run", "--scheme", scheme, "--out", tmp_path / "out.json")
     assert outcome.status == 0
     told = json.loads((tmp_path / "out.json").read_text())
     assert told["provenance"]["scheme"] == scheme

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.errors import InputError, located
+from printhammer.errors import InputError, located, nearest
 from printhammer.identify.lowpass import time_constant
 from printhammer.identify.result import REPLACED, Fit, FittedConstant
 from printhammer.identify.shots.approach import Prior
@@ -119,9 +119,10 @@ def _free_keys(
             raise InputError(f"free: {key} is given twice, expected it once")
         given_otherwise = hertz and key in (_DAMPING, "backstop.stiffness")
         if (key not in hammer.constants and not given_otherwise) or key == "platen":
+            known = [name for name in hammer.constants if name != "platen"]
+            moving = nearest(key, known, "one such as 'mass'")
             raise InputError(
-                f"free: {key!r} is no constant of {hammer.path} that moves the armature, expected one such as"
-                " 'mass'"
+                f"free: {key!r} is no constant of {hammer.path} that moves the armature, expected {moving}"
             )
         if key == _DAMPING and not touched:
             raise InputError(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numba
 from numba.core.registry import CPUDispatcher
 
+from printhammer.kernel.compile.cache import keep
 from printhammer.kernel.compile.linking import KeptCompiler, PartCompiler, WholeCompiler
 
 if TYPE_CHECKING:
@@ -86,4 +87,4 @@ def entry(function: Function) -> Function:
     sources, that :mod:`printhammer.kernel.compile.specialise` defines in a template module, keeps them apart.
     """
     function.__qualname__ += "_" + function.__globals__["DIGEST"]
-    return numba.njit(cache=True, pipeline_class=WholeCompiler, **_CALLED)(function)  # type: ignore[no-any-return]
+    return keep(numba.njit(pipeline_class=WholeCompiler, **_CALLED)(function))  # type: ignore[no-any-return]

@@ -104,8 +104,10 @@ class Kernel:
         except KeyError:
             raise AttributeError(name) from None
         if announce is not None and not self._announced and not _is_ready(function):
+            from printhammer.kernel.compile.cache import kept
+
             self._announced = True
-            announce(f"compiling the kernel for {self.label} (once; kept on disk)")
+            announce(f"compiling the kernel for {self.label} ({kept(function)})")
         return function
 
 
@@ -115,8 +117,9 @@ def _is_ready(function: Any) -> bool:
         # Plain Python where NUMBA_DISABLE_JIT is set.
         return True
     python = function.py_func
-    folder = Path(function.stats.cache_path)
-    return any(folder.glob(f"{Path(inspect.getfile(python)).stem}.{python.__qualname__}-*.nbc"))
+    folder = function.stats.cache_path
+    name = f"{Path(inspect.getfile(python)).stem}.{python.__qualname__}-*.nbc"
+    return folder is not None and any(Path(folder).glob(name))
 
 
 def _source(module: ModuleType) -> bytes:

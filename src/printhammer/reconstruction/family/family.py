@@ -49,6 +49,9 @@ LEAST: Final = 20  # Number of hammers that make a family at least
 
 COUNT: Final = 24  # Number of hammers of the family unless told otherwise
 
+WRITTEN: Final = ("family.csv", "family.json")
+"""Files of a family."""
+
 FORMAT: Final = 1
 
 _PRINTED: Final = 2e-3
@@ -162,8 +165,8 @@ def write_family(
         dict(zip(_keys([row.constants for row in candidates]), tables[1][number], strict=True))
         for number in chosen
     ]
-    write_file(place / "family.csv", csv_text(family))
-    write_file(place / "family.json", json_text(family, rows))
+    for name, text in zip(WRITTEN, (csv_text(family), json_text(family, rows)), strict=True):
+        write_file(place / name, text)
     shelf.remove()
     return family
 

@@ -22,8 +22,13 @@ EXAMPLE: Final = "printhammer fit magnet magnet.csv --spring spring.csv --hammer
 _RESULTS: Final = "Results"
 # In the order of writing.
 _FILES: Final = {
-    "plot": opt.files("Picture of data and residuals, .svg, .png or .pdf.", many=False, panel=_RESULTS),
-    "out": opt.file("The constants as a fragment of a hammer file, TOML.", panel=_RESULTS),
+    "out": opt.files(
+        "The constants as a fragment of a hammer file (.toml), or picture of data and residuals (.svg, .png,"
+        " .pdf); may be given repeatedly.",
+        ".toml",
+        panel=_RESULTS,
+        older=("plot",),
+    ),
     "covariance": opt.file("Covariance of the constants, CSV.", panel=_RESULTS),
     "into": opt.file("The hammer of --hammer with the constants replaced.", panel=_RESULTS),
 }
@@ -98,7 +103,7 @@ def spring(
 
 @verb(
     "fit pack",
-    "printhammer fit pack pack.csv --thickness '0.007 in' --plot pack.png",
+    "printhammer fit pack pack.csv --thickness '0.007 in' --out pack.png",
     {
         **_PASSED,
         "thickness": opt.quantity("m", "LENGTH", "Thickness of the pack, such as '0.007 in'."),
@@ -225,6 +230,7 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
     """Fit, and return what is shown and written."""
     from printhammer.cli.verbs.laboratory.fit_report import described
     from printhammer.hammer.hammer import load
+    from printhammer.support.outputs import write_file
 
     for path in job.wanted["into"]:
         if hammer is None:
@@ -233,8 +239,7 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
     known = None if hammer is None else load(hammer)
     fit = fitted(known)
     files = {
-        "plot": Content(plot=fit.plot),
-        "out": Content.text(fit.fragment),
+        "out": Content(lambda path: write_file(path, fit.fragment()), fit.plot),
         "covariance": Content.text(fit.covariance_table),
     }
     if job.wanted["into"] and known is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from printhammer.cli import options as opt
-from printhammer.cli.runner import Answer, Job, check_new, verb
+from printhammer.cli.runner import Answer, Job, verb
 from printhammer.cli.terminal import say
 from printhammer.errors import InputError
 
@@ -55,7 +55,6 @@ def measure(
     out: Path | None = opt.folder("Table to write, CSV; a folder for all.", metavar="FILE"),
     exact: bool = opt.switch("Begin with sensors without any error.", panel=_SENSORS),
     seed: int = opt.whole("Of the random numbers.", default=0),
-    force: bool = opt.FORCE,
     **passed: Any,
 ) -> Answer:
     """Measure a hammer in a synthetic laboratory, with the errors of real sensors.
@@ -64,7 +63,7 @@ def measure(
     """
     from printhammer.identify.bench.laboratory import measure as measured
 
-    kinds, paths = _places(kind, out, job.inputs, force)
+    kinds, paths = _places(kind, out, job)
     bench = {name: passed.pop(name) for name in (*_LISTS, *_TIMES) if name in passed}
     settings = _settings(kinds, {**passed, **opt.given(exact=exact or None)})
     options = _options(kinds, bench)
@@ -87,9 +86,7 @@ def measure(
     return Answer()
 
 
-def _places(
-    kind: str, out: Path | None, inputs: list[Path], force: bool
-) -> tuple[list[str], dict[str, Path]]:
+def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str, Path]]:
     """Return what is to be measured, and the files to write."""
     from printhammer.identify.bench.laboratory import KINDS
     from printhammer.support.outputs import check_outputs
@@ -103,14 +100,14 @@ def _places(
         if out.suffix.lower() != ".csv":
             raise InputError(f"--out {out}: expected a name that ends in .csv")
         paths = {kind: out}
-        check_outputs(paths.values(), inputs)
+        check_outputs(paths.values(), job.inputs)
     else:
         if out.exists() and not out.is_dir():
             raise InputError(f"--out {out}: expected a folder, this is a file")
         paths = {each: out / f"{each}.csv" for each in KINDS}
         if out.is_dir():
-            check_outputs(paths.values(), inputs)
-    check_new(paths.values(), force=force)
+            check_outputs(paths.values(), job.inputs)
+    job.check_new(paths.values())
     return list(paths), paths
 
 

@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from rich.markup import escape
+
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
 from printhammer.cli.screen import Column, table
@@ -28,8 +30,10 @@ _LOG: Final = opt.argument("LOG", "Log of a search.", default=..., type=Path, is
 _JUDGED: Final = opt.argument("JUDGED", "Log of judged candidates.", default=..., type=Path, is_input=True)
 
 
-def _written(what: str, metavar: str = "FILE") -> opt.Files:
-    return opt.Files(what, metavar, default=..., type=Path, argument=True, pictures=False)
+def _written(what: str, metavar: str = "FILE", *, continued: bool = False) -> opt.Files:
+    return opt.Files(
+        what, metavar, default=..., type=Path, argument=True, pictures=False, continued=continued
+    )
 
 
 def _json(table: dict[str, Any]) -> str:
@@ -39,7 +43,7 @@ def _json(table: dict[str, Any]) -> str:
 @verb(
     "reconstruct search",
     EXAMPLE,
-    log=_written("JSON lines, one for each candidate; a search begun there goes on.", "LOG"),
+    log=_written("JSON lines, one for each candidate; a search begun there goes on.", "LOG", continued=True),
 )
 def search(
     job: Job,
@@ -106,7 +110,7 @@ def search(
 @verb(
     "reconstruct judge",
     "printhammer reconstruct judge all.jsonl judged.jsonl --best 20",
-    judged=_written("Log of judged candidates.", "JUDGED"),
+    judged=_written("Log of judged candidates.", "JUDGED", continued=True),
 )
 def judge(
     job: Job,
@@ -259,11 +263,12 @@ def family(
     out: Path = opt.folder("Where to write.", default=Path("build/family")),
 ) -> Answer:
     """Choose clearly different hammers that do equally well, and tell which conclusions hold for all."""
-    from printhammer.reconstruction.family.family import write_family
+    from printhammer.reconstruction.family.family import WRITTEN, write_family
 
+    job.check_new(out / name for name in WRITTEN)
     announce_compiling()
-    members = write_family(judged, out, lambda text: job.show(f"[dim]{text}[/dim]"))
-    return Answer([f"{len(members)} hammers; [dim]wrote[/dim] {out}"])
+    members = write_family(judged, out, lambda text: job.show(f"[dim]{escape(text)}[/dim]"))
+    return Answer([f"{len(members)} hammers; [dim]wrote[/dim] {escape(str(out))}"])
 
 
 @verb("reconstruct ship", "printhammer reconstruct ship judged.jsonl all.jsonl --out build/hammer")
@@ -292,7 +297,9 @@ def ship(
     searches = [{**heading, "candidates": len(tried)} for heading, tried in map(read_search, logs)]
     hammer = shipped_hammer(best_of(rows)["constants"], name)
     folder = make_folder(out)
-    check_outputs([folder / f"{name}.toml", folder / "search.json"], job.inputs)
+    written = [folder / f"{name}.toml", folder / "search.json"]
+    check_outputs(written, job.inputs)
+    job.check_new(written)
     announce_compiling()
     hammer.save(folder / f"{name}.toml")
     with job.telling("judging") as say:

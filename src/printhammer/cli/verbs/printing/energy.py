@@ -24,7 +24,7 @@ _MOST_RATES: Final = 200
     "printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png",
     {
         "dots": opt.whole("Number of dots.", default=8),
-        "force": opt.number("Least force in parts of that of the single pulse (0.9)."),
+        "force": opt.number("Least force in parts of that of the single pulse (0.9).", flag="--least-force"),
         "largest": opt.text("CURRENT", "Largest current of either sign, such as '2 A'.", default="2 A"),
         "slew": opt.number("Largest slope of the current, A/s (the hammer's own waveform's).", metavar="A/S"),
         "spacing": opt.text("TIME", "Time between nodes of the current, such as '50 us'."),

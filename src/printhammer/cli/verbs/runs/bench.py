@@ -19,9 +19,14 @@ if TYPE_CHECKING:
 
 @verb(
     "bench",
-    "printhammer bench --quick --json build/bench.json",
-    json=opt.file("Write the figures as JSON."),
-    markdown=opt.file("Write the tables as Markdown."),
+    "printhammer bench --quick --out build/bench.json",
+    out=opt.file(
+        "Figures (.json) or tables (.md); may be given repeatedly.",
+        ".json",
+        ".md",
+        many=True,
+        older=("json", "markdown"),
+    ),
 )
 def bench(
     job: Job,
@@ -32,14 +37,16 @@ def bench(
     """Measure speed and error against a slow reference and other solvers, single runs and ensembles."""
     from printhammer import bench as benchmark
     from printhammer.bench.entry import load_peers
+    from printhammer.support.outputs import write_file
 
     others = None if peers is None else load_peers(Path(peers))
     announce_compiling()
     with job.telling() as say:
         report = benchmark.run(quick=quick, threads=threads, peers=others, say=say)
+    texts = {".json": report.to_json, ".md": report.to_markdown}
     return Answer(
         described(report),
-        files={"json": Content.text(report.to_json), "markdown": Content.text(report.to_markdown)},
+        files={"out": Content(lambda path: write_file(path, texts[path.suffix.lower()]()))},
     )
 
 

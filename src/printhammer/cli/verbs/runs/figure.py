@@ -34,6 +34,7 @@ def figure(
 ) -> Answer:
     """Draw a figure of the paper as SVG, PNG and PDF."""
     from printhammer.figures import FIGURES, save
+    from printhammer.figures.elements.save import FORMATS
     from printhammer.support.outputs import make_folder
 
     entry = FIGURES.get(opt.read_whole(number, "figure"))
@@ -45,8 +46,6 @@ def figure(
         )
     if scheme != "exact" and entry.number != _POINCARE:
         raise InputError(f"--scheme = {scheme}, expected it with figure {_POINCARE}, not {entry.number}")
-    make_folder(out)
-    job.screen.print(f"[bold]Figure {entry.number}[/bold]  {entry.title}")
     options: dict[str, Any] = {}
     name = f"figure{entry.number:02d}"
     if entry.number == _POINCARE:
@@ -56,6 +55,9 @@ def figure(
         if scheme != "exact":
             options |= {"scheme": scheme, "reading": reading}
             name = f"{name}-{scheme}-{reading}"
+    job.check_new(out / f"{name}.{kind}" for kind in FORMATS)
+    make_folder(out)
+    job.screen.print(f"[bold]Figure {entry.number}[/bold]  {entry.title}")
     for path in save(entry.draw(hammer, **options), out, name):
         job.wrote(path)
     return Answer()

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.runner import PICTURES, Answer, Content, Job, check_new, verb
+from printhammer.cli.runner import PICTURES, Answer, Content, Job, verb
 from printhammer.cli.screen import facts
 from printhammer.errors import InputError
 
@@ -50,7 +50,6 @@ def map_(
         "Displacement records to compare with, CSV or NetCDF; rates and times are then theirs unless given."
     ),
     figure: str | None = opt.choice("8|9", "Which figure of the paper a picture is like (9)."),
-    force: bool = opt.FORCE,
     **passed: Any,
 ) -> Answer:
     """Fire bursts at many rates and map the displacement against time and rate, as Figs. 8 and 9.
@@ -61,7 +60,6 @@ def map_(
     from printhammer.maps.measured import load_measured_map
     from printhammer.results.files import save_dataset
 
-    check_new(job.outputs, force=force)
     drawn = _number_of(figure, job.outputs, measured)
     beside = None if measured is None else load_measured_map(measured)
     grid, moments = _axes(beside, lowest, highest, rates, times)

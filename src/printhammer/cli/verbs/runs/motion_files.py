@@ -43,6 +43,16 @@ def write_rows(rows: Sequence[Dot] | Sequence[Contact], kind: type[Dot | Contact
     (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(frame, path)
 
 
+def write_motion(motion: Motion, path: Path) -> None:
+    """Write a motion: all that it tells as JSON, else its record; errors as for `Motion.save`."""
+    from printhammer.support.outputs import write_file
+
+    if path.suffix.lower() == ".json":
+        write_file(path, as_json(motion))
+    else:
+        motion.save(path)
+
+
 def as_json(motion: Motion) -> str:
     """Return what a motion tells as JSON, SI, names with units."""
     times, x = motion.maxima

@@ -33,13 +33,18 @@ _COLUMNS: Final[tuple[Column[Any], ...]] = (
 def paper(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    out: Path = opt.folder("Where to write the report.", default=Path("build/paper")),
+    out: Path = opt.folder(
+        "Where to write the report, in place of an earlier one.", default=Path("build/paper")
+    ),
     pdf: bool = opt.switch("Write the report as report.pdf too."),
     strict: bool = opt.switch("End with status 1 if a claim fails."),
 ) -> Answer:
     """Draw the figures, judge the claims, and write one HTML report, the figures and claims.json."""
     from printhammer.report import write_report
+    from printhammer.report.publish import check_place
 
+    if not job.force:
+        check_place(out)
     with job.telling() as say:
         report = write_report(hammer, out, progress=say, pdf=pdf)
     counts = ", ".join(_verdict(verdict, f"{report.count(verdict)} {verdict}") for verdict in _STYLES)

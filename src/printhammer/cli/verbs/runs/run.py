@@ -44,12 +44,13 @@ _record = partial(opt.file, panel=_FILES)
         ),
         "points": opt.whole("Points in the record of the motion."),
     },
-    csv=_record("Record of the motion, CSV."),
-    parquet=_record("Record of the motion, Parquet."),
+    out=opt.results(
+        "Motion, as .json its dots, contacts and energies",
+        panel=_FILES,
+        older=("csv", "parquet", "json", "plot"),
+    ),
     dots=_record("Dots, .csv or .parquet.", ".csv", ".parquet"),
     contacts=_record("Contacts, .csv or .parquet.", ".csv", ".parquet"),
-    json=_record("Dots, contacts, energies and provenance, JSON."),
-    plot=opt.files("Picture of the motion, .svg, .png or .pdf.", many=False, panel=_FILES),
 )
 def run(
     job: Job,
@@ -67,7 +68,7 @@ def run(
 
     Ends with status 1 where the run stopped before its end, which the status line names.
     """
-    from printhammer.cli.verbs.runs.motion_files import as_json, write_rows
+    from printhammer.cli.verbs.runs.motion_files import write_motion, write_rows
     from printhammer.run.contacts import Contact, Dot
     from printhammer.run.simulate import simulate
 
@@ -83,12 +84,9 @@ def run(
         shown,
         note=escape(repr(motion.drive)[1:-1]),
         files={
-            "csv": Content(motion.to_csv),
-            "parquet": Content(motion.to_parquet),
+            "out": Content(partial(write_motion, motion), motion.plot),
             "dots": Content(partial(write_rows, motion.dots, Dot)),
             "contacts": Content(partial(write_rows, motion.contacts, Contact)),
-            "json": Content.text(partial(as_json, motion)),
-            "plot": Content(plot=motion.plot),
         },
         complaints=[] if motion.ok else [motion.message],
     )

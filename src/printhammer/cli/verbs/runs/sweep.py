@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def sweep(
     job: Job,
     spec: Path | None = opt.argument("SPEC", "A spec file, TOML.", type=Path),
-    out: Path | None = opt.folder("Store of the results (Zarr), new or gone on with."),
+    out: Path | None = opt.folder("Store of the results (Zarr), new or gone on with.", writes=False),
     threads: int | None = opt.THREADS,
     dask: str | None = opt.text("ADDRESS", "Work on a dask cluster: address of its scheduler."),
     check: bool = opt.switch("Say what would be done and how much room it takes; do nothing."),
