@@ -8,6 +8,7 @@ counts from its firing on. Every number is SI; a string with a unit ("1.2 kHz") 
 from __future__ import annotations
 
 import math
+from copy import copy
 from typing import TYPE_CHECKING, Any, Self, SupportsIndex
 
 import numpy as np
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import numpy.typing as npt
+
+    from printhammer.support.arrays import FloatArray
 
 __all__ = ["Burst", "Drive", "Overlap", "PulseTrain", "SineForce"]
 
@@ -126,6 +129,17 @@ class PulseTrain(_Pulsed):
             raise InputError(f"pulses = {count} is expected to come with a rate, a period or firing times")
         steps, self._spacing, spacing = even_times(rate, period, count) if ways else (np.zeros(1), None, None)
         super().__init__(waveform, first + steps, overlap, spacing)
+
+    def _with_checked_times(self, times: FloatArray, rate: float | None) -> PulseTrain:
+        """Return the train that fires the same at times, s, which have been checked.
+
+        `rate` is the one that they follow, Hz, or None.
+        """
+        result = copy(self)
+        result._times = times
+        result._spacing = None if rate is None else ("rate", rate)
+        result._period = None if rate is None else 1.0 / rate
+        return result
 
     def _table(self) -> tuple[str, dict[str, Any]]:
         if self._spacing is None:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
+from printhammer.drive.batch import PulseTrains
 from printhammer.drive.input import read_count, read_number
-from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.maps.layout import hammer_attributes, map_dataset, matching, on_times
 from printhammer.results.provenance import provenance
@@ -111,7 +111,7 @@ def frequency_map(
         raise InputError(
             f"{grid.size} rates x {moments.size} times, expected at most {MOST_CELLS} displacements in a map"
         )
-    drives = [PulseTrain(fired, rate=rate, pulses=count, overlap=overlap) for rate in grid.tolist()]
+    drives = PulseTrains.at_rates(fired, grid, count, overlap)
     ends = np.maximum(moments[-1], (count - 1) / grid + TAIL)
     runs = Ensemble(hammer, drives, ends, tolerance=tolerance)
     result = runs.run(dots=True, times=moments, threads=threads, progress=progress)
