@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Self, SupportsIndex, overload
 
 import numpy as np
 
-from printhammer.drive.input import MOST_PULSES, checked_times, read_array, read_count, read_positive
+from printhammer.drive.input import MOST_PULSES, PULSES, checked_times, read_array, read_count, read_positive
 from printhammer.drive.trains import Drive, Overlap, PulseTrain
 from printhammer.errors import InputError
 from printhammer.support.ragged import Ragged, starts_of
@@ -50,7 +50,11 @@ class PulseTrains(Sequence[PulseTrain]):
 
     @classmethod
     def at_rates(
-        cls, waveform: Waveform, rates: npt.ArrayLike, pulses: SupportsIndex, overlap: Overlap = "add"
+        cls,
+        waveform: Waveform,
+        rates: npt.ArrayLike,
+        pulses: SupportsIndex = PULSES,
+        overlap: Overlap = "add",
     ) -> Self:
         """Make trains of so many pulses at constant rates, Hz, all of them fired at 0 s first.
 

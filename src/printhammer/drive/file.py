@@ -2,7 +2,7 @@
 
 A file has ``format = 1``, optionally ``overlap = "add"`` or ``"replace"``, and exactly one of five tables::
 
-    [train]                       # rate or period, with pulses; start
+    [train]                       # rate or period; pulses, 9 if left out; start
     rate = "1.2 kHz"
     pulses = 9
 
@@ -149,7 +149,7 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
         _required(arguments, ("at",), kind)
     elif "rate" not in arguments and "period" not in arguments:
         raise InputError(f"{kind}.rate is missing, expected a rate or a period")
-    else:
+    elif kind == "burst":
         _required(arguments, ("pulses",), kind)
     if "waveform" in data:
         waveform: Waveform | None = _waveform(_table(data["waveform"], "waveform"), folder, "waveform")

@@ -16,6 +16,7 @@ import numpy as np
 from printhammer.drive.base import Drive, Overlap
 from printhammer.drive.input import (
     MOST_PULSES,
+    PULSES,
     SPACING_UNITS,
     even_times,
     read_count,
@@ -84,11 +85,11 @@ class PulseTrain(_Pulsed):
     waveform
         What every firing does.
     rate, period
-        Firings per second, Hz, or the time between them, s; one of the two, with `pulses`.
+        Firings per second, Hz, or the time between them, s; one of the two.
     at
         Instead: firing times, s, ascending.
     pulses
-        Number of firings; without rate, period and times it is 1.
+        Number of firings; by default nine, as in the bursts of the paper, and one without rate or period.
     overlap
         "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
     start
@@ -124,7 +125,7 @@ class PulseTrain(_Pulsed):
                 )
             super().__init__(waveform, read_times(at) + first, overlap, None)
             return
-        count = read_count(1 if pulses is None and not ways else pulses, "pulses")
+        count = read_count((PULSES if ways else 1) if pulses is None else pulses, "pulses")
         if not ways and count > 1:
             raise InputError(f"pulses = {count} is expected to come with a rate, a period or firing times")
         steps, self._spacing, spacing = even_times(rate, period, count) if ways else (np.zeros(1), None, None)

@@ -11,6 +11,7 @@ from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, tables_beside, verb
 from printhammer.cli.screen import Column, coloured, facts, table
 from printhammer.cli.units import Units, with_unit
+from printhammer.drive.input import PULSES
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from printhammer.run.contacts import Dot
     from printhammer.run.motion import Motion
 
-PULSES: Final = 9
 MOST_ROWS: Final = 40
 """Dots shown; of more, the first and the last."""
 
@@ -68,7 +68,6 @@ def run(
     Ends with status 1 where the run stopped before its end, which the status line names.
     """
     from printhammer.cli.verbs.runs.motion_files import as_json, write_rows
-    from printhammer.run.contacts import Contact, Dot
     from printhammer.run.simulate import simulate
 
     train = {"rate": rate, "period": period, "at": at, "pulses": pulses, "overlap": overlap}
@@ -85,8 +84,8 @@ def run(
         files={
             "csv": Content(motion.to_csv),
             "parquet": Content(motion.to_parquet),
-            "dots": Content(partial(write_rows, motion.dots, Dot)),
-            "contacts": Content(partial(write_rows, motion.contacts, Contact)),
+            "dots": Content(partial(write_rows, motion.dots)),
+            "contacts": Content(partial(write_rows, motion.contacts)),
             "json": Content.text(partial(as_json, motion)),
             "plot": Content(plot=motion.plot),
         },
@@ -108,8 +107,6 @@ def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
         raise InputError(
             f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE"
         )
-    if "rate" in beside or "period" in beside:
-        beside.setdefault("pulses", PULSES)
     if "at" in beside:
         beside["at"] = [each.strip() for each in beside["at"].split(",")]
     return PulseTrain(hammer.waveform, **beside)
