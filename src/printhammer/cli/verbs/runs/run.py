@@ -11,7 +11,6 @@ from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, tables_beside, verb
 from printhammer.cli.screen import Column, coloured, facts, table
 from printhammer.cli.units import Units, with_unit
-from printhammer.drive.input import PULSES
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def run(
     rate: str | None = _drive("RATE", "Firings per second, such as '1.2 kHz'."),
     period: str | None = _drive("TIME", "Time between firings, such as '1.05 ms'."),
     at: str | None = _drive("TIMES", "Firing times, such as '0 us, 700 us'."),
-    pulses: int | None = opt.whole(f"Number of firings with --rate or --period ({PULSES}).", panel=_DRIVE),
+    pulses: int | None = opt.whole("Number of firings with --rate or --period (9).", panel=_DRIVE),
     overlap: str | None = opt.overlapping(_DRIVE),
     drive: Path | None = opt.source("A drive file instead.", panel=_DRIVE),
     units: Units = opt.UNITS,
