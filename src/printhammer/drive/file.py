@@ -96,12 +96,24 @@ def read_drive(
         As for `load_drive`.
     """
     try:
-        return _drive(tomllib.loads(text), waveform, folder or Path())
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+        return drive_of(tomllib.loads(text), waveform, name=name, folder=folder)
+    except InputError:
+        raise
     except (ValueError, RecursionError) as error:
         # tomllib raises a bare ValueError for a number of thousands of digits.
         raise InputError(f"{name}: expected TOML ({' '.join(str(error).split())})") from None
+
+
+def drive_of(
+    data: dict[str, Any],
+    waveform: Waveform | None = None,
+    *,
+    name: str = "drive",
+    folder: Path | None = None,
+) -> Drive:
+    """Return the drive of a drive file, from its tables; arguments and errors as for `read_drive`."""
+    with located(name):
+        return _drive(data, waveform, folder or Path())
 
 
 def save_drive(drive: Drive, path: str | Path) -> None:
