@@ -1,10 +1,11 @@
-"""What a public call costs above its engine: the frequency-time map and the safe rate.
+"""What a public call costs above its engine: the frequency-time map, the safe rate, a sweep.
 
     python benchmarks/public_calls.py [HAMMER] [--rates N] [--times N] [--rounds N]
 
 The engine of the map is the run of an ensemble that was made before, with the same dots and times; both
-have their turn in each round. That of the safe rate are the runs of the ensembles inside the call. Times are
-of the processor, on one thread; printed are medians and the median of the ratios.
+have their turn in each round. That of the others are the runs of the ensembles inside the call; the sweep is
+the printed example at 512 rates, in one block, without its store. Times are of the processor, on one thread;
+printed are medians and the median of the ratios.
 """
 
 from __future__ import annotations
@@ -12,12 +13,18 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
+import tomllib
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import printhammer as ph
-from printhammer.maps.frequency import HIGHEST, LOWEST, PULSES, TAIL
+from printhammer.drive.input import PULSES
+from printhammer.maps.frequency import HIGHEST, LOWEST, TAIL
+from printhammer.sweep.plan import make_plan
+from printhammer.sweep.spec import read_spec
+from printhammer.sweep.work import run_chunk
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +42,8 @@ def main() -> None:
     print(f"{'':22}{'call':>12}{'engine':>12}{'above':>10}{'ratio':>8}")
     for name, samples in (
         (f"map, {given.rates} x {given.times}", chart(hammer, given.rates, given.times, given.rounds)),
-        ("safe rate", safe_rate(hammer, max(3, given.rounds // 10))),
+        ("safe rate", with_runs_inside(lambda: ph.safe_rate(hammer, threads=1), max(3, given.rounds // 10))),
+        ("sweep, example", with_runs_inside(block(), given.rounds)),
     ):
         call, engine = (statistics.median(column) for column in zip(*samples, strict=True))
         above = statistics.median(call - engine for call, engine in samples)
@@ -64,8 +72,8 @@ def chart(hammer: ph.Hammer, rates: int, times: int, rounds: int) -> list[tuple[
     return [(seconds(call), seconds(engine)) for _ in range(rounds)]
 
 
-def safe_rate(hammer: ph.Hammer, rounds: int) -> list[tuple[float, float]]:
-    """Return times of the public call and of all runs of ensembles in it, s, for each round."""
+def with_runs_inside(call: Callable[[], object], rounds: int) -> list[tuple[float, float]]:
+    """Return times of a call and of all runs of ensembles in it, s, for each round."""
     inside: list[float] = []
     run = ph.Ensemble.run
 
@@ -78,14 +86,23 @@ def safe_rate(hammer: ph.Hammer, rounds: int) -> list[tuple[float, float]]:
     samples = []
     ph.Ensemble.run = timed  # type: ignore[method-assign]
     try:
-        ph.safe_rate(hammer, threads=1)
+        call()
         for _ in range(rounds):
             inside.clear()
-            whole = seconds(lambda: ph.safe_rate(hammer, threads=1))
+            whole = seconds(call)
             samples.append((whole, sum(inside)))
     finally:
         ph.Ensemble.run = run  # type: ignore[method-assign]
     return samples
+
+
+def block() -> Callable[[], object]:
+    """Return the work of all members of the example of a sweep as one block, the store apart."""
+    content = tomllib.loads((files("printhammer") / "sweep" / "example.toml").read_text())
+    content["axis"][0]["count"] = 512
+    plan = make_plan(read_spec(content))
+    rows = plan.rows(range(plan.members))
+    return lambda: run_chunk(plan.spec.base, plan.spec.outputs, rows)
 
 
 def seconds(work: Callable[[], object]) -> float:
