@@ -20,6 +20,7 @@ from .control.table.compensation import load_table as load_table
 from .control.table.report import judge_table as judge_table
 from .control.table.tuning import tune as tune
 from .derivatives.sensitivities import sensitivities as sensitivities
+from .drive.batch import PulseTrains as PulseTrains
 from .drive.sequence import PulseSequence as PulseSequence
 from .drive.trains import Burst as Burst
 from .drive.trains import PulseTrain as PulseTrain

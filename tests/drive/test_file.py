@@ -110,7 +110,7 @@ def test_a_sampled_waveform_lies_beside_the_drive_file(tmp_path: Path) -> None:
         ('format = 1\n"a\\nb" = 1', "not known"),
         ("format = 1\n[tarin]", "tarin = {} is not known"),
         ("format = 1\n[train]\npulses = 9", "train.rate is missing"),
-        ('format = 1\n[train]\nrate = "1 kHz"', "train.pulses is missing"),
+        ('format = 1\n[burst]\nrate = "1 kHz"', "burst.pulses is missing"),
         ('format = 1\n[train]\nrate = "1 kHz"\nperiod = "1 ms"\npulses = 2', "rate and period"),
         ("format = 1\n[train]\nrate = 1200\npulses = 9", "train.rate = 1200 has no unit"),
         ('format = 1\n[train]\nrate = "1200"\npulses = 9', "train.rate.*no unit"),

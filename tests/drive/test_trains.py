@@ -196,7 +196,6 @@ def test_a_drive_is_told_in_one_line_and_pickled() -> None:
         ({"period": math.inf, "pulses": 3}, "period = inf"),
         ({"rate": 1.0, "period": 1.0, "pulses": 3}, "rate and period"),
         ({"rate": 1.0, "at": [0.0]}, "rate and at"),
-        ({"rate": 1.0}, "pulses = None"),
         ({"rate": 1.0, "pulses": 0}, "pulses = 0"),
         ({"rate": 1.0, "pulses": 2.5}, "pulses = 2.5"),
         ({"rate": 1.0, "pulses": True}, "pulses = True"),

@@ -64,7 +64,7 @@ def axes(*tables: dict[str, Any], **changes: Any) -> dict[str, Any]:
             r"outputs.displacement: expected at least 2 times",
         ),
         (changed(drive={}), r"drive: expected exactly one of the tables"),
-        (changed(drive={"train": {}}), r"train.pulses is missing"),
+        (changed(drive={"burst": {}}), r"burst.pulses is missing"),
         (changed(drive={"train": {"pulses": 2, "rat": 1}}), r"train.rat = 1 is not known"),
         (
             changed(drive={"train": {"pulses": 2, "rate": "1 kHz"}}),

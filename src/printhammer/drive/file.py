@@ -2,7 +2,7 @@
 
 A file has ``format = 1``, optionally ``overlap = "add"`` or ``"replace"``, and exactly one of five tables::
 
-    [train]                       # rate or period, with pulses; start
+    [train]                       # rate or period; pulses, 9 if left out; start
     rate = "1.2 kHz"
     pulses = 9
 
@@ -96,12 +96,24 @@ def read_drive(
         As for `load_drive`.
     """
     try:
-        return _drive(tomllib.loads(text), waveform, folder or Path())
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+        return drive_of(tomllib.loads(text), waveform, name=name, folder=folder)
+    except InputError:
+        raise
     except (ValueError, RecursionError) as error:
         # tomllib raises a bare ValueError for a number of thousands of digits.
         raise InputError(f"{name}: expected TOML ({' '.join(str(error).split())})") from None
+
+
+def drive_of(
+    data: dict[str, Any],
+    waveform: Waveform | None = None,
+    *,
+    name: str = "drive",
+    folder: Path | None = None,
+) -> Drive:
+    """Return the drive of a drive file, from its tables; arguments and errors as for `read_drive`."""
+    with located(name):
+        return _drive(data, waveform, folder or Path())
 
 
 def save_drive(drive: Drive, path: str | Path) -> None:
@@ -149,7 +161,7 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
         _required(arguments, ("at",), kind)
     elif "rate" not in arguments and "period" not in arguments:
         raise InputError(f"{kind}.rate is missing, expected a rate or a period")
-    else:
+    elif kind == "burst":
         _required(arguments, ("pulses",), kind)
     if "waveform" in data:
         waveform: Waveform | None = _waveform(_table(data["waveform"], "waveform"), folder, "waveform")

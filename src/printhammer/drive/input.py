@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import FloatArray
 
+PULSES: Final = 9
+"""Number of firings of a train that is known by its rate or period alone, as in the bursts of the paper."""
+
 MOST_PULSES: Final = 10_000_000
 """Number of firings above which a drive is refused."""
 

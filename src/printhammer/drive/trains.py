@@ -8,6 +8,7 @@ counts from its firing on. Every number is SI; a string with a unit ("1.2 kHz") 
 from __future__ import annotations
 
 import math
+from copy import copy
 from typing import TYPE_CHECKING, Any, Self, SupportsIndex
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from printhammer.drive.base import Drive, Overlap
 from printhammer.drive.input import (
     MOST_PULSES,
+    PULSES,
     SPACING_UNITS,
     even_times,
     read_count,
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import numpy.typing as npt
+
+    from printhammer.support.arrays import FloatArray
 
 __all__ = ["Burst", "Drive", "Overlap", "PulseTrain", "SineForce"]
 
@@ -81,11 +85,11 @@ class PulseTrain(_Pulsed):
     waveform
         What every firing does.
     rate, period
-        Firings per second, Hz, or the time between them, s; one of the two, with `pulses`.
+        Firings per second, Hz, or the time between them, s; one of the two.
     at
         Instead: firing times, s, ascending.
     pulses
-        Number of firings; without rate, period and times it is 1.
+        Number of firings; by default nine, as in the bursts of the paper, and one without rate or period.
     overlap
         "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
     start
@@ -121,11 +125,22 @@ class PulseTrain(_Pulsed):
                 )
             super().__init__(waveform, read_times(at) + first, overlap, None)
             return
-        count = read_count(1 if pulses is None and not ways else pulses, "pulses")
+        count = read_count((PULSES if ways else 1) if pulses is None else pulses, "pulses")
         if not ways and count > 1:
             raise InputError(f"pulses = {count} is expected to come with a rate, a period or firing times")
         steps, self._spacing, spacing = even_times(rate, period, count) if ways else (np.zeros(1), None, None)
         super().__init__(waveform, first + steps, overlap, spacing)
+
+    def _with_checked_times(self, times: FloatArray, rate: float | None) -> PulseTrain:
+        """Return the train that fires the same at times, s, which have been checked.
+
+        `rate` is the one that they follow, Hz, or None.
+        """
+        result = copy(self)
+        result._times = times
+        result._spacing = None if rate is None else ("rate", rate)
+        result._period = None if rate is None else 1.0 / rate
+        return result
 
     def _table(self) -> tuple[str, dict[str, Any]]:
         if self._spacing is None:

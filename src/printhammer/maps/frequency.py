@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.drive.input import read_count, read_number
-from printhammer.drive.trains import PulseTrain
+from printhammer.drive.batch import PulseTrains
+from printhammer.drive.input import PULSES, read_count, read_number
 from printhammer.errors import InputError
 from printhammer.maps.layout import hammer_attributes, map_dataset, matching, on_times
 from printhammer.results.provenance import provenance
@@ -41,9 +41,6 @@ RATES: Final = 512
 
 TIMES: Final = 512
 """Number of times of a map unless told otherwise."""
-
-PULSES: Final = 9
-"""Number of pulses of a burst, as in the paper."""
 
 TAIL: Final = 1e-3
 """Time after the last firing, s, that a map shows at its lowest rate."""
@@ -111,7 +108,7 @@ def frequency_map(
         raise InputError(
             f"{grid.size} rates x {moments.size} times, expected at most {MOST_CELLS} displacements in a map"
         )
-    drives = [PulseTrain(fired, rate=rate, pulses=count, overlap=overlap) for rate in grid.tolist()]
+    drives = PulseTrains.at_rates(fired, grid, count, overlap)
     ends = np.maximum(moments[-1], (count - 1) / grid + TAIL)
     runs = Ensemble(hammer, drives, ends, tolerance=tolerance)
     result = runs.run(dots=True, times=moments, threads=threads, progress=progress)

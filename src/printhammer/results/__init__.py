@@ -4,6 +4,7 @@ from printhammer.results.declare import Column, Declared, column, coordinate, de
 from printhammer.results.files import ENDINGS, Reopened, reopen, save_dataset
 from printhammer.results.provenance import KEYS, provenance
 from printhammer.results.result import RESULTS, Result
+from printhammer.results.rows import Rows
 
 __all__ = [
     "ENDINGS",
@@ -13,6 +14,7 @@ __all__ = [
     "Declared",
     "Reopened",
     "Result",
+    "Rows",
     "column",
     "coordinate",
     "derived",

@@ -23,8 +23,10 @@ from typing import (
     dataclass_transform,
 )
 
+from printhammer.results.notebook import cell, html_table, titled
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
 Kind = Literal["column", "coordinate", "scalar", "part"]
 
@@ -227,3 +229,26 @@ class Declared:
         super().__init_subclass__(**options)
         dataclass(frozen=True, eq=eq)(cls)
         cls.__doc__ = with_attributes(cls.__doc__ or "", cls, columns_of(cls))
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the values that the text shows, with units and meanings."""
+        notes = columns_of(type(self))
+        rows = [
+            (
+                notes[entry.name].heading(entry.name),
+                cell(getattr(self, entry.name)),
+                notes[entry.name].meaning,
+            )
+            for entry in fields(self)
+            if entry.repr and entry.name in notes
+        ]
+        return titled(type(self).__name__, html_table(rows))
+
+    def __dir__(self) -> list[str]:
+        """Return what completion shows: public names of fields, properties and methods."""
+        return public_names(super().__dir__())
+
+
+def public_names(names: Iterable[str]) -> list[str]:
+    """Return the names for those who use an object: neither private ones nor constants of its class."""
+    return sorted(name for name in names if not name.startswith("_") and not name.isupper())

@@ -17,6 +17,7 @@ What does not apply to a result is left out; the versions are always there.
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
 
@@ -82,4 +83,10 @@ def versions() -> dict[str, str]:
     """Return the versions on which the bits of a result depend."""
     from printhammer import __version__
 
-    return {"printhammer": __version__, **{name: version(name) for name in VERSIONS[1:]}}
+    return {"printhammer": __version__, **{name: _installed(name) for name in VERSIONS[1:]}}
+
+
+@cache
+def _installed(name: str) -> str:
+    """Return the version of a package, which is read from a file."""
+    return version(name)

@@ -16,7 +16,6 @@ and arrays that are no fields, come from a class's own `entries`; further attrib
 from __future__ import annotations
 
 from dataclasses import Field, dataclass
-from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
 
@@ -29,13 +28,15 @@ from printhammer.results.declare import (
     columns_of,
     coordinate,
     part,
+    public_names,
     scalar,
     with_attributes,
 )
+from printhammer.results.notebook import extent, html_table, span, titled
 from printhammer.results.provenance import provenance
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
     from pathlib import Path
 
     import pandas as pd
@@ -179,22 +180,19 @@ class Result:
     def _repr_html_(self) -> str:
         """Return what a notebook shows: title, columns, and attributes to unfold."""
         columns = [
-            (note.heading(name), " × ".join(map(str, np.shape(values))), ", ".join(note.dims), note.meaning)
+            (note.heading(name), extent(values), ", ".join(note.dims), span(values), note.meaning)
             for name, (note, values) in self.entries().items()
         ]
         attributes = [(key, str(value)) for key, value in files.plain(self.attributes).items()]
-        return (
-            f"<div><b>{escape(self.title)}</b>{_html_table(columns)}"
-            f"<details><summary>attributes</summary>{_html_table(attributes)}</details></div>"
+        return titled(
+            self.title,
+            html_table(columns, ("", "shape", "dimensions", "values", "meaning")),
+            f"<details><summary>attributes</summary>{html_table(attributes)}</details>",
         )
 
-
-def _html_table(rows: Sequence[Sequence[str]]) -> str:
-    cells = (
-        "".join(f"<td>{escape(cell if len(cell) <= 80 else cell[:77] + '...')}</td>" for cell in row)
-        for row in rows
-    )
-    return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+    def __dir__(self) -> list[str]:
+        """Return what completion shows: public names of fields, properties and methods."""
+        return public_names(super().__dir__())
 
 
 def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:

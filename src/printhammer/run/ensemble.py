@@ -13,21 +13,23 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
+from printhammer.drive.batch import PulseTrains, firings_of
 from printhammer.drive.input import read_array
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.results import Result, column, part
-from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job, kernel_of
+from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job
+from printhammer.run.fired import Fired
 from printhammer.run.problem import TOLERANCE, check_tolerance, laws_of
 from printhammer.run.start import check_branch, initial_state
+from printhammer.support.ragged import Ragged
 from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, thread_count
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.drive.trains import Drive
-    from printhammer.kernel.compile.lanes import LaneKinds
     from printhammer.kernel.model.laws import Laws
     from printhammer.results.result import Entries
     from printhammer.run.motion import Motion
@@ -125,7 +127,7 @@ class Ensemble:
     hammers : Hammer or sequence of Hammer
         One for all members, or one for each.
     drives : Drive or sequence of Drive
-        Likewise.
+        Likewise; many trains are cheapest as `printhammer.PulseTrains`.
     ends : float or array
         End of the runs, s, one for all or one for each.
     states : tuple or array, optional
@@ -157,14 +159,17 @@ class Ensemble:
     ) -> None:
         check_tolerance(tolerance)
         self.tolerance = tolerance
-        one_hammer, one_drive = isinstance(hammers, Hammer), not isinstance(drives, list | tuple)
         many_hammers = [hammers] if isinstance(hammers, Hammer) else list(hammers)
-        many_drives: list[Drive] = list(drives) if isinstance(drives, list | tuple) else [drives]  # type: ignore[list-item]
+        many_drives: Sequence[Drive]
+        if isinstance(drives, list | tuple):
+            many_drives = list(drives)
+        else:
+            many_drives = drives if isinstance(drives, PulseTrains) else [drives]  # type: ignore[list-item]
         moments, begun = _each(ends, "ends"), _each(starts, "starts")
         rows = None if states is None else read_array(states, "states")
         counts = {
-            "hammers": 1 if one_hammer else len(many_hammers),
-            "drives": 1 if one_drive else len(many_drives),
+            "hammers": len(many_hammers),
+            "drives": len(many_drives),
             "ends": len(moments) if np.ndim(ends) else 1,
             "states": 1 if rows is None or rows.ndim < 2 else len(rows),
             "starts": len(begun) if np.ndim(starts) else 1,
@@ -177,7 +182,8 @@ class Ensemble:
         if wrong.any():
             raise InputError(f"ends = {float(moments[wrong][0])!r} s, expected positive numbers")
         self.hammers: list[Hammer] = many_hammers * (self.size if len(many_hammers) == 1 else 1)
-        self.drives: list[Drive] = many_drives * (self.size if len(many_drives) == 1 else 1)
+        one_for_all = len(many_drives) == 1 and self.size != 1
+        self.drives: Sequence[Drive] = [many_drives[0]] * self.size if one_for_all else many_drives
         self.ends = np.broadcast_to(moments, (self.size,)).astype(np.float64)
         self.states = self._states(rows)
         self.states[:, 0] = self._checked_starts(begun)
@@ -188,11 +194,8 @@ class Ensemble:
         if rows is None:
             from printhammer.hammer.equilibrium import rest_state
 
-            rest: dict[int, float] = {}
-            for i, hammer in enumerate(self.hammers):
-                if id(hammer) not in rest:
-                    rest[id(hammer)] = rest_state(hammer)
-                full[i, 1] = rest[id(hammer)]
+            hammers, hammer_of = self._own_hammers
+            full[:, 1] = np.array([rest_state(hammer) for hammer in hammers])[hammer_of]
             return full
         if rows.ndim not in (1, 2) or rows.shape[-1] not in (2, 4):
             raise InputError(
@@ -217,26 +220,36 @@ class Ensemble:
     @cached_property
     def groups(self) -> list[Group]:
         """The members, sorted by the laws of their parts."""
-        alike: dict[Hashable, list[int]] = {}
-        laws: dict[tuple[int, str], Laws] = {}
-        kinds: dict[bytes, LaneKinds | None] = {}
-        for i, (hammer, drive) in enumerate(zip(self.hammers, self.drives, strict=True)):
-            key = (id(hammer), drive.quantity)
+        fired = Fired(self.drives)
+        hammers, hammer_of = self._own_hammers
+        # The kernel of a member follows from its hammer and the form of its drive.
+        pairs, first, pair_of = np.unique(
+            hammer_of * len(fired.forms) + fired.form_of, return_index=True, return_inverse=True
+        )
+        laws: dict[tuple[int, bool], Laws] = {}
+        kernels: dict[Hashable, int] = {}
+        kernel_of = np.zeros(len(pairs), np.int64)
+        for pair, i in enumerate(first.tolist()):
+            form = fired.forms[fired.form_of[i]]
+            key = int(hammer_of[i]), form.force
             if key not in laws:
-                laws[key] = laws_of(hammer, drive)
-            kernel = laws[key], kernel_of(drive, kinds), bool(self.states[i, 3] >= 0.0)
-            alike.setdefault(kernel, []).append(i)
+                laws[key] = laws_of(self.hammers[i], self.drives[i])
+            kernel = laws[key], form.replace, fired.kinds[form.table]
+            kernel_of[pair] = kernels.setdefault(kernel, len(kernels))
+        begun_inside = self.states[:, 3] >= 0.0
+        alike = Ragged.sorted_by(2 * kernel_of[pair_of] + begun_inside)
         return [
-            Group(
-                np.array(members),
-                [self.hammers[i] for i in members],
-                [self.drives[i] for i in members],
-                self.states[members],
-                self.ends[members],
-                self.tolerance,
-            )
-            for members in alike.values()
+            Group(alike[row], hammers, hammer_of, fired, self.states, self.ends, self.tolerance)
+            for row in range(len(alike))
         ]
+
+    @cached_property
+    def _own_hammers(self) -> tuple[list[Hammer], IntArray]:
+        """The hammers, each object once, and which one is a member's."""
+        known = {id(hammer): hammer for hammer in self.hammers}
+        places = {key: place for place, key in enumerate(known)}
+        which = [places[id(hammer)] for hammer in self.hammers]
+        return list(known.values()), np.array(which, dtype=np.int64)
 
     def motion(self, member: int) -> Motion:
         """Return everything about one member.
@@ -334,22 +347,17 @@ class Ensemble:
             whole[group.members] = gathered
         return whole
 
-    def _spread(self, tables: Sequence[FloatArray], starts: Sequence[IntArray]) -> FloatArray:
-        """Return ragged rows of the results as one array (members, rows, columns), filled up with NaN."""
-        most = max((int(np.diff(start).max(initial=0)) for start in starts), default=0)
-        whole = np.full((self.size, most, tables[0].shape[1] if tables else MOST_COLUMNS), np.nan)
-        for group, table, start in zip(self.groups, tables, starts, strict=True):
-            counts = np.diff(start)
-            column = np.arange(len(table)) - np.repeat(start[:-1], counts)
-            whole[np.repeat(group.members, counts), column] = table
+    def _spread(self, rows: Sequence[Ragged]) -> FloatArray:
+        """Return rows of the members of each group as an array (members, rows, columns), filled with NaN."""
+        most = max((own.longest for own in rows), default=0)
+        whole = np.empty((self.size, most, rows[0].values.shape[1] if rows else MOST_COLUMNS))
+        for group, own in zip(self.groups, rows, strict=True):
+            whole[group.members] = own.filled(most)
         return whole
 
     def _dot_table(self, jobs: Sequence[Job]) -> DotTable:
-        starts = [job.group.batch.firing_starts for job in jobs]
-        dots = self._spread([job.kept.dots for job in jobs], starts)
-        fired_at = np.full(dots.shape[:2], np.nan)
-        for i, drive in enumerate(self.drives):
-            fired_at[i, : len(drive.times)] = drive.times
+        dots = self._spread([Ragged(job.kept.dots, job.group.firings.starts) for job in jobs])
+        fired_at = firings_of(self.drives).filled().copy()
         reached = self._gathered([job.kept.reached for job in jobs])
         fired = fired_at <= reached[:, np.newaxis]
         contacts = np.nan_to_num(dots[:, :, 0]).astype(np.int64)
@@ -365,33 +373,29 @@ class Ensemble:
             extra_contacts=np.maximum(contacts - 1, 0),
         )
 
-    def _strobes(self, jobs: Sequence[Job], moments: Sequence[FloatArray]) -> Strobes:
-        starts = [job.kept.strobe_starts for job in jobs]
-        states = self._spread([job.kept.strobes for job in jobs], starts)
-        t = np.full(states.shape[:2], np.nan)
-        for i, moment in enumerate(moments):
-            t[i, : len(moment)] = moment
+    def _strobes(self, jobs: Sequence[Job], moments: Ragged) -> Strobes:
+        states = self._spread([Ragged(job.kept.strobes, job.kept.strobe_starts) for job in jobs])
         mode = states[:, :, 2]
         return Strobes(
-            t=t,
+            t=moments.filled().copy(),
             x=states[:, :, 0],
             v=states[:, :, 1],
             branch=np.where(np.isnan(mode), -1, np.nan_to_num(mode)).astype(np.int64),
             memory=states[:, :, 3],
         )
 
-    def _moments(self, strobes: Literal["firings"] | Sequence[npt.ArrayLike] | None) -> list[FloatArray]:
+    def _moments(self, strobes: Literal["firings"] | Sequence[npt.ArrayLike] | None) -> Ragged:
         if strobes is None:
-            return [np.zeros(0)] * self.size
+            return Ragged.empty(self.size)
         if isinstance(strobes, str):
             if strobes != "firings":
                 raise InputError(f'strobes = {strobes!r}, expected "firings" or an array for each member')
-            return [np.asarray(drive.times, dtype=np.float64) for drive in self.drives]
+            return firings_of(self.drives)
         if not isinstance(strobes, Sequence | np.ndarray):
             raise InputError(f'strobes = {strobes!r}, expected "firings" or an array for each member')
         if len(strobes) != self.size:
             raise InputError(f"strobes: {len(strobes)} arrays, expected {self.size}")
-        return [_ascending(moment, "strobes") for moment in strobes]
+        return Ragged.of([_ascending(moment, "strobes") for moment in strobes])
 
 
 def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Progress | None) -> None:

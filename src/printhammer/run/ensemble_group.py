@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.kernel.lanes import layout as lane_layout
-from printhammer.kernel.model.layout import CUBIC_PIECE, END, EXPONENTIAL_PIECE, MAGNET, PLACES, SINE_PIECE
+from printhammer.kernel.model.layout import MAGNET, PLACES
 from printhammer.kernel.single import carry
 from printhammer.run.problem import MAX_STEPS, Problem, scales_of
+from printhammer.support.ragged import Ragged, starts_of
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Sequence
+    from collections.abc import Sequence
 
     import numpy.typing as npt
 
-    from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.compile.lanes import LaneKinds
     from printhammer.kernel.compile.specialise import Kernel
+    from printhammer.run.fired import Fired
     from printhammer.support.arrays import FloatArray, IntArray
 
 _NODES: Final = 2048
@@ -32,102 +32,56 @@ _PIECE: Final = 4 * lane_layout.LANES
 """Members in one piece of work for lanes."""
 
 
-def starts_of(arrays: Sequence[npt.NDArray[Any]]) -> IntArray:
-    """Return where each of some arrays begins when they are put one after the other, and the end of all."""
-    return np.concatenate([[0], np.cumsum([len(array) for array in arrays])]).astype(np.int64)
-
-
-def kernel_of(drive: Drive, known: dict[bytes, LaneKinds | None]) -> Hashable:
-    """Return what of a drive decides on the kernel: the overlap rule, and the kinds of its pieces."""
-    _times, _begins, pieces, replace, _force = drive.kernel_arrays()
-    form = pieces.tobytes()
-    if form not in known:
-        known[form] = closed_form(pieces)[1]
-    return bool(replace), known[form]
-
-
 class Group:
     """Members with the same laws, overlap rule and kinds of pieces in their waveforms, started alike.
 
     All this is decided for each member, so that one kernel serves it in whatever company. `members` are their
-    numbers in the ensemble; there is a hammer, a drive, a row of `states` (time, displacement, velocity, mode
-    and memory at the start) and an end, s, for each of them.
+    numbers in the ensemble; `hammers` and `hammer_of` say whose hammer is which, and `fired` is what the
+    drives of all members do. For each member of the ensemble there is a row of `states` (time, displacement,
+    velocity, mode and memory at the start) and an end, s.
     """
 
     def __init__(
         self,
         members: IntArray,
         hammers: Sequence[Hammer],
-        drives: Sequence[Drive],
+        hammer_of: IntArray,
+        fired: Fired,
         states: FloatArray,
         ends: FloatArray,
         tolerance: float,
     ) -> None:
         self.members = members
-        rows: dict[tuple[Any, ...], int] = {}
-        waves: dict[bytes, int] = {}
-        peaks: dict[bytes, float] = {}
-        problems: list[Problem] = []
-        tables: list[FloatArray] = []
-        hammer_of, waveform_of = np.zeros((2, len(members)), np.int64)
-        forms_of: dict[int, tuple[int, float]] = {}
-        typical: dict[tuple[Any, ...], float] = {}
-        for i, (hammer, drive) in enumerate(zip(hammers, drives, strict=True)):
-            if id(drive) not in forms_of:
-                pieces = np.asarray(drive.kernel_arrays()[2], dtype=np.float64)
-                form = pieces.tobytes()
-                if form not in waves:
-                    waves[form] = len(tables)
-                    tables.append(pieces)
-                if drive.bounded:
-                    forms_of[id(drive)] = waves[form], drive.largest_pulse
-                else:
-                    if form not in peaks:
-                        peaks[form] = drive.largest_pulse
-                    forms_of[id(drive)] = waves[form], peaks[form]
-            waveform_of[i], peak = forms_of[id(drive)]
-            x, v = float(states[i, 1]), float(states[i, 2])
-            key: tuple[Any, ...] = (id(hammer), peak, drive.quantity)
-            if key not in typical:
-                free = hammer.position is None or hammer.front is None
-                typical[key] = math.nan if free else scales_of(hammer, drive, (x, 0.0))[1]
-            # Only what is faster than the typical speed has scales of its own.
-            key = (
-                (*key, x, v, drive.period) if math.isnan(typical[key]) else (*key, max(abs(v), typical[key]))
-            )
-            if key not in rows:
-                rows[key] = len(problems)
-                problems.append(Problem(hammer, drive, (x, v), 0.0, tolerance))
-            hammer_of[i] = rows[key]
-        firings = [np.asarray(drive.times, dtype=np.float64) for drive in drives]
-        begins = [np.asarray(drive.kernel_arrays()[1], dtype=np.int64) for drive in drives]
+        problems, problem_of = _problems(members, hammers, hammer_of, fired, states, tolerance)
+        own_tables, waveform_of = np.unique(fired.table_of[members], return_inverse=True)
+        tables = [fired.tables[number] for number in own_tables.tolist()]
         self.kernel: Kernel = problems[0].kernel
         self.laws = problems[0].laws
         constants = np.zeros((len(problems), max(problem.constants.size for problem in problems)))
         for row, problem in enumerate(problems):
             constants[row, : problem.constants.size] = problem.constants
-        forms = [closed_form(table) for table in tables]
-        self.lane_kinds = forms[0][1]
+        self.lane_kinds = fired.kinds[own_tables[0]]
         self.uniform = len(problems) == 1 and len(tables) == 1
-        self.most_firings = max(len(times) for times in firings)
+        self.firings = fired.firings.take(members)
+        self.most_firings = self.firings.longest
         # Imported late, since it takes numba.
         from printhammer.kernel.lanes.batch import Batch
 
         self.batch = Batch(
-            hammer_of=hammer_of,
+            hammer_of=problem_of,
             hammers=constants,
             controls=np.array([problem.control for problem in problems]),
             bounds=np.array([problem.bounds for problem in problems]),
-            waveform_of=waveform_of,
-            piece_starts=starts_of(tables),
+            waveform_of=waveform_of.astype(np.int64),
+            piece_starts=starts_of(np.array([len(table) for table in tables], dtype=np.int64)),
             pieces=np.concatenate(tables),
-            rates=np.array([rates for rates, _kinds in forms]),
-            firing_starts=starts_of(firings),
-            firings=np.concatenate(firings),
-            begins=np.concatenate(begins),
-            replace=bool(drives[0].kernel_arrays()[3]),
-            states=states,
-            ends=ends,
+            rates=np.array([fired.rates[number] for number in own_tables.tolist()]),
+            firing_starts=self.firings.starts,
+            firings=self.firings.values,
+            begins=fired.begins[fired.firings.places(members)],
+            replace=fired.forms[fired.form_of[members[0]]].replace,
+            states=states[members],
+            ends=ends[members],
         )
 
     def fits_lanes(self) -> bool:
@@ -153,21 +107,35 @@ class Group:
         return specialise_lanes(self.laws, self.lane_kinds)
 
 
-def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
-    """Return the rates of the pieces of a set of waveforms, and what kinds of pieces there are, for lanes.
-
-    None instead of the kinds where the waveforms have more rates than lanes provide for.
-    """
-    pieces = table[table[:, 1] != END]
-    kind = pieces[:, 1]
-    decays = np.unique(pieces[kind == EXPONENTIAL_PIECE, 4])
-    frequencies = np.unique(pieces[kind == SINE_PIECE, 4])
-    rates = [0.0] * lane_layout.RATES_WIDTH
-    if len(decays) > 2 or len(frequencies) > 1:
-        return rates, None
-    rates[: len(decays)] = decays
-    rates[2 : 2 + len(frequencies)] = frequencies
-    return rates, (len(decays), bool(pieces[kind == CUBIC_PIECE, 3:].any()), len(frequencies) > 0)
+def _problems(
+    members: IntArray,
+    hammers: Sequence[Hammer],
+    hammer_of: IntArray,
+    fired: Fired,
+    states: FloatArray,
+    tolerance: float,
+) -> tuple[list[Problem], IntArray]:
+    """Return the problems that members pose, drives apart: hammer and scales; and which is whose."""
+    problems: list[Problem] = []
+    problem_of = np.zeros(len(members), np.int64)
+    peaks, peak_of = np.unique(fired.peak_of[members], return_inverse=True)
+    alike = Ragged.sorted_by(hammer_of[members] * len(peaks) + peak_of)
+    for places in map(alike.__getitem__, range(len(alike))):
+        own = members[places]
+        hammer, drive = hammers[hammer_of[own[0]]], fired.drives[own[0]]
+        x, v = states[own, 1], states[own, 2]
+        if hammer.position is None or hammer.front is None:
+            periods = [math.nan if (period := fired.drives[i].period) is None else period for i in own]
+            keys = np.column_stack([x, v, periods])
+        else:
+            # Only what is faster than the typical speed has scales of its own.
+            keys = np.maximum(np.abs(v), scales_of(hammer, drive, (float(x[0]), 0.0))[1])
+        _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        problem_of[places] = len(problems) + which
+        for k in first.tolist():
+            state = float(x[k]), float(v[k])
+            problems.append(Problem(hammer, fired.drives[own[k]], state, 0.0, tolerance))
+    return problems, problem_of
 
 
 class Job:
@@ -182,27 +150,26 @@ class Job:
         self,
         group: Group,
         want_dots: bool,
-        moments: Sequence[FloatArray],
+        moments: Ragged,
         grid: FloatArray,
         x: npt.NDArray[np.float32],
     ) -> None:
         self.group = group
         count = len(group.members)
         self.order = np.arange(count)
-        own = [moments[member] for member in group.members]
-        strobe_times = np.concatenate(own)
+        own = moments.take(group.members)
         from printhammer.kernel.lanes.batch import Kept
 
         self.kept = Kept(
-            strobe_starts=starts_of(own),
-            strobe_times=strobe_times,
+            strobe_starts=own.starts,
+            strobe_times=own.values,
             grid=grid,
             want_dots=want_dots,
             status=np.zeros(count, np.int64),
             reached=np.zeros(count),
             steps=np.zeros(count, np.int64),
             dots=np.empty((group.batch.firings.size if want_dots else 0, _DOT_WIDTH)),
-            strobes=np.empty((strobe_times.size, _STROBE_WIDTH)),
+            strobes=np.empty((own.values.size, _STROBE_WIDTH)),
             x=x if count == len(x) else np.empty((count, grid.size), np.float32),
         )
 

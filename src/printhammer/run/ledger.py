@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.parts import absent
-from printhammer.results import Declared, part
+from printhammer.results import Declared, scalar
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
@@ -20,16 +20,21 @@ if TYPE_CHECKING:
 class Ledger(Declared):
     """Energies of one run, J."""
 
-    coil_work: float = part("integral of (Fm(x, I) - Fm(x, 0)) v dt")
-    drive_work: float = part("work of a drive that is a force")
-    pack_loss: float = part("minus the integral of Fp v dt")
-    backstop_loss: float = part("minus the integral of Fe v dt, and what impacts on a rigid backstop take")
-    kinetic: float = part("change of kinetic energy from start to end")
-    stored: float = part("change of stored energy likewise", more="magnet at zero current, spring, Hertz")
-    throughput: float = part(
-        "sum of the integrals of the absolute power of coil, drive force, pack and backstop"
+    coil_work: float = scalar("J", "integral of (Fm(x, I) - Fm(x, 0)) v dt")
+    drive_work: float = scalar("J", "work of a drive that is a force")
+    pack_loss: float = scalar("J", "minus the integral of Fp v dt")
+    backstop_loss: float = scalar(
+        "J", "minus the integral of Fe v dt, and what impacts on a rigid backstop take"
     )
-    residual: float = part(
+    kinetic: float = scalar("J", "change of kinetic energy from start to end")
+    stored: float = scalar(
+        "J", "change of stored energy likewise", more="magnet at zero current, spring, Hertz"
+    )
+    throughput: float = scalar(
+        "J", "sum of the integrals of the absolute power of coil, drive force, pack and backstop"
+    )
+    residual: float = scalar(
+        "J",
         "work minus losses minus changes",
         more="0 but for numerical errors, since each term has a quadrature of its own",
     )

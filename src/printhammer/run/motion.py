@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.results import Column, Result, derived, provenance
+from printhammer.results import Column, Result, Rows, derived, provenance
 from printhammer.results.files import write_csv, write_parquet
 from printhammer.run.coil_work import CoilWork, coil_work_of
 from printhammer.run.contacts import Contact, Dot, contacts_of, dots_of, loading_works
@@ -172,18 +172,18 @@ class Motion(Result, fields=False):
         return increments_of(self._problem, self._record)
 
     @cached_property
-    def contacts(self) -> tuple[Contact, ...]:
-        """All contacts in order of touch, one open at the start among them."""
+    def contacts(self) -> Rows[Contact]:
+        """All contacts in order of touch, one open at the start among them; a tuple, shown as a table."""
         rigid = self.hammer.backstop is not None and bool(
             getattr(import_module(self.hammer.backstop.module), "RIGID", False)
         )
-        return tuple(contacts_of(self._problem, self._record, self._increments, rigid))
+        return Rows(contacts_of(self._problem, self._record, self._increments, rigid), Contact)
 
     @cached_property
-    def dots(self) -> tuple[Dot, ...]:
-        """What each firing up to the end of the run did, in order."""
+    def dots(self) -> Rows[Dot]:
+        """What each firing up to the end of the run did, in order; a tuple, shown as a table."""
         works = loading_works(self._problem, self._record, self.contacts, self._increments)
-        return tuple(dots_of(self.drive.times, self.contacts, works, self.end))
+        return Rows(dots_of(self.drive.times, self.contacts, works, self.end), Dot)
 
     @cached_property
     def energy(self) -> Ledger:

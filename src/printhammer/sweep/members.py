@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import tomllib
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.drive.file import read_drive
+from printhammer.drive.file import drive_of
 from printhammer.drive.text import FORMAT, document
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.results import Declared, part, scalar
@@ -69,7 +71,8 @@ class Maker:
     base: Base
     _hammers: dict[tuple[float, ...], Hammer] = field(default_factory=dict)
     _rests: dict[int, float] = field(default_factory=dict)
-    _drives: dict[tuple[float, ...], Drive] = field(default_factory=dict)
+    _standards: dict[int, tuple[Waveform | None, Hashable]] = field(default_factory=dict)
+    _drives: dict[tuple[Hashable, ...], Drive] = field(default_factory=dict)
 
     def member(self, row: Sequence[float]) -> Member:
         """Return the member of a row of values, SI, one for each axis."""
@@ -103,10 +106,12 @@ class Maker:
 
     def _drive(self, row: Sequence[float], hammer: Hammer) -> Drive:
         changes = self._of(row, "waveform", "drive", "at")
-        key = (*changes.values(), *self._of(row, "hammer").values())
+        key = (*changes.values(), self._standard(hammer)[1])
         if key in self._drives:
             return self._drives[key]
-        tables = {name: dict(table) for name, table in self.base.drive.items() if isinstance(table, Mapping)}
+        tables = {
+            name: dict(table) if isinstance(table, dict) else table for name, table in self._tables.items()
+        }
         kind = self.base.kind
         for axis, value in changes.items():
             quantity = {"value": value, "unit": axis.note.si}
@@ -120,11 +125,24 @@ class Maker:
             elif axis.target == "drive":
                 tables[kind][axis.field] = int(value) if axis.field in COUNTS else quantity
             else:
-                times = list(self.base.drive[kind]["at"])
+                times = list(tables[kind]["at"])
                 times[int(axis.field)] = quantity
                 tables[kind]["at"] = times
-        head = {"format": FORMAT}
-        head |= {name: value for name, value in self.base.drive.items() if not isinstance(value, Mapping)}
-        standard = self.base.waveform if self.base.waveform is not None else hammer.waveform
-        self._drives[key] = read_drive(document(head, tables), standard, folder=self.base.folder)
+        self._drives[key] = drive_of(tables, self._standard(hammer)[0], folder=self.base.folder)
         return self._drives[key]
+
+    @cached_property
+    def _tables(self) -> dict[str, Any]:
+        """The tables of the drive file, before the axes change them."""
+        head: dict[str, Any] = {"format": FORMAT}
+        head |= {name: value for name, value in self.base.drive.items() if not isinstance(value, Mapping)}
+        tables = {name: table for name, table in self.base.drive.items() if isinstance(table, Mapping)}
+        return tomllib.loads(document(head, tables))
+
+    def _standard(self, hammer: Hammer) -> tuple[Waveform | None, Hashable]:
+        """Return what is fired where the drive does not say, and what that does; many hammers share it."""
+        if id(hammer) not in self._standards:
+            fired = self.base.waveform if self.base.waveform is not None else hammer.waveform
+            does = None if fired is None else (fired.quantity, fired.segments().tobytes())
+            self._standards[id(hammer)] = fired, does
+        return self._standards[id(hammer)]

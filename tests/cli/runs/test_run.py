@@ -24,6 +24,22 @@ def dot_rows(text: str) -> list[list[float]]:
     return [numbers_of(line) for line in table.splitlines() if re.match(r"\s+\d+ ", line)]
 
 
+@pytest.mark.parametrize(("name", "text"), [("rate", "1.2 kHz"), ("period", "0.7 ms")])
+def test_a_rate_alone_is_one_drive_wherever_it_is_said(
+    cli, hammer: "ph.Hammer", tmp_path: Path, name: str, text: str
+) -> None:
+    """In Python, in a drive file and on the command line: nine firings."""
+    assert hammer.waveform is not None
+    drive = ph.PulseTrain(hammer.waveform, **{name: text})
+    assert drive == ph.PulseTrain(hammer.waveform, **{name: text}, pulses=9)
+    (tmp_path / "drive.toml").write_text(f'format = 1\n[train]\n{name} = "{text}"\n')
+    for number, options in enumerate([(f"--{name}", text), ("--drive", str(tmp_path / "drive.toml"))]):
+        out = tmp_path / f"{number}.json"
+        assert cli("run", "hendriks-1983", *options, "--json", str(out)).status == 0
+        told = json.loads(out.read_text())
+        assert told["provenance"]["drive_fingerprint"] == drive.fingerprint
+
+
 def test_the_table_tells_what_the_motion_tells(cli, hammer: "ph.Hammer") -> None:
     outcome = cli("run", "hendriks-1983", "--rate", "1.2 kHz")
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, rate=1200.0, pulses=9))

@@ -10,9 +10,10 @@ import numpy as np
 
 from printhammer.chaos.strobe.map import margin_of
 from printhammer.derivatives.states import follow
-from printhammer.results import Column, Result, column, derived, part
+from printhammer.results import Column, Result, Rows, column, derived, part
 from printhammer.results.files import plain
 from printhammer.results.result import named_codes
+from printhammer.run.contacts import Contact, Dot
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from printhammer.chaos.orbits.newton import Closing
-    from printhammer.run.contacts import Contact, Dot
     from printhammer.run.ledger import Ledger
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray, IntArray
@@ -103,10 +103,10 @@ class Orbit(Result):
         "",
         more="re-integrated whole",
     )
-    contacts: tuple[Contact, ...] = part(
+    contacts: Rows[Contact] = part(
         "all contacts that begin in a period of the orbit, times from its first firing on", repr=False
     )
-    dots: tuple[Dot, ...] = part(
+    dots: Rows[Dot] = part(
         "what each firing did on the paper, times from the first firing on",
         more="empty under an endless force",
         repr=False,
@@ -260,8 +260,8 @@ def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orb
         multipliers=np.full(2, complex(math.nan, math.nan)),
         smooth=False,
         residual=math.nan,
-        contacts=(),
-        dots=(),
+        contacts=Rows((), Contact),
+        dots=Rows((), Dot),
         energy=None,
         margin=math.nan,
         tolerance=tolerance,
@@ -360,7 +360,7 @@ class _Run:
 
 def _contacts_and_dots(
     regime: Regime, start: FloatArray, firings: int, tolerance: float
-) -> tuple[tuple[Contact, ...], tuple[Dot, ...]]:
+) -> tuple[Rows[Contact], Rows[Dot]]:
     """Return what begins in one period of an orbit; its run goes on until all of that has ended."""
     skipped = 0 if regime.phase == 0.0 or regime.drive is not None else 1
     run = _Run(regime, start, firings + skipped + 1, tolerance)
@@ -385,13 +385,13 @@ def _contacts_and_dots(
         )
     contacts.sort(key=lambda contact: contact.t_in)
     if regime.drive is not None:
-        return tuple(contacts), ()
+        return Rows(contacts, Contact), Rows((), Dot)
     fired_dots = motion.dots[before + skipped : before + skipped + firings]
     dots = [
         replace(dot, index=k, fired_at=k * regime.period)
         for k, dot in enumerate([*fired_dots[firings - skipped :], *fired_dots[: firings - skipped]])
     ]
-    return tuple(contacts), tuple(dots)
+    return Rows(contacts, Contact), Rows(dots, Dot)
 
 
 def _numbers(values: Iterable[float | None]) -> FloatArray:

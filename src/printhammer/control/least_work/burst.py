@@ -30,11 +30,12 @@ from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of
 from printhammer.printing.dots.settling import settled_from
-from printhammer.results import Declared, Result, part, scalar
+from printhammer.results import Declared, Result, Rows, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
 from printhammer.run.coil_work import CoilWork, coil_power
+from printhammer.run.contacts import Contact
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.ledger import Ledger, stored_energy
 from printhammer.run.problem import TOLERANCE
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
     from printhammer.drive.sequence import PulseSequence
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.run.contacts import Contact
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
@@ -144,9 +144,10 @@ class LeastWork(Result, rows="node"):
         return times, values
 
     @property
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self) -> Rows[Contact]:
         """Contacts with the pack, in order."""
-        return tuple(contact for contact in self.motion.contacts if contact.surface == "pack")
+        touched = (contact for contact in self.motion.contacts if contact.surface == "pack")
+        return Rows(touched, Contact)
 
     @property
     def forces(self) -> FloatArray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import wraps
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Final, ParamSpec
+from typing import TYPE_CHECKING, Any, Final, Literal, ParamSpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
 _P = ParamSpec("_P")
+_Layout = Literal["constrained", "none"]
 
 INK: Final = "#1a1a1a"
 MUTED: Final = "#6b6b6b"
@@ -104,11 +105,13 @@ def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
     return wrapped
 
 
-def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure, sizes in inches, whose axes will be laid out without overlap."""
-    from matplotlib.figure import Figure
+def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrained") -> Figure:
+    """Return an empty figure, sizes in inches, whose axes will be laid out without overlap; or by hand."""
+    from printhammer.figures.elements.picture import Picture
 
-    return Figure(figsize=(width, height), layout="constrained")
+    figure = Picture(figsize=(width, height), layout=layout)  # type: ignore[arg-type]
+    figure.settings = RC
+    return figure
 
 
 def new_panel(height: float, width: float = WIDTH) -> tuple[Figure, Axes]:

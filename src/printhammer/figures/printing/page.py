@@ -84,7 +84,7 @@ def plot(page: Page, view: View = "page") -> Figure:
     zoom = wide * place.height / place.width
     rows = 1 if beside else 3
     height = rows * (_LABEL + strip + _GAP) + (1.5 + beside) * _LABEL + zoom + _FOOT + 0.1
-    figure, top = _figure(height), height - 0.1
+    figure, top = style.new_figure(height, _WIDTH, "none"), height - 0.1
     if beside:
         top -= _LABEL
         look: dict[str, Any] = {"fontsize": style.SMALL, "color": style.MUTED, "va": "center"}
@@ -135,14 +135,6 @@ def zoomed_sheet(page: Page) -> Sheet:
         top - margin,
         top + (head.wires - 1) * head.wire_pitch + margin,
     )
-
-
-def _figure(height: float, width: float = _WIDTH) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height))
-    figure.set_layout_engine("none")
-    return figure
 
 
 def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, left: float = _SIDE) -> Axes:
@@ -283,7 +275,7 @@ def _zoom_alone(page: Page) -> Figure:
     place = zoomed_sheet(page)
     wide = _WIDTH - 2.0 * _SIDE
     height = wide * place.height / place.width
-    figure = _figure(height + 2.5 * _LABEL + _FOOT)
+    figure = style.new_figure(height + 2.5 * _LABEL + _FOOT, _WIDTH, "none")
     title = f"{_printed_title(page)}\n{_zoom_title(page)}"
     _zoom(_panel(figure, place, _FOOT + height, height, title), place, page)
     _sign(figure, page)
@@ -292,7 +284,7 @@ def _zoom_alone(page: Page) -> Figure:
 
 def _sheet_alone(page: Page) -> Figure:
     sheet = whole_sheet(page)
-    figure = _figure(sheet.height / _INCH, sheet.width / _INCH)
+    figure = style.new_figure(sheet.height / _INCH, sheet.width / _INCH, "none")
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     ax.set_axis_off()
     ax.set_xlim(sheet.left, sheet.right)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from printhammer.drive.trains import Drive, PulseTrain
+from printhammer.drive.batch import PulseTrains, firings_of
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.slots import slot_times
@@ -12,6 +12,7 @@ from printhammer.printing.dots.slots import slot_times
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
 
 
@@ -32,7 +33,7 @@ class Strategy(Protocol):
         ...
 
 
-def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
+def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> Sequence[Drive]:
     """Fire the waveform of the hammer at every slot at which a dot is wanted, whatever the hammer does.
 
     Raises
@@ -42,13 +43,12 @@ def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) 
     """
     if not patterns:
         return []
-    pulse = PulseTrain(pulse_of(hammer))
-    return [pulse.with_times(slot_times(slots, rate)) for slots in patterns]
+    return PulseTrains(pulse_of(hammer), [slot_times(slots, rate) for slots in patterns])
 
 
 def checked_drives(
     strategy: Strategy, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
-) -> list[Drive]:
+) -> Sequence[Drive]:
     """Return the drives of a strategy.
 
     Raises
@@ -56,13 +56,13 @@ def checked_drives(
     InputError
         It gives another number of drives, or drives with another number of firings, than is wanted.
     """
-    drives = list(strategy(hammer, patterns, rate))
+    drives = strategy(hammer, patterns, rate)
     if len(drives) != len(patterns):
         raise InputError(f"the strategy gives {len(drives)} drives, expected {len(patterns)}")
-    for slots, drive in zip(patterns, drives, strict=True):
-        if len(drive.times) != len(slots):
+    for slots, count in zip(patterns, firings_of(drives).counts.tolist(), strict=True):
+        if count != len(slots):
             raise InputError(
-                f"the strategy gives {len(drive.times)} firings for the slots {slots}, expected {len(slots)}"
+                f"the strategy gives {count} firings for the slots {slots}, expected {len(slots)}"
             )
     return drives
 

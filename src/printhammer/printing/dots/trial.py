@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from printhammer.drive.batch import firings_of, joined
 from printhammer.printing.dots.judging import Judgement, judge
 from printhammer.printing.dots.nominal import WAIT, SinglePulse
 from printhammer.printing.dots.slots import FIRST_SLOT
@@ -36,7 +37,7 @@ class Trial(Declared):
 
     cases: tuple[Case, ...] = part("hammers and rates")
     patterns: tuple[tuple[int, ...], ...] = part("numbers of the slots at which dots are wanted")
-    drives: tuple[Drive, ...] = part("what drove each member")
+    drives: Sequence[Drive] = part("what drove each member")
     slots: IntArray = column(
         "1", "number of the slot of each firing; -1 where there is none", "member firing"
     )
@@ -77,9 +78,7 @@ def attempt(
     InputError
         The strategy gives drives that do not fit.
     """
-    drives: list[Drive] = []
-    for case in cases:
-        drives += checked_drives(strategy, case.hammer, patterns, case.rate)
+    drives = joined([checked_drives(strategy, case.hammer, patterns, case.rate) for case in cases])
     every = list(patterns) * len(cases)
     slots = np.full((len(every), max(len(pattern) for pattern in patterns)), -1)
     for row, pattern in zip(slots, every, strict=True):
@@ -87,7 +86,7 @@ def attempt(
     rates = np.repeat([case.rate for case in cases], len(patterns))
     due = FIRST_SLOT + slots / rates[:, np.newaxis]
     # A drive may fire its last dot ahead of the slot, or after it.
-    ends = np.maximum([drive.times[-1] for drive in drives], due.max(axis=1)) + WAIT
+    ends = np.maximum(firings_of(drives).last, due.max(axis=1)) + WAIT
     hammers = [case.hammer for case in cases for _ in patterns]
     result = Ensemble(hammers, drives, ends, tolerance=tolerance).run(
         dots=True, threads=threads, progress=progress
@@ -99,7 +98,7 @@ def attempt(
     return Trial(
         cases=tuple(cases),
         patterns=tuple(patterns),
-        drives=tuple(drives),
+        drives=drives,
         slots=slots,
         due=due,
         ends=ends,

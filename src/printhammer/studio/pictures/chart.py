@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.drive.trains import PulseTrain
+from printhammer.drive.batch import PulseTrains
 from printhammer.errors import InputError
 from printhammer.maps.frequency import TAIL
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
@@ -128,12 +128,12 @@ def _end(state: State) -> float:
 
 
 @lru_cache(maxsize=64)
-def _trains(waveform: Waveform, rates: tuple[float, ...], slots: str, overlap: Overlap) -> list[PulseTrain]:
+def _trains(waveform: Waveform, rates: tuple[float, ...], slots: str, overlap: Overlap) -> PulseTrains:
     """Return a train for each rate; kept, since they stay the same while a constant of the hammer changes."""
     if "0" not in slots:
-        return [PulseTrain(waveform, rate=rate, pulses=len(slots), overlap=overlap) for rate in rates]
+        return PulseTrains.at_rates(waveform, rates, len(slots), overlap)
     fired = np.flatnonzero([mark == "1" for mark in slots])
-    return [PulseTrain(waveform, at=(fired / rate).tolist(), overlap=overlap) for rate in rates]
+    return PulseTrains(waveform, [fired / rate for rate in rates], overlap)
 
 
 def codes_of(x: Any, low: float, high: float) -> Any:

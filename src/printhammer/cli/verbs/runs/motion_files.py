@@ -4,43 +4,23 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
+
+from printhammer.results.declare import columns_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
+    from printhammer.results import Rows
     from printhammer.run.contacts import Contact, Dot
     from printhammer.run.motion import Motion
 
-UNITS: Final = {
-    "fired_at": "s",
-    "flight_time": "s",
-    "impact_speed": "m/s",
-    "peak_force": "N",
-    "indentation": "m",
-    "contact_time": "s",
-    "loading_work": "J",
-    "net_loss": "J",
-    "t_in": "s",
-    "v_in": "m/s",
-    "t_out": "s",
-    "v_out": "m/s",
-    "t_peak": "s",
-    "depth": "m",
-    "loss": "J",
-}
 
-
-def write_rows(rows: Sequence[Dot] | Sequence[Contact], kind: type[Dot | Contact], path: Path) -> None:
+def write_rows(rows: Rows[Any], path: Path) -> None:
     """Write dots or contacts as CSV or Parquet, columns such as "t_in [s]"; errors as for `write_file`."""
-    import pandas as pd
-
     from printhammer.results.files import write_csv, write_parquet
 
-    frame = pd.DataFrame([asdict(row) for row in rows], columns=list(kind.__dataclass_fields__))
-    frame = frame.rename(columns={key: f"{key} [{unit}]" for key, unit in UNITS.items()})
-    (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(frame, path)
+    (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(rows.to_dataframe(), path)
 
 
 def write_motion(motion: Motion, path: Path) -> None:
@@ -78,7 +58,8 @@ def as_json(motion: Motion) -> str:
 
 def _named(row: Dot | Contact) -> dict[str, Any]:
     """Return a dot or contact by names such as "flight_time_s"."""
+    units = {name: note.unit for name, note in columns_of(type(row)).items()}
     return {
-        f"{key}_{UNITS[key].replace('/', '_per_')}" if key in UNITS else key: value
+        f"{key}_{units[key].replace('/', '_per_')}" if units[key] else key: value
         for key, value in asdict(row).items()
     }

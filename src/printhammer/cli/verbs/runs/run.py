@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from printhammer.run.contacts import Dot
     from printhammer.run.motion import Motion
 
-PULSES: Final = 9
 MOST_ROWS: Final = 40
 """Dots shown; of more, the first and the last."""
 
@@ -58,7 +57,7 @@ def run(
     rate: str | None = _drive("RATE", "Firings per second, such as '1.2 kHz'."),
     period: str | None = _drive("TIME", "Time between firings, such as '1.05 ms'."),
     at: str | None = _drive("TIMES", "Firing times, such as '0 us, 700 us'."),
-    pulses: int | None = opt.whole(f"Number of firings with --rate or --period ({PULSES}).", panel=_DRIVE),
+    pulses: int | None = opt.whole("Number of firings with --rate or --period (9).", panel=_DRIVE),
     overlap: str | None = opt.overlapping(_DRIVE),
     drive: Path | None = opt.source("A drive file instead.", panel=_DRIVE),
     units: Units = opt.UNITS,
@@ -69,7 +68,6 @@ def run(
     Ends with status 1 where the run stopped before its end, which the status line names.
     """
     from printhammer.cli.verbs.runs.motion_files import write_motion, write_rows
-    from printhammer.run.contacts import Contact, Dot
     from printhammer.run.simulate import simulate
 
     train = {"rate": rate, "period": period, "at": at, "pulses": pulses, "overlap": overlap}
@@ -85,8 +83,8 @@ def run(
         note=escape(repr(motion.drive)[1:-1]),
         files={
             "out": Content(partial(write_motion, motion), motion.plot),
-            "dots": Content(partial(write_rows, motion.dots, Dot)),
-            "contacts": Content(partial(write_rows, motion.contacts, Contact)),
+            "dots": Content(partial(write_rows, motion.dots)),
+            "contacts": Content(partial(write_rows, motion.contacts)),
         },
         complaints=[] if motion.ok else [motion.message],
     )
@@ -106,8 +104,6 @@ def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
         raise InputError(
             f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE"
         )
-    if "rate" in beside or "period" in beside:
-        beside.setdefault("pulses", PULSES)
     if "at" in beside:
         beside["at"] = [each.strip() for each in beside["at"].split(",")]
     return PulseTrain(hammer.waveform, **beside)

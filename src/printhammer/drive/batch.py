@@ -1,0 +1,177 @@
+"""Many trains side by side, as arrays of firing times: what a map fires, or a report over patterns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Self, SupportsIndex, overload
+
+import numpy as np
+
+from printhammer.drive.input import MOST_PULSES, PULSES, checked_times, read_array, read_count, read_positive
+from printhammer.drive.trains import Drive, Overlap, PulseTrain
+from printhammer.errors import InputError
+from printhammer.support.ragged import Ragged, starts_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import numpy.typing as npt
+
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.support.arrays import FloatArray, IntArray
+
+
+class PulseTrains(Sequence[PulseTrain]):
+    """Pulse trains side by side that fire the same waveform, or one of a few.
+
+    All firing times are in one array, which an ensemble takes as it is; a member is made into a `PulseTrain`
+    only when it is looked at.
+
+    Parameters
+    ----------
+    waveform
+        What every firing does.
+    at
+        Firing times of each train, s, ascending.
+    overlap
+        As for `PulseTrain`.
+
+    Raises
+    ------
+    InputError
+        As for `PulseTrain`; or there is no train.
+    """
+
+    def __init__(self, waveform: Waveform, at: Iterable[npt.ArrayLike], overlap: Overlap = "add") -> None:
+        firings = Ragged.of([np.atleast_1d(read_array(row, "at", "firing times, s")) for row in at])
+        rates = np.full(len(firings), np.nan)
+        self._place([PulseTrain(waveform, overlap=overlap)], np.zeros(len(firings), np.int64), firings, rates)
+        self._check()
+
+    @classmethod
+    def at_rates(
+        cls,
+        waveform: Waveform,
+        rates: npt.ArrayLike,
+        pulses: SupportsIndex = PULSES,
+        overlap: Overlap = "add",
+    ) -> Self:
+        """Make trains of so many pulses at constant rates, Hz, all of them fired at 0 s first.
+
+        Raises
+        ------
+        InputError
+            As for `PulseTrain`; or there is no rate.
+        """
+        grid = read_array(rates, "rates", "numbers, Hz").reshape(-1)
+        steps = np.arange(read_count(pulses, "pulses"), dtype=np.float64)
+        with np.errstate(all="ignore"):
+            periods = 1.0 / grid
+            firings = Ragged.even(periods[:, np.newaxis] * steps)
+        odd = grid[~(np.isfinite(grid) & (grid > 0.0) & np.isfinite(periods))]
+        if odd.size:
+            read_positive(float(odd[0]), "Hz", "rate")
+        result = cls.__new__(cls)
+        result._place([PulseTrain(waveform, overlap=overlap)], np.zeros(len(grid), np.int64), firings, grid)
+        result._check()
+        return result
+
+    @classmethod
+    def of_parts(cls, parts: Sequence[PulseTrains]) -> Self:
+        """Return all trains of at least one sequence of them, in order."""
+        places: dict[tuple[int, str], int] = {}
+        pulses: list[PulseTrain] = []
+        pulse_of = []
+        for part in parts:
+            for pulse in part.pulses:
+                key = (id(pulse.waveform), pulse.overlap)
+                if key not in places:
+                    places[key] = len(pulses)
+                    pulses.append(pulse)
+            own = [places[id(pulse.waveform), pulse.overlap] for pulse in part.pulses]
+            pulse_of.append(np.array(own, dtype=np.int64)[part.pulse_of])
+        firings = Ragged(
+            np.concatenate([part.firings.values for part in parts]),
+            starts_of(np.concatenate([part.firings.counts for part in parts])),
+        )
+        result = cls.__new__(cls)
+        rates = np.concatenate([part._rates for part in parts])
+        result._place(pulses, np.concatenate(pulse_of), firings, rates)
+        return result
+
+    def _place(
+        self, pulses: Sequence[PulseTrain], pulse_of: IntArray, firings: Ragged, rates: FloatArray
+    ) -> None:
+        self._pulses, self._pulse_of, self._firings, self._rates = tuple(pulses), pulse_of, firings, rates
+        firings.values.flags.writeable = False
+
+    def _check(self) -> None:
+        """Refuse times that are no firing times, with the sentence that a single train has for them."""
+        if not len(self):
+            raise InputError("no train is given, expected at least one")
+        times, starts = self._firings.values, self._firings.starts
+        counts = self._firings.counts
+        with np.errstate(invalid="ignore"):
+            rising = np.diff(times, prepend=-np.inf) > 0.0
+        rising[starts[:-1][counts > 0]] = True
+        bad = np.flatnonzero(~(rising & np.isfinite(times) & (times >= 0.0)))
+        wrong = np.union1d(
+            np.searchsorted(starts, bad, side="right") - 1,
+            np.flatnonzero((counts == 0) | (counts > MOST_PULSES)),
+        )
+        if wrong.size:
+            checked_times(self._firings[int(wrong[0])])
+
+    @property
+    def firings(self) -> Ragged:
+        """Firing times of all trains, s, read-only."""
+        return self._firings
+
+    @property
+    def pulses(self) -> tuple[PulseTrain, ...]:
+        """The single pulses that are fired, each with the overlap rule of its trains."""
+        return self._pulses
+
+    @property
+    def pulse_of(self) -> IntArray:
+        """Which of the `pulses` each train fires, shape (trains,)."""
+        return self._pulse_of
+
+    def __len__(self) -> int:
+        """Return the number of trains."""
+        return len(self._firings)
+
+    @overload
+    def __getitem__(self, index: int) -> PulseTrain: ...
+    @overload
+    def __getitem__(self, index: slice) -> Self: ...
+    def __getitem__(self, index: int | slice) -> PulseTrain | Self:
+        """Return a train by its number, or the trains of a slice as a sequence of the same kind."""
+        if isinstance(index, slice):
+            return self.take(np.arange(len(self))[index])
+        place = range(len(self))[index]
+        rate = float(self._rates[place])
+        pulse = self._pulses[int(self._pulse_of[place])]
+        return pulse._with_checked_times(self._firings[place], None if np.isnan(rate) else rate)
+
+    def take(self, which: IntArray) -> Self:
+        """Return some of the trains, by their numbers."""
+        result = type(self).__new__(type(self))
+        result._place(self._pulses, self._pulse_of[which], self._firings.take(which), self._rates[which])
+        return result
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {len(self)} trains, {self._firings.values.size} firings>"
+
+
+def firings_of(drives: Sequence[Drive]) -> Ragged:
+    """Return the firing times of some drives, s."""
+    return drives.firings if isinstance(drives, PulseTrains) else Ragged.of([drive.times for drive in drives])
+
+
+def joined(parts: Sequence[Sequence[Drive]]) -> Sequence[Drive]:
+    """Return the drives of some sequences in order, as arrays where all of these are."""
+    trains = [part for part in parts if isinstance(part, PulseTrains)]
+    if not parts or len(trains) < len(parts):
+        return [drive for part in parts for drive in part]
+    return PulseTrains.of_parts(trains)

@@ -1,0 +1,55 @@
+"""Members share what they can: equal drives are one object, whatever the hammer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import printhammer as ph
+from printhammer.drive.file import read_drive
+from printhammer.sweep.members import Maker
+from printhammer.sweep.spec import read_spec
+
+SPEC: dict[str, Any] = {
+    "format": 1,
+    "title": "members",
+    "hammer": "hendriks-1983",
+    "drive": {"overlap": "replace", "train": {"pulses": 3, "start": "1 ms"}},
+    "outputs": {"scalars": ["lost_dots"]},
+}
+RATE = {"key": "drive.rate", "values": ["600 Hz", "1.2 kHz"]}
+
+
+def drives(*axes: dict[str, Any]) -> list[ph.PulseTrain]:
+    spec = read_spec({**SPEC, "axis": list(axes)})
+    maker = Maker(spec.base)
+    first, second = (axis.values for axis in spec.axes)
+    made: list[Any] = [maker.member((a, b)).drive for a in first for b in second]
+    return made
+
+
+def test_hammers_with_the_same_pulse_share_drives() -> None:
+    slow, fast, slow_too, fast_too = drives({"key": "pack.stiffness", "values": ["50 lbf", "60 lbf"]}, RATE)
+    assert slow is slow_too
+    assert fast is fast_too
+    waveform = ph.load("hendriks-1983").waveform
+    for drive, rate in ((slow, "600 Hz"), (fast, "1.2 kHz")):
+        assert drive == ph.PulseTrain(waveform, rate=rate, pulses=3, overlap="replace", start="1 ms")
+
+
+@pytest.mark.parametrize("own", [{}, {"waveform": {"shape": "half-sine", "amplitude": "1 A"}}])
+def test_another_pulse_is_another_drive(own: dict[str, Any]) -> None:
+    """That of the hammer, or the drive's own."""
+    axis = {"key": "waveform.width", "values": ["300 us", "350 us"]}
+    content = {**SPEC, "drive": {**SPEC["drive"], **own}, "axis": [axis, RATE]}
+    base = read_spec(content).base
+    maker = Maker(base)
+    found = [maker.member((width, 600.0)).drive for width in (300e-6, 350e-6)]
+    assert found[0] != found[1]
+    assert [drive.waveform.width for drive in found] == [300e-6, 350e-6]  # type: ignore[attr-defined]
+
+
+def test_a_member_is_what_its_drive_file_says() -> None:
+    slow = drives({"key": "pack.stiffness", "values": ["50 lbf"]}, RATE)[0]
+    assert read_drive(slow.to_toml()) == slow
