@@ -24,13 +24,14 @@ from printhammer.cli.verbs.runs.paper import paper
 from printhammer.cli.verbs.runs.run import run
 from printhammer.cli.verbs.runs.studio import studio
 from printhammer.cli.verbs.runs.sweep import sweep
+from printhammer.cli.verbs.runs.warm import warm
 
 if TYPE_CHECKING:
     from printhammer.cli.runner import Verb
 
 VERBS: Final[tuple[Verb, ...]] = (
     *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, lyapunov),
-    *(print_, energy, feedback, quality, tune, bench, studio, sweep, measure),
+    *(print_, energy, feedback, quality, tune, bench, studio, sweep, measure, warm),
     *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped),
     *(fit.magnet, fit.spring, fit.pack, fit.backstop, fit.motion),
     *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),

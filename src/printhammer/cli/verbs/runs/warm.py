@@ -1,0 +1,90 @@
+"""The verb `warm`: machine code for a hammer, made before it is needed."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Job, verb
+from printhammer.cli.screen import Column, table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.hammer.hammer import Hammer
+
+
+def _runs(hammer: Hammer) -> None:
+    from printhammer import PulseTrain, simulate
+
+    assert hammer.waveform is not None
+    _ = simulate(hammer, PulseTrain(hammer.waveform)).dots
+
+
+def _lanes(hammer: Hammer) -> None:
+    from printhammer import frequency_map
+
+    frequency_map(hammer, [500.0, 600.0], threads=1)
+
+
+def _strobes(hammer: Hammer) -> None:
+    from printhammer import strobe
+
+    strobe(hammer, period=2e-3, points=1, verdict=False)
+
+
+def _exponents(hammer: Hammer) -> None:
+    from printhammer import lyapunov
+
+    lyapunov(hammer, period=2e-3, firings=1, transient=0)
+
+
+_KERNELS: Final[dict[str, Callable[[Hammer], None]]] = {
+    "runs, their dots and peaks": _runs,
+    "maps and sweeps": _lanes,
+    "strobe points": _strobes,
+    "exponents, orbits, sensitivities": _exponents,
+}
+
+
+def _made(name: str, hammer: Hammer) -> tuple[str, float]:
+    """Make or load the machine code of one kind, in a process of its own; return its name and the time, s."""
+    start = time.perf_counter()
+    _KERNELS[name](hammer)
+    return name, time.perf_counter() - start
+
+
+@verb("warm", "printhammer warm hendriks-1983")
+def warm(job: Job, hammer: Hammer = opt.FIRED) -> Answer:
+    """Compile what a hammer needs ahead of time, on two cores; another hammer with these laws needs nothing.
+
+    The machine code stays where numba keeps it, beside the program or in NUMBA_CACHE_DIR, and may be copied
+    to another machine with the same processor, the same versions and the same place of the program; where it
+    does not fit, it is made again.
+    """
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from multiprocessing import get_context
+
+    rows = []
+    with (
+        job.counting("machine code", remaining=False) as tell,
+        ProcessPoolExecutor(2, get_context("spawn")) as pool,
+    ):
+        # What takes longest begins first, beside what is wanted first.
+        tasks = [pool.submit(_made, name, hammer) for name in _KERNELS]
+        tell(0, len(tasks))
+        for done, task in enumerate(as_completed(tasks), 1):
+            rows.append(task.result())
+            tell(done, len(tasks))
+    return Answer(
+        [
+            table(
+                [
+                    Column("machine code", lambda row: row[0], left=True),
+                    Column("took", lambda row: row[1], unit="s", format=".1f"),
+                ],
+                sorted(rows, key=lambda row: list(_KERNELS).index(row[0])),
+            )
+        ]
+    )
