@@ -131,9 +131,7 @@ class Job:
         }
         check_outputs([stores.get(path, path) for path in self.outputs], self.inputs)
 
-    def counting(
-        self, name: str, *, remaining: bool = True
-    ) -> AbstractContextManager[Callable[[int, int], None]]:
+    def counting(self, name: str, *, remaining: bool = True) -> AbstractContextManager[progress.Counted]:
         """Show a bar during work that is counted, and note its time; see `progress.counting`."""
         return self._timed(progress.counting(name, remaining=remaining))
 
