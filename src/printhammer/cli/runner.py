@@ -16,7 +16,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from printhammer.cli import progress
-from printhammer.cli.options import Files, Option
+from printhammer.cli.options import PART, Files, Option
 from printhammer.cli.screen import heading
 from printhammer.cli.terminal import complain, console, say, warn
 from printhammer.errors import InputError
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 Shown = TypeVar("Shown")
 
 INTERRUPTED: Final = 130
+_WITH_PARTS: Final = ("HAMMER", "SPEC")
+"""What stands for the files that may name a law from elsewhere."""
 PICTURES: Final = (".svg", ".png", ".pdf")
 """Endings of the names of pictures."""
 
@@ -210,6 +212,8 @@ def verb(
         own = [name for name, each in signature.parameters.items() if isinstance(each.default, Option)]
         on = passed or {}
         options: dict[str, Option] = {**{name: signature.parameters[name].default for name in own}, **on}
+        if any(option.hammer or option.metavar in _WITH_PARTS for option in options.values()):
+            options["part"] = PART
         every = {**options, **files}
 
         def call(**texts: Any) -> int:
@@ -256,6 +260,10 @@ def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> d
         )
     )
     values = dict(texts)
+    for path in values.pop("part", None) or []:
+        from printhammer.parts.outside import load_parts
+
+        load_parts(path)
     for name, option in options.items():
         if option.read is not None and texts[name] is not None:
             values[name] = option.read(texts[name], option.flag_of(name))
