@@ -239,7 +239,8 @@ _FRONT: Final[tuple[Column[Any], ...]] = (
 
 @verb(
     "reconstruct front",
-    f"{_JUDGED_TOO} printhammer reconstruct front judged.jsonl --out front.csv",
+    f"{_SEARCHED} printhammer reconstruct judge all.jsonl judged.jsonl --best 1 --every-claim"
+    " && printhammer reconstruct front judged.jsonl --out front.csv",
     out=opt.results("Front"),
 )
 def front(
