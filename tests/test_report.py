@@ -272,9 +272,17 @@ def test_a_failure_midway_keeps_the_report_before(
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
 
 
+def test_the_steps_of_a_report_are_counted(hammer: "ph.Hammer", tmp_path: Path) -> None:
+    steps: list[tuple[int, int, str]] = []
+    write_report(
+        hammer, tmp_path, claims=["geometry"], figures=[2], progress=lambda *step: steps.append(step)
+    )
+    assert steps == [(0, 3, "claim geometry"), (1, 3, "figure 2"), (2, 3, "page")]
+
+
 @pytest.mark.parametrize("step", ["figure 2", "page", "PDF"])
 def test_an_interrupted_report_leaves_the_one_before(hammer: "ph.Hammer", tmp_path: Path, step: str) -> None:
-    def stop(at: str) -> None:
+    def stop(_done: int, _steps: int, at: str) -> None:
         if at == step:
             raise KeyboardInterrupt
 

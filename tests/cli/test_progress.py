@@ -2,7 +2,7 @@
 
 import pytest
 
-from printhammer.cli.progress import counting, telling
+from printhammer.cli.progress import counting, pace_of, telling
 
 
 @pytest.fixture
@@ -44,3 +44,32 @@ def test_a_terminal_sees_what_is_told(capsys: pytest.CaptureFixture[str]) -> Non
 def test_an_error_goes_through() -> None:
     with pytest.raises(ZeroDivisionError), counting("orbits"):
         raise ZeroDivisionError
+
+
+@pytest.mark.usefixtures("terminal")
+def test_count_rate_and_time_left_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    with counting("judging") as count:
+        count(0, 4)
+        count(1, 4, "settle out")
+    err = " ".join(capsys.readouterr().err.split())
+    assert "judging settle out" in err
+    assert "1/4" in err
+    assert "/s" in err
+    assert "left" in err
+
+
+@pytest.mark.parametrize(
+    ("done", "total", "seconds", "said"),
+    [
+        (0, 4, 5.0, ""),
+        (3, 4, None, ""),
+        (30, 60, 10.0, "3/s, 0:10 left"),
+        (2, 7, 61.0, "30.5 s each, 2:32 left"),
+        (4, 4, 2.0, "2/s, 0:00 left"),
+        (1, None, 3.0, "3 s each"),
+    ],
+)
+def test_the_pace_is_rate_and_time_left(
+    done: int, total: int | None, seconds: float | None, said: str
+) -> None:
+    assert pace_of(done, total, seconds) == said

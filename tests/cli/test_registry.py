@@ -1,8 +1,9 @@
 """What holds for every verb: its help, its example, and that bad input is told in one sentence."""
 
+import re
 import shlex
 import subprocess
-import sysconfig
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,9 @@ import typer
 import printhammer as ph
 from printhammer.cli.main import app
 from printhammer.cli.options import Files, read_plain, read_whole
-from printhammer.cli.registry import VERBS
+from printhammer.cli.registry import GROUPS, VERBS
 from printhammer.cli.runner import Verb
 
-SCRIPTS = Path(sysconfig.get_path("scripts"))
 NAMES = [verb.name for verb in VERBS]
 # What a verb cannot do without, so that it comes to see what is wrong beside it.
 NEEDED = {
@@ -37,12 +37,15 @@ NEEDED = {
 }
 # Examples that take more than a few seconds.
 LONG = {"bifurcation", "continue", "orbits", "energy", "feedback", "tune", "sweep"}
-# Examples that are part of other tests, or do not end.
+LONG |= {f"reconstruct {verb}" for verb in ("judge", "front", "predictions", "schemes", "family")}
+# Examples that are part of other tests, or take minutes.
 ELSEWHERE = {
     "paper": "takes minutes; test_paper.py writes the whole report",
     "studio": "ends with Ctrl-C only, in test_studio.py",
     "bench": "takes minutes; test_bench.py",
-    **{verb.name: "follow each other; test_reconstruct.py" for verb in VERBS if "reconstruct" in verb.name},
+    "reconstruct search": "takes a minute; the other examples of reconstruct begin with a shorter one",
+    "reconstruct base-rates": "takes minutes; test_reconstruct.py, with claims at no cost",
+    "reconstruct ship": "judges all claims, which takes minutes; test_reconstruct.py, with the stated ones",
 }
 
 
@@ -54,18 +57,36 @@ def test_names_are_told_apart() -> None:
     assert len(set(NAMES)) == len(NAMES)
 
 
+def printed(cli: Callable[..., Any], words: list[str]) -> str:
+    """Return the example as a help shows it, which is what a user copies."""
+    done = cli(*words, "--help")
+    assert done.status == 0
+    lines = done.out.partition("Example: ")[2].splitlines()
+    return "\n".join(line.strip() for line in lines).strip()
+
+
+def commands_of(shown: str) -> list[list[str]]:
+    """Return the words of the commands of an example, as a shell takes them."""
+    assert all(line.endswith("\\") for line in shown.splitlines()[:-1])
+    return [shlex.split(part) for part in shown.replace("\\\n", "").split(" && ")]
+
+
 @pytest.mark.parametrize("verb", VERBS, ids=NAMES)
 def test_help_carries_an_example_that_can_be_read(cli: Callable[..., Any], verb: Verb) -> None:
-    done = cli(*verb.name.split(), "--help")
-    assert done.status == 0
-    assert f"Example: {verb.example}" in " ".join(done.out.split())
-    program, *words = shlex.split(verb.example.rpartition("&&")[2])
-    assert program == "printhammer"
-    command: Any = typer.main.get_command(app)
-    for name in verb.name.split():
-        assert words.pop(0) == name
-        command = command.commands[name]
-    command.make_context(verb.name, words)
+    shown = printed(cli, verb.name.split())
+    assert shown.replace("\\\n", "") == verb.example
+    for words in commands_of(shown):
+        assert words.pop(0) == "printhammer"
+        command: Any = typer.main.get_command(app)
+        while hasattr(command, "commands"):
+            command = command.commands[words.pop(0)]
+        if ">" not in words:
+            command.make_context(verb.name, words)
+
+
+@pytest.mark.parametrize("group", [name for name, (_help, example) in GROUPS.items() if example])
+def test_a_group_has_the_example_of_a_verb(cli: Callable[..., Any], group: str) -> None:
+    assert printed(cli, [group]).replace("\\\n", "") in {verb.example for verb in VERBS}
 
 
 def examples() -> Iterator[Any]:
@@ -79,19 +100,28 @@ def test_the_example_in_the_help_runs(
     cli: Callable[..., Any], verb: Verb, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    if verb.name.startswith("fit "):
-        assert cli("measure", "all", "--out", ".").status == 0
-    before = set(tmp_path.iterdir())
-    if "&&" in verb.example:
-        shell = verb.example.replace("printhammer", str(SCRIPTS / "printhammer"))
-        done = subprocess.run(shell, shell=True, capture_output=True, text=True, check=True)
+    shown = printed(cli, verb.name.split())
+    if ">" in shown or verb.name.startswith("reconstruct"):
+        # Into a file, or with processes of its own.
+        program = f"{shlex.quote(sys.executable)} -m printhammer "
+        shell = re.sub(r"(^|&& )printhammer ", lambda found: found[1] + program, shown, flags=re.MULTILINE)
+        done = subprocess.run(shell, shell=True, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
         assert done.stdout
     else:
-        outcome = cli(*shlex.split(verb.example)[1:])
-        assert outcome.status == 0, outcome.err
-        assert outcome.out
-    wanted = " --out " in verb.example
-    assert (set(tmp_path.iterdir()) > before) == wanted
+        for _program, *words in commands_of(shown):
+            outcome = cli(*words)
+            assert outcome.status == 0, outcome.err
+            assert outcome.out
+    assert {path.name for path in tmp_path.iterdir()} == written_by(verb)
+
+
+def written_by(verb: Verb) -> set[str]:
+    """Return what an example writes, by the names in it."""
+    words = verb.example.split()
+    names = [words[k + 1] for k, word in enumerate(words) if word in ("--out", ">")]
+    names += re.findall(r"[\w.]+\.jsonl?\b", verb.example)
+    return {Path(name).parts[0] for name in names}
 
 
 @pytest.mark.parametrize("verb", VERBS, ids=NAMES)
@@ -132,6 +162,43 @@ def test_a_file_that_cannot_be_written_is_refused(
         refused(*words_of(verb, flag, name, flag, name), said=(name, "twice"))
     (tmp_path / name).mkdir()
     refused(*words_of(verb, flag, name), said=(name, "folder"))
+
+
+HAMMERED = [verb for verb in VERBS if any(option.hammer for option in verb.options.values())]
+
+
+def hammer_words(verb: Verb, path: object) -> list[object]:
+    (option,) = [option for option in verb.options.values() if option.hammer]
+    return [path] if option.argument else ["--hammer", path]
+
+
+@pytest.mark.parametrize("verb", HAMMERED, ids=[verb.name for verb in HAMMERED])
+def test_a_hammer_that_is_none_is_refused(refused: Callable[..., None], verb: Verb) -> None:
+    refused(*words_of(verb, *hammer_words(verb, "nobody.toml")), said=("nobody.toml", "no such file"))
+
+
+@pytest.mark.parametrize("verb", HAMMERED, ids=[verb.name for verb in HAMMERED])
+def test_a_hammer_is_never_written_over(refused: Callable[..., None], verb: Verb, tmp_path: Path) -> None:
+    for name, files in verb.files.items():
+        ending = (*files.endings, ".png")[0]
+        path = tmp_path / f"hammer{ending}"
+        ph.load("hendriks-1983").save(path)
+        words = words_of(verb, *hammer_words(verb, path))
+        # An output without a flag is one of those words.
+        written = [path if word == "new.json" else word for word in words]
+        refused(*written, *([] if files.argument else [f"--{name}", path]), said="this one is read")
+
+
+FIRED = [verb for verb in HAMMERED if any(option.hammer == "fired" for option in verb.options.values())]
+
+
+@pytest.mark.parametrize("verb", FIRED, ids=[verb.name for verb in FIRED])
+def test_a_hammer_without_a_waveform_is_not_fired(
+    refused: Callable[..., None], verb: Verb, tmp_path: Path
+) -> None:
+    path = tmp_path / "bare.toml"
+    ph.load("hendriks-1983").replace("waveform", None).save(path)
+    refused(*words_of(verb, *hammer_words(verb, path)), said=("bare.toml", "has no [waveform] to fire"))
 
 
 def places() -> Iterator[Any]:

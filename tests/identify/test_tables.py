@@ -45,7 +45,7 @@ def test_a_byte_order_mark_and_line_ends_of_other_systems(tmp_path: Path) -> Non
 
 @given(
     rows=st.lists(
-        st.tuples(*2 * (st.floats(-1e6, 1e6, allow_nan=False),)),
+        st.tuples(*2 * (st.floats(-1e6, 1e6, allow_nan=False, allow_subnormal=False),)),
         min_size=1,
         max_size=20,
     ),
@@ -99,6 +99,9 @@ HEADING = "displacement [um],force [N]\n"
         (HEADING + "1,\n", ("line 2", "'force'", "''")),
         (HEADING + "nan,1\n", ("line 2", "'displacement'", "finite")),
         (HEADING + "1,inf\n", ("line 2", "finite")),
+        (HEADING + "1e16,1\n", ("line 2", "1e16 um", "measured value")),
+        (HEADING + "1,2\n3,-9.9e37\n", ("line 3", "-9.9e37 N", "measured value")),
+        (HEADING + "5e-324,1\n", ("line 2", "5e-324 um", "measured value")),
         (HEADING + "1,2,3\n", ("line 2", "3 cells", "expected 2")),
         (HEADING + "1\n", ("line 2", "1 cells")),
         (HEADING + '1,"2\n', ("line 2", "comma-separated")),

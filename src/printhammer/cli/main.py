@@ -6,6 +6,7 @@ in one sentence on the standard error; 130 after Ctrl-C.
 
 from __future__ import annotations
 
+import re
 import sys
 from typing import TYPE_CHECKING, Annotated, Final, NoReturn
 
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 BAD_INPUT: Final = 2
+_COLUMNS: Final = 76
+"""Where the lines of an example end at the latest."""
+
 HELP: Final = (
     "A laboratory for impact print hammers: motion, contacts, dots, and the claims of Hendriks (1983)."
 )
@@ -43,6 +47,19 @@ def _program(
     """Hold the options of the program itself."""
 
 
+def _shown(example: str | None) -> str | None:
+    """Return an example as the help shows it, in lines that a shell takes as they stand."""
+    if example is None:
+        return None
+    lines = ["Example:"]
+    for word in re.findall(r"--\S+ '[^']*'|--\S+ [^-&\s]\S*|'[^']*'|\S+", example):
+        if len(lines[-1]) + len(word) < _COLUMNS:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word)
+    return " \\\n".join(lines)
+
+
 def _built() -> typer.Typer:
     """Return the program with the verbs of the registry."""
     program = typer.Typer(
@@ -57,12 +74,11 @@ def _built() -> typer.Typer:
     program.callback()(_program)
     homes = {"": program}
     for name, (text, example) in GROUPS.items():
-        epilog = None if example is None else f"Example: {example}"
-        homes[name] = typer.Typer(help=text, epilog=epilog, no_args_is_help=True)
+        homes[name] = typer.Typer(help=text, epilog=_shown(example), no_args_is_help=True)
         program.add_typer(homes[name], name=name)
     for verb in VERBS:
         group, _, name = verb.name.rpartition(" ")
-        homes[group].command(name, epilog=f"Example: {verb.example}")(verb.call)
+        homes[group].command(name, epilog=_shown(verb.example))(verb.call)
     return program
 
 

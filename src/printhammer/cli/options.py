@@ -270,6 +270,7 @@ def _hammer(use: str, *, flag: bool = False) -> Any:
     return text("HAMMER", what, default="hendriks-1983", argument=not flag, is_input=True, hammer=use)
 
 
+PART: Final = source("Python file that registers laws of parts; may be given repeatedly.", many=True)
 NAMED, HAMMER, FIRED = _hammer("named"), _hammer("loaded"), _hammer("fired")
 HAMMER_OPTION: Final = _hammer("loaded", flag=True)
 PERIOD: Final = text("TIME", "Time between firings, such as '1.05 ms'.", panel=_TRAIN)

@@ -3,32 +3,60 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rich.progress import Progress, ProgressColumn
+    from rich.progress import Progress, ProgressColumn, Task
+
+
+class Counted(Protocol):
+    """Takes steps done and of all, and perhaps what is being done."""
+
+    def __call__(self, done: int, total: int, what: str = "", /) -> None:
+        """Show them."""
 
 
 @contextmanager
-def counting(name: str, *, remaining: bool = True) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar while something, called `name`, is counted; yield a function of the steps done and of all.
+def counting(name: str, *, remaining: bool = True) -> Iterator[Counted]:
+    """Show count, rate and time left while something, called `name`, is counted; yield what takes the count.
 
-    The time that is left is told too where `remaining`; it says nothing where most steps may not be needed.
+    The time that went by is shown instead of that left unless `remaining`: the latter says nothing where most
+    steps may not be needed.
     """
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.text import Text
 
-    last = TimeRemainingColumn() if remaining else TimeElapsedColumn()
-    with _shown(TextColumn(name), BarColumn(), MofNCompleteColumn(), last) as bar:
+    class Pace(ProgressColumn):
+        """Rate, and the time left at that rate."""
+
+        def render(self, task: Task) -> Text:
+            return Text(pace_of(task.completed, task.total if remaining else None, task.elapsed), style="dim")
+
+    columns = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Pace()]
+    with _shown(*columns, *(() if remaining else (TimeElapsedColumn(),))) as bar:
         task = bar.add_task(name, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+        def count(done: int, total: int, what: str = "", /) -> None:
+            bar.update(task, completed=done, total=total, description=f"{name} {what}" if what else name)
+
+        yield count
+
+
+def pace_of(done: float, total: float | None, seconds: float | None) -> str:
+    """Return how fast steps were done, and how long the others take at that rate; empty before the first.
+
+    The rate is that since the beginning: steps that are done in parallel come in bursts.
+    """
+    if not done or not seconds:
+        return ""
+    rate = done / seconds
+    said = f"{rate:.3g}/s" if rate >= 1.0 else f"{1.0 / rate:.3g} s each"
+    if total is None:
+        return said
+    minutes, rest = divmod(round((total - done) / rate), 60)
+    return f"{said}, {minutes}:{rest:02d} left"
 
 
 @contextmanager
@@ -47,4 +75,9 @@ def _shown(*columns: ProgressColumn) -> Progress:
 
     console = Console(stderr=True)
     # Where it is no terminal, the library would end with an empty line.
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    return Progress(
+        *columns,
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 from rich.markup import escape
 
 from printhammer.cli import progress
-from printhammer.cli.options import FORCE, Files, Option
+from printhammer.cli.options import FORCE, PART, Files, Option
 from printhammer.cli.screen import heading
 from printhammer.cli.terminal import complain, console, say, warn
 from printhammer.errors import InputError
@@ -34,6 +34,8 @@ Shown = TypeVar("Shown")
 
 INTERRUPTED: Final = 130
 _FORCE: Final = "write_over"
+_WITH_PARTS: Final = ("HAMMER", "SPEC")
+"""What stands for the files that may name a law from elsewhere."""
 PICTURES: Final = (".svg", ".png", ".pdf")
 """Endings of the names of pictures."""
 
@@ -147,9 +149,7 @@ class Job:
             if not self.force and (path.exists() or path.is_symlink()):
                 raise InputError(f"{path}: expected a new file, this one is there; --force writes over it")
 
-    def counting(
-        self, name: str, *, remaining: bool = True
-    ) -> AbstractContextManager[Callable[[int, int], None]]:
+    def counting(self, name: str, *, remaining: bool = True) -> AbstractContextManager[progress.Counted]:
         """Show a bar during work that is counted, and note its time; see `progress.counting`."""
         return self._timed(progress.counting(name, remaining=remaining))
 
@@ -237,6 +237,8 @@ def verb(
             *(each for each in files.values() if not each.continued),
             *(o for o in options.values() if o.writes),
         ]
+        if any(option.hammer or option.metavar in _WITH_PARTS for option in options.values()):
+            options["part"] = PART
         every = {**options, **files, **older, **({_FORCE: FORCE} if new else {})}
 
         def call(**texts: Any) -> int:
@@ -287,6 +289,10 @@ def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> d
         )
     )
     values = dict(texts)
+    for path in values.pop("part", None) or []:
+        from printhammer.parts.outside import load_parts
+
+        load_parts(path)
     for name, option in options.items():
         if option.read is not None and texts[name] is not None:
             values[name] = option.read(texts[name], option.flag_of(name))

@@ -21,6 +21,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from printhammer.errors import InputError, located, nearest
 from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
+from printhammer.parts.functions import check_functions
+from printhammer.parts.outside import load_installed
 from printhammer.support.constants import (
     STATUSES,
     Constant,
@@ -123,7 +125,9 @@ def model_of(section: str, kind: str) -> type[BaseModel]:
         from printhammer.drive.waveforms.shapes import SHAPES
 
         return SHAPES[kind]
-    return PARTS[section, kind]
+    part = PARTS[section, kind]
+    check_functions(part)
+    return part
 
 
 def kinds_of(section: str) -> tuple[str, ...]:
@@ -132,6 +136,7 @@ def kinds_of(section: str) -> tuple[str, ...]:
         from printhammer.drive.waveforms.shapes import SHAPES
 
         return tuple(SHAPES)
+    load_installed()
     return laws(section)
 
 

@@ -85,14 +85,43 @@ class Solution(Declared, eq=False):
         return weights
 
 
+class NoSolutionError(ArithmeticError):
+    """No parameters of a law come near the data; `row` is farthest from those that the fit began with."""
+
+    def __init__(self, row: int) -> None:
+        super().__init__(f"no parameters of the law come near the data, row {row} lies farthest off")
+        self.row = row
+
+
 def solve(law: Law, data: FloatArray, start: FloatArray, *, robust: bool = True) -> Solution:
     """Fit a law to data, shape (m,), more than it has parameters, from parameters near enough.
 
     Rows that lie too far off are left out if the fit is to be robust.
+
+    Raises
+    ------
+    NoSolutionError
+        The parameters run away, or the law has no finite value on the way.
     """
+    # A row very far off can drive the first fit, which counts it in full, away; a second try leaves that out.
+    for plain_first in (True, False) if robust else (True,):
+        with np.errstate(all="ignore"):
+            try:
+                solution = _solve(law, data, start, robust, plain_first)
+            except (ArithmeticError, ValueError):
+                # What SciPy and LAPACK raise where residuals or Jacobian are not finite.
+                continue
+        if np.isfinite(solution.p).all() and np.isfinite(solution.covariance).all():
+            return solution
+    with np.errstate(all="ignore"):
+        distances = np.abs(data - law.value(start))
+    raise NoSolutionError(int(np.argmax(np.where(np.isnan(distances), np.inf, distances))))
+
+
+def _solve(law: Law, data: FloatArray, start: FloatArray, robust: bool, plain_first: bool) -> Solution:
     m, n = len(data), len(start)
     used = np.ones(m, dtype=bool)
-    p = _least_squares(law, data, np.ones(m), used, start)
+    p = _least_squares(law, data, np.ones(m), used, start) if plain_first else start
     if robust:
         for _ in range(3):
             scale = robust_scale(data - law.value(p))
@@ -142,7 +171,7 @@ def _solution(
     freedom = int(used.sum()) - len(p)
     root = np.sqrt(variance[used])
     rows, errors = jacobian[used] / root[:, None], residuals[used] / root
-    length = _lengths(rows)
+    length = lengths_of(rows)
     singular = np.linalg.svd(rows / length, compute_uv=False)
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else math.inf
     scale = math.sqrt(float(np.sum(residuals[used] ** 2)) / max(freedom, 1))
@@ -170,7 +199,7 @@ def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArr
     of each parameter, those of Bell and McCaffrey.
     """
     m, n = rows.shape
-    length = _lengths(rows)
+    length = lengths_of(rows)
     inverse = np.linalg.pinv(rows / length) / length[:, None]
     basis = _basis(rows)
     own = np.sum(basis * basis, axis=1)
@@ -198,11 +227,11 @@ def leverage(rows: FloatArray) -> FloatArray:
 
 def _basis(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis of what the columns span, shape (m, rank)."""
-    basis, singular, _ = np.linalg.svd(rows / _lengths(rows), full_matrices=False)
+    basis, singular, _ = np.linalg.svd(rows / lengths_of(rows), full_matrices=False)
     return basis[:, singular > 1e-12 * singular[0]] if singular.size else basis
 
 
-def _lengths(rows: FloatArray) -> FloatArray:
+def lengths_of(rows: FloatArray) -> FloatArray:
     """Return the lengths of the columns; 1 for a column of zeros."""
     lengths: FloatArray = np.linalg.norm(rows, axis=0)
     lengths[lengths == 0.0] = 1.0

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
 
+LARGEST: Final = 1e9
+"""Largest magnitude of a measured value in SI. Beyond it is what instruments write without a reading, such as
+9.9e37."""
+
 
 class Readings(Declared, eq=False):
     """Columns of a file in the order of its rows."""
@@ -65,8 +69,8 @@ def read_table(
     ------
     InputError
         The file cannot be read, has no rows, a column is missing, not known or given twice, lacks its unit
-        or has one of another dimension, a cell is no finite number or no word allowed, or a row has too many
-        or too few cells.
+        or has one of another dimension, a cell is no finite number or no word allowed, or a number is
+        too large or too small to be a measured one, or a row has too many or too few cells.
     """
     source = Path(path)
     if not source.exists():
@@ -148,4 +152,12 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
             f"{where}: {cell.strip()!r} is expected to be a finite number, {describe(si)} in {unit}"
         )
     with located(where):
-        return to_si(number, unit, si)
+        value = to_si(number, unit, si)
+    # Squares and powers of what no sensor reads are no numbers.
+    tiny = float(np.finfo(np.float64).tiny)
+    if abs(value) > LARGEST or (number != 0.0 and abs(value) < tiny):
+        raise InputError(
+            f"{where}: {cell.strip()} {unit}, expected a measured value, 0 or one of a magnitude from"
+            f" {tiny:.2g} to {LARGEST:g} {si}"
+        )
+    return value

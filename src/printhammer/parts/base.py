@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from printhammer.errors import InputError
+from printhammer.parts.functions import check_functions
 from printhammer.support.constants import sentence
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ class Part(BaseModel):
     Raises
     ------
     InputError
-        A constant is missing, unknown, not a finite number or out of its bounds.
+        A constant is missing, unknown, not a finite number or out of its bounds, or a function of the law
+        takes other arguments than the kernel hands it.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -44,6 +46,7 @@ class Part(BaseModel):
                 super().__init__(**data)
             except ValidationError as error:
                 raise InputError(sentence(error, type(self), f"{self.role}.")) from None
+            check_functions(type(self))
 
         # Lets model_validate keep its context (the folder of the file), which a custom __init__ would lose.
         __init__.__pydantic_base_init__ = True

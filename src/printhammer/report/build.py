@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import tomllib
 from contextlib import suppress
@@ -11,6 +12,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import Context, JudgedClaim, buzz_search, judge_all
+from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import panel_strobes, printed_verdicts
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.reconstruction.results import BaseRates, Results, shipped_results
@@ -32,7 +34,7 @@ def write_report(
     hammer: Hammer,
     out: str | Path,
     *,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
     claims: Iterable[str] | None = None,
     figures: Iterable[int] | None = None,
     reconstruction: Results | None = None,
@@ -47,7 +49,7 @@ def write_report(
     out : path
         Folder for `index.html`, `claims.json` and `figures/`; made where it is missing.
     progress : callable, optional
-        Called with a phrase before each step.
+        Called before each step with the number of steps done, of all, and a phrase for the next.
     claims, figures : iterable, optional
         Names and numbers of those to report; by default all.
     reconstruction : Results, optional
@@ -69,23 +71,27 @@ def write_report(
     from printhammer.report.page import page
     from printhammer.report.pdf import check_typesetter, write_pdf
 
-    tell = progress or (lambda _: None)
     reconstruction = shipped_results() if reconstruction is None else reconstruction
     reconstruction.check()
     if pdf:
         check_typesetter()
+    sayings = tomllib.loads(files("printhammer").joinpath("report", "figures.toml").read_text("utf-8"))
+    drawn = None if figures is None else set(figures)
+    numbered = {int(name): says for name, says in sayings.items() if drawn is None or int(name) in drawn}
+    wanted = set(every_claim() if claims is None else claims) & set(every_claim())
+    steps, done = len(wanted) + len(numbered) + 1 + pdf, itertools.count()
+
+    def tell(what: str) -> None:
+        if progress is not None:
+            progress(next(done), steps, what)
+
     with staged(out) as folder:
         start = perf_counter()
         context = Context(hammer)
-        results = judge_all(hammer, claims, progress=lambda name: tell(f"claim {name}"), context=context)
-        drawn = None if figures is None else set(figures)
+        results = judge_all(hammer, wanted, progress=lambda name: tell(f"claim {name}"), context=context)
         written: list[Path] = []
         drawings = []
-        sayings = files("printhammer").joinpath("report", "figures.toml").read_text(encoding="utf-8")
-        for name, says in tomllib.loads(sayings).items():
-            number = int(name)
-            if drawn is not None and number not in drawn:
-                continue
+        for number, says in numbered.items():
             tell(f"figure {number}")
             drawing = _draw(context, number, says, results, folder / PICTURES, written)
             if drawing is not None:

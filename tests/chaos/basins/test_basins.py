@@ -245,3 +245,14 @@ def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, 
 def test_entropy_of_what_is_no_plane_is_refused(labels: np.ndarray, box: int, said: str) -> None:
     with pytest.raises(ph.InputError, match=said):
         basin_entropy(labels, box=box)
+
+
+def test_near_a_doubling_no_cell_is_left_and_the_orbit_has_its_own_period() -> None:
+    hammer = ph.load("hendriks-1983")
+    # The multiplier is -0.990: states two firings apart agree a thousand firings before those one apart do.
+    found = ph.basins(hammer, period=1.05e-3, x=(30e-6, 260e-6, 4), v=(-1.0, 1.0, 4))
+    assert found.counts[0] == 0
+    assert [attractor.name for attractor in found.attractors] == ["period-1", "period-2"]
+    ((x, v),) = found.attractors[0].states.tolist()
+    after = ph.strobe(hammer, period=1.05e-3, points=2, transient=3000, state=(x, v), verdict=False)
+    assert after.x[0] == pytest.approx(x, abs=1e-9)

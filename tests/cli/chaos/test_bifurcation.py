@@ -1,3 +1,4 @@
+import re
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -25,13 +26,50 @@ def test_windows_routes_and_files(cli: Callable, tmp_path: Path) -> None:
     assert "different attractors at" in done.out
     periods = np.linspace(1.29e-3, 1.33e-3, 5)
     found = ph.bifurcation(
-        ph.load("hendriks-1983"), periods=periods, direction="both", refine=0, firings=60, transient=30
+        ph.load("hendriks-1983"),
+        periods=periods,
+        direction="both",
+        refine=0,
+        firings=60,
+        transient=30,
+        exponents=True,
     )
     with xr.open_dataset(paths["nc"], engine="scipy") as chart:
         np.testing.assert_array_equal(chart["x"], found.x)
     assert pd.read_csv(paths["csv"], comment="#")["verdict"].tolist() == found.verdicts.reshape(-1).tolist()
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in paths["svg"].read_bytes()
+
+
+@pytest.mark.slow
+def test_most_trains_are_decided_and_the_others_say_why(cli: Callable) -> None:
+    done = cli("bifurcation", "hendriks-1983", "--values", "100")
+    assert done.status == 0
+    out = " ".join(done.out.split())
+    assert re.search(r"period: 100 values and \d+ between those that differ, \d+ trains of 1000 firings", out)
+    # It was half of the range.
+    shares = {
+        row[1]: float(row[3]) for row in re.finditer(r"(undecided|strange) +(\d+) +([\d.]+) ", done.out)
+    }
+    assert shares["undecided"] < 6.0
+    assert shares["strange"] > 25.0
+    assert "[ms] [ms]" in out
+    assert re.search(r"With rising values the first strange train comes at 0\.92\d\d? ms after", out)
+    assert "undecided trains: neighbouring motions close up, so they still settle: more --firings" in out
+
+
+def test_without_exponents_it_is_said_how_to_tell(cli: Callable) -> None:
+    done = cli(
+        "bifurcation", "--from", "1.27 ms", "--to", "1.29 ms", "--values", "2", *SHORT, "--no-exponents"
+    )
+    assert done.status == 0
+    assert "2 values, 2 trains of 60 firings" in done.out
+    assert "undecided trains: no exponent is known: --exponents computes it" in done.out
+
+
+def test_a_transient_leaves_points_to_judge(cli: Callable) -> None:
+    words = ("--from", "1.3 ms", "--to", "1.31 ms", "--values", "2", "--refine", "0")
+    assert cli("bifurcation", *words, "--firings", "90").status == 0
 
 
 def test_another_constant(cli: Callable) -> None:
@@ -79,7 +117,7 @@ def test_ctrl_c_writes_what_is_done(
         (("--from", "2 ms"), "--to"),
         (("--values", "1"), "--values"),
         (("--firings", "0"), "firings"),
-        (("--transient", "300"), "transient"),
+        (("--transient", "1000"), "transient"),
         (("--direction", "sideways"), "sideways"),
         (("--refine", "-1"), "refine"),
         (("--show", "y"), "--show"),

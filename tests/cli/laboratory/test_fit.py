@@ -134,3 +134,50 @@ def test_bad_input_is_one_sentence(
     refused: Callable, tables: dict[str, Path], tmp_path: Path, words: str, said: tuple[str, ...]
 ) -> None:
     refused("fit", *shlex.split(words.format(**tables, out=tmp_path / "out.toml")), said=said)
+
+
+WORDS = {
+    "magnet": "--hammer hendriks-1983",
+    "spring": "--backstop '2 mil'",
+    "pack": "--thickness '7 mil'",
+    "backstop": "--hammer hendriks-1983",
+}
+
+
+@pytest.mark.parametrize("written", ["1e308", "-1e308", "9.9e37", "5e-324"])
+@pytest.mark.parametrize("kind", WORDS)
+def test_a_value_that_no_sensor_reads_is_refused(
+    refused: Callable, tables: dict[str, Path], kind: str, written: str
+) -> None:
+    lines = tables[kind].read_text().splitlines()
+    for column in range(lines[0].count(" [")):
+        changed = [line.split(",") for line in lines]
+        changed[5][column] = written
+        tables[kind].write_text("\n".join(map(",".join, changed)) + "\n")
+        words = shlex.split(WORDS[kind])
+        refused("fit", kind, tables[kind], *words, said=("line 6", written, "expected a measured value"))
+
+
+def test_a_row_far_off_is_left_out(cli: Callable, tables: dict[str, Path]) -> None:
+    lines = tables["spring"].read_text().splitlines()
+    lines[8] = lines[8].partition(",")[0] + ",1e5"
+    tables["spring"].write_text("\n".join(lines) + "\n")
+    done = cli("fit", "spring", tables["spring"], *shlex.split(WORDS["spring"]))
+    assert done.status == 0, done.err
+    assert "14 used" in done.out
+
+
+@pytest.mark.parametrize(("first", "second"), [(9, 31), (31, 55), (75, 105)])
+def test_rows_that_change_places_are_a_sentence_or_an_answer(
+    cli: Callable, tables: dict[str, Path], first: int, second: int
+) -> None:
+    lines = tables["pack"].read_text().splitlines()
+    lines[first], lines[second] = lines[second], lines[first]
+    tables["pack"].write_text("\n".join(lines) + "\n")
+    done = cli("fit", "pack", tables["pack"], *shlex.split(WORDS["pack"]))
+    if done.status:
+        assert done.status == 2
+        assert done.err.startswith("printhammer: ")
+        assert len(done.err.splitlines()) == 1
+    else:
+        assert "inf" not in done.out

@@ -135,7 +135,14 @@ def test_the_comparison(controller: Controller, monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setattr(
         "printhammer.control.feedback.comparison.Controller", lambda *_args, **_options: controller
     )
-    found = ph.feedback(controller.hammer, RATE, gaps=[0.6e-3, 1.1e-3])
+    steps: list[tuple[int, int]] = []
+    found = ph.feedback(
+        controller.hammer, RATE, gaps=[0.6e-3, 1.1e-3], progress=lambda *step: steps.append(step)
+    )
+    assert steps == sorted(steps)
+    assert len(steps) > 8
+    assert steps[0][0] == 0
+    assert 0.9 < steps[-1][0] / steps[-1][1] < 1.0
     assert isinstance(found, Feedback)
     assert found.strategies == ("open loop", "feedback")
     assert found.passed.shape == (2, 128)

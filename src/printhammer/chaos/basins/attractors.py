@@ -32,6 +32,11 @@ REACH: Final = 0.99
 INSIDE: Final = 0.95
 """Share of the points of a train that must lie within reach for it to be on a strange attractor."""
 
+DECAY: Final = 0.999
+"""A train that seems to have an even period settles to half of it where the distance of states half a period
+apart falls below this part of itself while it is judged: near a doubling, where neighbours take turns about
+the orbit, states two firings apart agree long before those one firing apart."""
+
 ATTEMPTS: Final = 12
 """Trains without a period that are followed for long, at most, to find strange attractors."""
 
@@ -69,6 +74,10 @@ class Attractors:
         places = np.full(len(columns), -1, np.int64)
         for q in np.unique(cycles[cycles > 0]).tolist():
             rows = np.flatnonzero(cycles == q)
+            points = self._scaled(columns.x[rows], columns.v[rows])
+            settling = _settles(points, q)
+            places[rows[settling]] = self._known(points[settling, -(q // 2) :])
+            rows = rows[~settling]
             orbits = self._scaled(columns.x[rows, -q:], columns.v[rows, -q:])
             places[rows] = self._periodic(orbits)
         self._strange(columns, np.flatnonzero((cycles == 0) & (columns.status == OK)), places)
@@ -85,16 +94,21 @@ class Attractors:
     def _periodic(self, orbits: FloatArray) -> IntArray:
         """Return the places of orbits of one period, shape (n, q, 2); those that are new are added."""
         q = orbits.shape[1]
-        places = np.full(len(orbits), -1, np.int64)
-        for place, attractor in enumerate(self.found):
-            if attractor.period == q:
-                left = np.flatnonzero(places < 0)
-                places[left[_agree(orbits[left], attractor.states / self.scales[:2])]] = place
+        places = self._known(orbits)
         while (left := np.flatnonzero(places < 0)).size:
             new = orbits[left[0]]
             states = np.roll(new, -int(np.argmin(new[:, 0])), axis=0) * self.scales[:2]
             places[left[_agree(orbits[left], new)]] = len(self.found)
             self.found.append(Attractor(f"period-{q}", q, states))
+        return places
+
+    def _known(self, orbits: FloatArray) -> IntArray:
+        """Return the places of orbits of one period, shape (n, q, 2), -1 for those that are new."""
+        places = np.full(len(orbits), -1, np.int64)
+        for place, attractor in enumerate(self.found):
+            if attractor.period == orbits.shape[1]:
+                left = np.flatnonzero(places < 0)
+                places[left[_agree(orbits[left], attractor.states / self.scales[:2])]] = place
         return places
 
     def _strange(self, columns: Columns, rows: IntArray, places: IntArray) -> None:
@@ -135,6 +149,8 @@ class Attractors:
             return None
         cycles, _ = self._cycles(longer)
         q = int(cycles[0])
+        if q and _settles(self._scaled(longer.x, longer.v), q)[0]:
+            return None
         if q:
             return int(self._periodic(self._scaled(longer.x[:, -q:], longer.v[:, -q:]))[0])
         x, v, branch, _memory = longer.last[0].tolist()
@@ -150,6 +166,15 @@ class Attractors:
         states = np.column_stack([longer.x[0], longer.v[0]])
         self.found.append(Attractor("strange", None, states, exponent.value, exponent.standard_error))
         return len(self.found) - 1
+
+
+def _settles(points: FloatArray, q: int) -> BoolArray:
+    """Tell which trains of an even period q, states of shape (n, points, 2), still settle to half of it."""
+    if q % 2:
+        return np.zeros(len(points), np.bool_)
+    apart = np.abs(points[:, q // 2 :] - points[:, : -(q // 2)]).max(axis=2)
+    part = max(apart.shape[1] // 4, 1)
+    return np.asarray(apart[:, -part:].mean(axis=1) < DECAY * apart[:, :part].mean(axis=1))
 
 
 def _agree(orbits: FloatArray, known: FloatArray) -> BoolArray:

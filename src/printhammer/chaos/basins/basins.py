@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 FIRINGS: Final = 200
 """Firings of a round unless told otherwise."""
 
-ROUNDS: Final = 4
+ROUNDS: Final = 20
 """Rounds that a cell gets, at most, unless told otherwise."""
 
 CELLS: Final = 128

@@ -14,7 +14,7 @@ import numpy as np
 from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from printhammer.support.arrays import FloatArray
 
@@ -63,7 +63,11 @@ class Route(Declared):
 
     @property
     def sentence(self) -> str:
-        """The finding in a sentence."""
+        """The finding in a sentence, with the value in SI."""
+        return self.told_with("{:.9g}".format)
+
+    def told_with(self, shown: Callable[[float], str]) -> str:
+        """Return the finding in a sentence, with the value as `shown` writes it."""
         way = ", ".join(window.verdict for window in self.before) or "nothing"
         if not self.complete:
             return (
@@ -74,7 +78,8 @@ class Route(Declared):
             return f"With {self.way} values no strange train comes: {way}."
         series = "a series of doublings" if self.cascade else "no series of doublings"
         return (
-            f"With {self.way} values the first strange train comes at {self.first:.9g} after {series}: {way}."
+            f"With {self.way} values the first strange train comes at {shown(self.first)} after {series}:"
+            f" {way}."
         )
 
 

@@ -17,6 +17,7 @@ from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.driver import LARGEST_CURRENT, Driver, driver_of
 from printhammer.control.feedback.estimator.sensor import PositionSensor
+from printhammer.control.feedback.fronts import OFFSETS, STEPS
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+    from printhammer.support.threads import Progress
 
 BURST: Final = "11101101"  # Pattern of the run that is shown
 MOST_GAPS: Final = 500  # Number of gaps above which a double-pulse test is refused
@@ -135,6 +137,7 @@ def feedback(
     gaps: npt.ArrayLike | None = None,
     tolerance: float = DISPLAY_TOLERANCE,
     threads: int | None = None,
+    progress: Progress | None = None,
 ) -> Feedback:
     """Drive a hammer with feedback, and compare it with the open loop.
 
@@ -161,6 +164,9 @@ def feedback(
         times the flight time of the single pulse.
     tolerance : float, optional
         As for `printhammer.simulate`; by default that for pictures.
+    progress : callable, optional
+        Called now and then with the number of steps done and of all; most of them are tables of the
+        controller.
 
     Returns
     -------
@@ -179,7 +185,15 @@ def feedback(
     bounds = Limits() if limits is None else limits
     actual = hammer if driven is None else driven
     between = None if gaps is None else _checked_gaps(gaps)
-    controller = Controller(hammer, driver, bounds, threads=threads)
+    tables = STEPS * len(OFFSETS)
+    steps = tables + 2 * (2 + len(beside))
+
+    def tell(done: int, _all: int) -> None:
+        if progress is not None:
+            progress(done, steps)
+
+    tell(0, steps)
+    controller = Controller(hammer, driver, bounds, threads=threads, progress=tell)
     own = FeedbackStrategy(controller, position_sensor, tolerance=tolerance, threads=threads)
     every: list[Strategy] = [open_loop, *beside, own]
     if between is None:
@@ -187,9 +201,13 @@ def feedback(
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     patterns = from_rest(every=False)
     single = controller.single
-    trials = [attempt([Case(actual, single, slot_rate)], patterns, way, **options) for way in every]
     cases = [Case(actual, single, 1.0 / gap) for gap in between.tolist()]
-    doubles = [attempt(cases, [(0, 1)], way, **options) for way in every]
+    trials, doubles = [], []
+    for number, way in enumerate(every):
+        tell(tables + 2 * number, steps)
+        trials.append(attempt([Case(actual, single, slot_rate)], patterns, way, **options))
+        tell(tables + 2 * number + 1, steps)
+        doubles.append(attempt(cases, [(0, 1)], way, **options))
     judged = [trial.judgement for trial in trials]
     return Feedback(
         hammer=hammer,

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.estimator.sensor import Samples
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray, IntArray
+    from printhammer.support.threads import Progress
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
 """Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,
@@ -78,7 +79,7 @@ class Controller:
     """A controller made for one hammer, the nominal one, and the driver of its coil.
 
     The hammer has a pack and a backstop. `limits` say how far a dot may be off; `threads` are by default as
-    many as there are cores.
+    many as there are cores; `progress` is called with the steps of `fronts` done and of all.
 
     Raises
     ------
@@ -87,7 +88,13 @@ class Controller:
     """
 
     def __init__(
-        self, hammer: Hammer, driver: Driver, limits: Limits | None = None, *, threads: int | None = None
+        self,
+        hammer: Hammer,
+        driver: Driver,
+        limits: Limits | None = None,
+        *,
+        threads: int | None = None,
+        progress: Progress | None = None,
     ) -> None:
         if hammer.front is None or hammer.backstop is None:
             missing = "pack" if hammer.front is None else "backstop"
@@ -98,7 +105,7 @@ class Controller:
         self.single, self.stroke = plant.single, plant.stroke
         forces = force_map(plant)
         self.start = launch(plant, forces)
-        self.fronts = fronts(plant, forces, self.start)
+        self.fronts = fronts(plant, forces, self.start, progress)
         self._contacts = Contacts(plant)
         # Of a period, s
         self.policy = lru_cache(_POLICIES)(lambda period: Policy(self.fronts, period, self.limits))

@@ -21,10 +21,17 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.launch import Launch
     from printhammer.control.feedback.plant import Plant
     from printhammer.support.arrays import FloatArray, IntArray
+    from printhammer.support.threads import Progress
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)
 """By how much the fronts of the maps lie farther from the armature, in parts of the way to the pack; evenly
 spaced."""
+
+STEPS: Final = 100
+"""Steps of the work for one distance."""
+
+_MAPPING: Final = 70
+"""Of these, until the map of the touches is there."""
 
 MIDDLE: Final = 1  # Number of the nominal one
 
@@ -51,13 +58,22 @@ class Fronts:
         return self.landings[MIDDLE]
 
 
-def fronts(plant: Plant, forces: ForceMap, start: Launch) -> Fronts:
-    """Compute the maps for all distances, with the forces of the nominal hammer and its start from rest."""
-    maps, landings = [], []
+def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | None = None) -> Fronts:
+    """Compute the maps for all distances, with the forces of the nominal hammer and its start from rest.
+
+    `progress` is called with what is done in `STEPS` for each of the distances.
+    """
+    maps: list[ImpactMap] = []
+    landings: list[Landing] = []
+
+    def mapping(done: int, total: int) -> None:
+        if progress is not None:
+            progress(STEPS * len(landings) + int(_MAPPING * done / total), STEPS * len(OFFSETS))
+
     for offset in OFFSETS:
         moved = plant.moved(offset)
         own = force_map(moved) if offset else forces
-        maps.append(impact_map(moved, own, start.width))
+        maps.append(impact_map(moved, own, start.width, mapping))
         landings.append(soft_landing(moved, own))
     return Fronts(tuple(maps), tuple(landings), front_force(plant.moved(OFFSETS[-1]), maps[MIDDLE]))
 

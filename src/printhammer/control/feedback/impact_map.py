@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.plant import Plant
     from printhammer.drive.waveforms.shapes import Switched
     from printhammer.support.arrays import FloatArray, IntArray
+    from printhammer.support.threads import Progress
 
 AHEAD: Final = 1e-6  # Time before the touch at which the runs of a map begin, s
 PUSHED, FREE = 0, 1
@@ -136,7 +137,9 @@ def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float,
     return np.where(ok, dots.peak_force[:, 0], np.nan) / plant.single.force
 
 
-def impact_map(plant: Plant, forces: ForceMap, launched: float) -> ImpactMap:
+def impact_map(
+    plant: Plant, forces: ForceMap, launched: float, progress: Progress | None = None
+) -> ImpactMap:
     """Compute where all ways to switch the coil lead; `launched` is the width of the push from rest, s."""
     single, driver = plant.single, plant.driver
     scale = single.flight_time
@@ -160,7 +163,7 @@ def impact_map(plant: Plant, forces: ForceMap, launched: float) -> ImpactMap:
         drives.append(driver.drive([firsts[key], pushes[float(width[way])]], [0.0, key[3] + AHEAD]))
     speed = forces.speed[rows]
     states = np.stack([forces.front - AHEAD * speed, speed], axis=1)
-    ok, dots, _ = plant.run(drives, fire[ways] + _WAIT * scale, states)
+    ok, dots, _ = plant.run(drives, fire[ways] + _WAIT * scale, states, progress=progress)
     flight = dots.flight_time[:, 1]
     pushed = width[ways] == ALWAYS
     with np.errstate(invalid="ignore"):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.nominal import Nominal
     from printhammer.support.arrays import BoolArray
+    from printhammer.support.threads import Progress
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,12 @@ class Plant:
         return replace(self, hammer=perturbed(self.hammer, travel)) if offset else self
 
     def run(
-        self, drives: Sequence[Drive], end: Any, states: Any = None, strobes: Any = None
+        self,
+        drives: Sequence[Drive],
+        end: Any,
+        states: Any = None,
+        strobes: Any = None,
+        progress: Progress | None = None,
     ) -> tuple[BoolArray, DotTable, Strobes]:
         """Run drives from rest, or from states (drives, 2), m and m/s, up to an end, s.
 
@@ -55,6 +61,6 @@ class Plant:
         """
         begun = None if states is None else np.array(states)
         result = Ensemble(self.hammer, list(drives), end, states=begun, tolerance=DISPLAY_TOLERANCE).run(
-            dots=True, strobes=strobes, threads=self.threads
+            dots=True, strobes=strobes, threads=self.threads, progress=progress
         )
         return result.ok, cast("DotTable", result.dots), cast("Strobes", result.strobes)

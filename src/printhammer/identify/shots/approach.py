@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.errors import InputError
 from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
@@ -46,7 +47,13 @@ class Priors:
         self._white = []
         for prior in priors:
             size = scales[prior.which]
-            factor = np.linalg.cholesky(prior.covariance / np.outer(size, size))
+            try:
+                factor = np.linalg.cholesky(prior.covariance / np.outer(size, size))
+            except np.linalg.LinAlgError:
+                raise InputError(
+                    "what current and earlier fits tell has no positive definite covariance, expected"
+                    " currents without stray values, and tables that tell the constants apart"
+                ) from None
             self._white.append((prior, np.linalg.inv(factor)))
 
     def residuals(self, values: FloatArray) -> list[FloatArray]:

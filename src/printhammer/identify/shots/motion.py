@@ -91,8 +91,9 @@ def fit_motion(
     pulses, notes = _pulses(hammer, shots)
     start, parameters, priors, own = _assembled(hammer, keys, pulses, earlier)
     shooting = Shooting(hammer, shots, own, parameters)
-    fit = GaussNewton(shooting, priors, robust=robust)
     where = " and ".join(shot.name for shot in shots)
+    with located(where):
+        fit = GaussNewton(shooting, priors, robust=robust)
     names = (*keys, *(f"the current of {shots[owner].name}" for owner in parameters.owners))
     states = [shot.states for shot in shots]
     refuse_degenerate(where, fit.design(start, states), names)

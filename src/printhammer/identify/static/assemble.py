@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.identify.least_squares import NoSolutionError, solve
 from printhammer.identify.result import Fit, FittedConstant, Profile, student
 from printhammer.identify.static.checks import inseparable
 from printhammer.results import Declared, part
@@ -36,6 +37,24 @@ class Data(Declared, eq=False):
     series: IntArray = part("place in `series_names`, shape (m,)")
     series_names: tuple[str, ...] = part("for the legend")
     lines: IntArray = part("lines of the files, shape (m,)")
+
+
+def solved(data: Data, law: Law, start: FloatArray, *, robust: bool) -> Solution:
+    """Fit a law to data; see `printhammer.identify.least_squares.solve`.
+
+    Raises
+    ------
+    InputError
+        No parameters come near the data; names the line that lies farthest off.
+    """
+    try:
+        return solve(law, data.values, start, robust=robust)
+    except NoSolutionError as error:
+        files = " and ".join(str(path) for path in data.files)
+        raise InputError(
+            f"{files}: no constants of the law come near the data, line {data.lines[error.row]} lies farthest"
+            f" off, expected rows in the order of the measurement, and none too far from the others"
+        ) from None
 
 
 def assemble(

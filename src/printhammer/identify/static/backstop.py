@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import Solution, solve
 from printhammer.identify.result import Fit, FittedConstant
-from printhammer.identify.static.assemble import Data, assemble, enough
+from printhammer.identify.static.assemble import Data, assemble, enough, solved
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.restitution import RestitutionLaw
 from printhammer.identify.tables import read_table
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from printhammer.identify.least_squares import Solution
     from printhammer.support.arrays import FloatArray
 
 RATIO: Final = "backstop.damping / backstop.stiffness"
@@ -147,7 +147,7 @@ def fit_backstop(
         )
     law = RestitutionLaw(speed)
     start = np.array([damping_from_restitution(1.0, middle, float(np.median(speed)))])
-    solution = solve(law, back, start, robust=robust)
+    solution = solved(data, law, start, robust=robust)
     p_value, why = judge(solution, {"slow": speed, "fast": speed**3}, speed, zeros)
     fit = assemble(
         data,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.identify.least_squares import Solution, sandwich
+from printhammer.identify.least_squares import Solution, lengths_of, sandwich
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -59,11 +59,15 @@ def _need(solution: Solution, term: FloatArray) -> float:
     root = np.sqrt(solution.variance[solution.used])
     errors = solution.residuals[solution.used] / root
     rows = np.column_stack([solution.jacobian, term])[solution.used] / root[:, None]
-    rows = rows / np.linalg.norm(rows, axis=0)
+    rows = rows / lengths_of(rows)
     if np.linalg.matrix_rank(rows, tol=1e-9) < rows.shape[1]:
         return math.nan
     need = np.linalg.lstsq(rows, errors, rcond=None)[0]
-    covariance, freedoms = sandwich(rows, errors - rows @ need)
+    try:
+        covariance, freedoms = sandwich(rows, errors - rows @ need)
+    except ZeroDivisionError:
+        # A row alone determines the term.
+        return math.nan
     return 2.0 * float(t.sf(abs(need[-1]) / math.sqrt(covariance[-1, -1]), freedoms[-1]))
 
 
@@ -95,7 +99,7 @@ def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
     if solution.condition_number < _HARD_TO_TELL:
         return []
     rows = solution.jacobian[solution.used] / np.sqrt(solution.variance[solution.used])[:, None]
-    weakest = np.linalg.svd(rows / np.linalg.norm(rows, axis=0))[2][-1]
+    weakest = np.linalg.svd(rows / lengths_of(rows))[2][-1]
     parts = [name for name, part in zip(names, weakest, strict=True) if name and abs(part) > 0.3]
     if len(parts) < 2:
         return []

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import solve
-from printhammer.identify.static.assemble import Data, assemble, enough
+from printhammer.identify.static.assemble import Data, assemble, enough, solved
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.magnet_law import TotalLaw, start_of
 from printhammer.identify.static.spring import start_of as spring_start
@@ -79,7 +78,7 @@ def fit_magnet(
         start = np.array([*start[:3], *pair])
     if zero is None:
         start = np.append(start, 0.0)
-    solution = solve(law, data.values, start, robust=robust)
+    solution = solved(data, law, start, robust=robust)
     _releases(table, law, solution.p, zero, position)
     p_value, why = judge(solution, law.richer(solution.p, by_current=levels != 2), x, data.series)
     wide, strong = "more rows over a wider span of displacement", "more currents over a wider span"

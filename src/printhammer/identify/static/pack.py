@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import Solution, solve
-from printhammer.identify.static.assemble import Data, assemble, enough
+from printhammer.identify.least_squares import NoSolutionError, Solution, solve
+from printhammer.identify.static.assemble import Data, assemble, enough, solved
 from printhammer.identify.static.checks import judge
 from printhammer.identify.static.pack_cycles import Cycles, check_loading, cycles_of
 from printhammer.identify.tables import Readings, read_table
@@ -35,6 +35,9 @@ _SPARE: Final = 4
 _LOADING_ROWS: Final = 4
 _MEETS: Final = 0.02
 """Part of the largest indentation by which the branches may meet elsewhere without a word."""
+
+_FAR: Final = 1.0
+"""Logarithm of how far from the largest indentation they may meet at all."""
 
 
 class PackLaw:
@@ -124,7 +127,8 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
         raise InputError(
             f"{table.path}: no rows of unloading, expected some, or their exponent cannot be found"
         )
-    solution = solve(law, force, _start(law, table), robust=robust)
+    solution = solved(data, law, _start(law, table), robust=robust)
+    _check_turns(law, table, solution)
     p_value, why = (float("nan"), "") if exponents else _judge(law, data, solution)
     free = [("exponent of loading", "1", False), ("exponent of unloading", "1", False)] if exponents else []
     turns = [("", "", False)] * len(law.turns)
@@ -161,6 +165,17 @@ def _start(law: PackLaw, table: Readings) -> FloatArray:
     return np.array([stiffness, *turns, *([LOADING, UNLOADING] if law.free else [])])
 
 
+def _check_turns(law: PackLaw, table: Readings, solution: Solution) -> None:
+    """Refuse a load cycle whose branches meet nowhere near what was measured."""
+    for turn, meeting in zip(law.turns, solution.p[1:], strict=False):
+        rows = np.flatnonzero(law.inside & (law.cycles.cycle == turn))
+        if abs(meeting - law.log_r[rows].max()) > _FAR:
+            raise InputError(
+                f"{table.path}: lines {table.lines[rows[0]]} to {table.lines[rows[-1]]} are a load cycle"
+                " whose loading and unloading do not meet, expected rows in the order of the measurement"
+            )
+
+
 def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
     """Test the exponents of equation (5); return the probability, and why they are rejected."""
     out = bool(len(law.turns))
@@ -173,7 +188,10 @@ def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
         r = data.abscissa / law.thickness
         free = PackLaw(r, law.cycles, True, law.thickness)
         start = np.array([*solution.p, LOADING, UNLOADING])
-        low, high = free.exponents(solve(free, data.values, start).p)
+        try:
+            low, high = free.exponents(solve(free, data.values, start).p)
+        except NoSolutionError:
+            return p_value, flaw
         flaw = f"exponents of {low:.3g} and {high:.3g} describe it better than {LOADING:g} and {UNLOADING:g}"
     return p_value, flaw
 

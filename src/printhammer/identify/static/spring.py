@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import solve
-from printhammer.identify.static.assemble import Data, assemble, enough
+from printhammer.identify.static.assemble import Data, assemble, enough, solved
 from printhammer.identify.static.checks import judge
 from printhammer.identify.tables import read_table
 
@@ -74,7 +73,7 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit
             f"{table.path}: {len(np.unique(x))} different displacements, expected 3 or more for a line"
         )
     law = SpringLaw(x - position)
-    solution = solve(law, force, start_of(table.path, x - position, force), robust=robust)
+    solution = solved(data, law, start_of(table.path, x - position, force), robust=robust)
     middle, half = 0.5 * (x.min() + x.max()), 0.5 * (x.max() - x.min())
     u = (x - middle) / half
     bent = "the force is no straight line over the displacement"

@@ -31,7 +31,7 @@ _count = partial(opt.whole, panel=_BASINS)
         "x": opt.span("Displacements, such as '30 um, 260 um, 128' (the strobe window).", panel=_BASINS),
         "v": opt.span("Velocities, such as '-1 m/s, 1 m/s, 128' (the strobe window).", panel=_BASINS),
         "firings": _count("Firings of a round (200)."),
-        "rounds": _count("Rounds that a cell gets at most (4)."),
+        "rounds": _count("Rounds that a cell gets at most (20)."),
         "gaps": opt.span("Times between the two firings ('0.5 ms, 0.9 ms, 128').", panel=_QUENCH),
         "widths": opt.span("Widths of the second pulse (half to 1.5 of the first, 128).", panel=_QUENCH),
         "tail": opt.text("TIME", "Time within which a second dot is waited for (1 ms).", panel=_QUENCH),
@@ -81,6 +81,7 @@ def basins(
 
 def led(result: Basins, box: int | None, units: Units) -> list[tuple[str, str | None]]:
     """Return the attractors with their shares, the cells that lead to none, and the basin entropy."""
+    from printhammer.chaos.basins.basins import UNDECIDED
     from printhammer.chaos.basins.entropy import BOX
 
     rows: list[tuple[str, str | None]] = []
@@ -98,8 +99,11 @@ def led(result: Basins, box: int | None, units: Units) -> list[tuple[str, str | 
         )
     if len(result.attractors) > _ROWS:
         rows.append(("", f"and {len(result.attractors) - _ROWS} more"))
+    after = (
+        f" after {result.firings.max()} firings, more --rounds may tell" if result.counts[UNDECIDED] else ""
+    )
     rows += [
-        (name, f"{result.counts[label]} of {result.labels.size} cells")
+        (name, f"{result.counts[label]} of {result.labels.size} cells{after if label == 0 else ''}")
         for label, name in ((0, "undecided"), (-1, "ended early"), (-2, "no state"))
         if result.counts[label] or label == 0
     ]

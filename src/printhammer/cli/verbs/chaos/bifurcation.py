@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,6 +14,8 @@ from printhammer.cli.screen import Column, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.table import Table
 
     from printhammer.chaos.bifurcation.diagram import Bifurcation
@@ -21,6 +24,10 @@ if TYPE_CHECKING:
 _RANGE: Final = ("0.8 ms", "1.35 ms")
 _PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
 _ROWS: Final = 12
+_JUDGED: Final = 200
+"""Firings that are judged, where there are enough."""
+_UNITS: Final = {"s": "ms", "m": "um"}
+"""Units of values of the parameter that are not shown in SI."""
 _of = partial(opt.text, panel=_PARAMETER)
 
 
@@ -29,10 +36,8 @@ _of = partial(opt.text, panel=_PARAMETER)
     "printhammer bifurcation hendriks-1983 --from '1.2 ms' --to '1.35 ms' --values 60"
     " --direction both --out bifurcation.png",
     {
-        "firings": opt.whole("Firings at each value.", default=300),
-        "transient": opt.whole("Of these, left out at the beginning.", default=100),
+        "transient": opt.whole("Firings left out at the beginning (all but 200; a third, if that is more)."),
         "refine": opt.whole("Halve the steps between neighbours that differ so often.", default=2),
-        "exponents": opt.switch("Tell strange trains from undecided ones; takes long."),
         "overlap": opt.overlapping(_PARAMETER),
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
@@ -53,6 +58,8 @@ def bifurcation(
         "Begin at rest (default), or where the train at the value before, or after, ended.",
         default="from-rest",
     ),
+    firings: int = opt.whole("Firings at each value.", default=1000),
+    exponents: bool = opt.switch("Tell strange trains from undecided ones by their exponents.", default=True),
     show: str = opt.choice("x|v", "What a picture shows.", default="x"),
     **passed: Any,
 ) -> Answer:
@@ -65,6 +72,9 @@ def bifurcation(
 
     start: Any = direction.replace("-", " ")
     axis = _axis(hammer, parameter, (lowest, highest), values, period, rate)
+    passed |= {"firings": firings, "exponents": exponents}
+    # With few firings at first, trains that settle slowly pass for undecided.
+    passed.setdefault("transient", max(firings - _JUDGED, firings // 3))
     interrupted = False
     try:
         with job.counting("trains") as tell:
@@ -75,7 +85,7 @@ def bifurcation(
     windows = [summary(result, name) for name in result.directions]
     return Answer(
         [*windows, *map(escape, sentences(result))] if done else [],
-        note=f"{escape(result.parameter)}: {len(result.values)} values, {done} trains of"
+        note=f"{escape(result.parameter)}: {counted(result)}, {done} trains of"
         f" {int(result.firing[-1])} firings, tolerance {result.tolerance:g}; computed in {job.seconds:.2g} s",
         files={"out": Content.of(result, show=show)} if done else {},
         complaints=[] if interrupted else ended_early(result.status.ravel()),
@@ -120,6 +130,27 @@ def _axis(
     return {"parameter": parameter, "values": grid, "period": period, "rate": rate}
 
 
+def counted(result: Bifurcation) -> str:
+    """Return how many values there are, and how many of them were put between those asked for."""
+    between = int((result.levels > 0).sum())
+    more = f" and {between} between those that differ" if between else ""
+    return f"{len(result.values) - between} values{more}"
+
+
+def shown_with(result: Bifurcation) -> tuple[Callable[[float], str], str]:
+    """Return what writes values of the parameter, with digits that tell neighbours apart, and the unit."""
+    import numpy as np
+
+    from printhammer.units import from_si
+
+    si = result.regime.quantity(result.parameter).si
+    unit = _UNITS.get(si, si)
+    steps = np.diff(result.values)
+    ratio = float(np.abs(result.values).max() / steps.min()) if steps.size else 1e6
+    digits = 1 + math.ceil(math.log10(max(ratio, 10.0)))
+    return lambda value: f"{from_si(value, si, unit):.{digits}g}", unit
+
+
 def summary(result: Bifurcation, direction: str) -> Table:
     """Return the verdicts of one direction: how many windows, how wide together, the widest one."""
     windows = result.windows(direction)
@@ -128,6 +159,7 @@ def summary(result: Bifurcation, direction: str) -> Table:
         verdict: [window for window in windows if window.verdict == verdict]
         for _period, verdict in sorted({(window.period or 1000, window.verdict) for window in windows})
     }
+    shown, unit = shown_with(result)
     widest = {verdict: max(same, key=lambda window: window.width) for verdict, same in some.items()}
     columns: tuple[Column[str], ...] = (
         Column("verdict", lambda verdict: verdict.replace("-", " "), left=True),
@@ -135,25 +167,46 @@ def summary(result: Bifurcation, direction: str) -> Table:
         Column(
             "share", lambda verdict: 100.0 * sum(each.width for each in some[verdict]) / total, "", "%", ".2f"
         ),
-        Column("widest from", lambda verdict: widest[verdict].low, format=".7g"),
-        Column("to", lambda verdict: widest[verdict].high, format=".7g"),
+        Column("widest from", lambda verdict: shown(widest[verdict].low), unit=unit),
+        Column("to", lambda verdict: shown(widest[verdict].high), unit=unit),
     )
     return table(columns, some, title=direction, most=_ROWS)
 
 
 def sentences(result: Bifurcation) -> list[str]:
-    """Return what the diagram tells: the routes to the first strange train, and hysteresis."""
+    """Return what the diagram tells: routes to strange trains, hysteresis, why trains are undecided."""
     from printhammer.chaos.bifurcation.diagram import hysteresis
     from printhammer.chaos.bifurcation.windows import cells
 
     lines = [""]
+    shown, unit = shown_with(result)
     several = len(result.directions) > 1
     for direction in result.directions:
         lines += [
-            (f"{direction}: " if several else "") + route.sentence for route in result.routes(direction)
+            (f"{direction}: " if several else "") + route.told_with(lambda value: f"{shown(value)} {unit}")
+            for route in result.routes(direction)
         ]
     if several:
         widths = cells(result.values)
         share = float(widths[hysteresis(result)].sum() / (widths.sum() or 1.0))
         lines.append(f"Up and down lead to different attractors at {100.0 * share:.2f} % of the range.")
-    return lines
+    return [*lines, *why_undecided(result)]
+
+
+def why_undecided(result: Bifurcation) -> list[str]:
+    """Return why trains that came to their end are undecided, a sentence for each reason."""
+    import numpy as np
+
+    from printhammer.chaos.strobe.verdict import SIGNIFICANT
+
+    exponents, errors = result.exponents, result.standard_errors
+    undecided = (result.verdicts == "undecided") & (result.status == "ok")
+    known = undecided & np.isfinite(exponents)
+    settling = known & (exponents < -SIGNIFICANT * errors)
+    reasons = (
+        (settling, "neighbouring motions close up, so they still settle: more --firings tell their periods"),
+        (known & ~settling, "the exponent is not told from zero by three standard errors"),
+        (undecided & ~known, "no exponent is known: --exponents computes it, unless touches graze"),
+    )
+    every = int(undecided.sum())
+    return [f"{int(some.sum())} of {every} undecided trains: {why}." for some, why in reasons if some.any()]

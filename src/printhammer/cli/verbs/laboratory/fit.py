@@ -17,7 +17,12 @@ if TYPE_CHECKING:
     from printhammer.identify.result import Fit
 
 GROUP: Final = "Find constants from measurements: CSV tables whose heading gives every column its unit."
-EXAMPLE: Final = "printhammer fit magnet magnet.csv --spring spring.csv --hammer hendriks-1983"
+_MEASURED: Final = "printhammer measure all hendriks-1983 --out lab &&"
+"""Makes the tables that the examples read."""
+
+EXAMPLE: Final = (
+    f"{_MEASURED} printhammer fit magnet lab/magnet.csv --spring lab/spring.csv --hammer hendriks-1983"
+)
 
 _RESULTS: Final = "Results"
 # In the order of writing.
@@ -84,7 +89,7 @@ def magnet(
 
 @verb(
     "fit spring",
-    "printhammer fit spring spring.csv --backstop '0.002 in'",
+    f"{_MEASURED} printhammer fit spring lab/spring.csv --backstop '0.002 in'",
     {**_PASSED, "position": _BACKSTOP},
     **_FILES,
 )
@@ -103,7 +108,7 @@ def spring(
 
 @verb(
     "fit pack",
-    "printhammer fit pack pack.csv --thickness '0.007 in' --out pack.png",
+    f"{_MEASURED} printhammer fit pack lab/pack.csv --thickness '0.007 in' --out pack.png",
     {
         **_PASSED,
         "thickness": opt.quantity("m", "LENGTH", "Thickness of the pack, such as '0.007 in'."),
@@ -170,7 +175,7 @@ def backstop(
 
 @verb(
     "fit motion",
-    "printhammer fit motion motion.csv --hammer hendriks-1983 --out motion.toml",
+    f"{_MEASURED} printhammer fit motion lab/motion.csv --hammer hendriks-1983 --out motion.toml",
     {
         **_PASSED,
         "bandwidth": opt.quantity("Hz", "FREQUENCY", "Of the displacement sensor, such as '200 kHz'."),

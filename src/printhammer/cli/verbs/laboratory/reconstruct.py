@@ -23,6 +23,10 @@ GROUP: Final = (
     "Search for hammers that do what the paper tells, judge them, and make tables of what was found."
 )
 EXAMPLE: Final = "printhammer reconstruct search all.jsonl --minutes 1"
+_SEARCHED: Final = "printhammer reconstruct search all.jsonl --from family --minutes 0.1 &&"
+_TWO: Final = f"{_SEARCHED} printhammer reconstruct judge all.jsonl judged.jsonl --best 2"
+_JUDGED_TOO: Final = f"{_TWO} &&"
+"""Make the logs that the examples read."""
 
 _WORKERS: Final = opt.bounded(1, "Processes to compute in.", default=2, metavar="N")
 _SEED: Final = opt.bounded(0, "Decides on everything random.", default=1)
@@ -109,7 +113,7 @@ def search(
 
 @verb(
     "reconstruct judge",
-    "printhammer reconstruct judge all.jsonl judged.jsonl --best 20",
+    _TWO,
     judged=_written("Log of judged candidates.", "JUDGED", continued=True),
 )
 def judge(
@@ -134,6 +138,7 @@ def judge(
     names = list(claims()) if every_claim else list(STATED)
     (judged,) = job.outputs
     with job.counting("judging") as count, worker_pool(workers) as pool:
+        count(0, len(chosen))
 
         def tell(done: int, of: int, _row: dict[str, Any]) -> None:
             count(len(chosen) - of + done, len(chosen))
@@ -170,6 +175,7 @@ def base_rates(
 
     announce_compiling()
     with job.counting("random hammers") as tell, worker_pool(workers) as pool:
+        tell(0, hammers)
         table = count(hammers, seed, slow=slow, pool=pool, tell=tell)
     return Answer(
         [f"{name}: {entry['holds']} of {entry['measured']}" for name, entry in table["claims"].items()],
@@ -179,7 +185,9 @@ def base_rates(
 
 @verb(
     "reconstruct predictions",
-    "printhammer reconstruct predictions stated.jsonl judged.jsonl predictions.json",
+    "printhammer reconstruct search stated.jsonl --aim stated --minutes 0.1"
+    " && printhammer reconstruct judge stated.jsonl judged.jsonl --best 2"
+    " && printhammer reconstruct predictions stated.jsonl judged.jsonl predictions.json",
     out=_written("JSON file to write."),
 )
 def predictions(log: Path = _LOG, judged: Path = _JUDGED) -> Answer:
@@ -213,6 +221,7 @@ def schemes(
 
     announce_compiling()
     with job.counting("random hammers") as tell, worker_pool(workers) as pool:
+        tell(0, hammers)
         table = schemes_json(hammer, hammers, seed, pool=pool, tell=tell)
     return Answer(
         [
@@ -234,7 +243,8 @@ _FRONT: Final[tuple[Column[Any], ...]] = (
 
 @verb(
     "reconstruct front",
-    "printhammer reconstruct front judged.jsonl --out front.csv",
+    f"{_SEARCHED} printhammer reconstruct judge all.jsonl judged.jsonl --best 1 --every-claim"
+    " && printhammer reconstruct front judged.jsonl --out front.csv",
     out=opt.results("Front"),
 )
 def front(
@@ -254,24 +264,40 @@ def front(
     return Answer([shown, "", result.title], files={"out": Content.of(result)})
 
 
-@verb("reconstruct family", "printhammer reconstruct family judged.jsonl --out family")
+@verb(
+    "reconstruct family",
+    "printhammer reconstruct search all.jsonl --from family --minutes 0.1"
+    " && printhammer reconstruct judge all.jsonl judged.jsonl --best 3"
+    " && printhammer reconstruct family judged.jsonl --hammers 1 --out family",
+)
 def family(
     job: Job,
     judged: list[Path] = opt.argument(
         "JUDGED...", "Logs of judged candidates.", type=Path, is_input=True, many=True, default=...
     ),
     out: Path = opt.folder("Where to write.", default=Path("build/family")),
+    hammers: int = opt.bounded(1, "Number of hammers wanted.", default=24),
+    least: int = opt.bounded(1, "Number of hammers needed.", default=20),
 ) -> Answer:
     """Choose clearly different hammers that do equally well, and tell which conclusions hold for all."""
     from printhammer.reconstruction.family.family import WRITTEN, write_family
 
     job.check_new(out / name for name in WRITTEN)
     announce_compiling()
-    members = write_family(judged, out, lambda text: job.show(f"[dim]{escape(text)}[/dim]"))
+    members = write_family(
+        judged,
+        out,
+        lambda text: job.show(f"[dim]{escape(text)}[/dim]"),
+        count=hammers,
+        least=min(least, hammers),
+    )
     return Answer([f"{len(members)} hammers; [dim]wrote[/dim] {escape(str(out))}"])
 
 
-@verb("reconstruct ship", "printhammer reconstruct ship judged.jsonl all.jsonl --out build/hammer")
+@verb(
+    "reconstruct ship",
+    f"{_JUDGED_TOO} printhammer reconstruct ship judged.jsonl all.jsonl --out build/hammer",
+)
 def ship(
     job: Job,
     judged: Path = _JUDGED,
@@ -302,10 +328,10 @@ def ship(
     job.check_new(written)
     announce_compiling()
     hammer.save(folder / f"{name}.toml")
-    with job.telling("judging") as say:
+    with job.counting("judging") as count:
 
         def tell(claim: str) -> None:
-            say(f"judging {claim.replace('_', ' ')}, {list(claims()).index(claim) + 1} of {len(claims())}")
+            count(list(claims()).index(claim), len(claims()), claim.replace("_", " "))
 
         table = search_json(hammer, rows, searches=searches, core_hours=core_hours, progress=tell)
     write_file(folder / "search.json", _json(table))

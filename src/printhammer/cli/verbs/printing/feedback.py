@@ -69,8 +69,9 @@ def feedback(
         passed["beside"] = [TableStrategy(load_table(beside), hammer)]
     change = Perturbation(current=read_positive(supply, "1", "supply") - 1.0, travel=travel or 0.0)
     sensor = PositionSensor(**opt.given(noise=noise, delay=delay, interval=interval, step=step, seed=seed))
-    with job.telling("tables, closed loops, comparisons"):
-        result = compared(hammer, rate, driven=perturbed(hammer, change), sensor=sensor, **passed)
+    driven = perturbed(hammer, change)
+    with job.counting("tables, closed loops") as tell:
+        result = compared(hammer, rate, driven=driven, sensor=sensor, progress=tell, **passed)
     bad, patterns = int((~result.passed[-1]).sum()), result.passed.shape[1]
     complaint = f"{bad} of {patterns} patterns are not printed within limits with feedback"
     return Answer(

@@ -41,5 +41,5 @@ def chosen_strategy(
     from printhammer.control.feedback.controller import Controller
     from printhammer.control.feedback.driver import driver_of
 
-    with job.telling("tables of the controller"):
-        return {"strategy": FeedbackStrategy(Controller(hammer, driver_of(hammer)))}, None
+    with job.counting("tables of the controller") as tell:
+        return {"strategy": FeedbackStrategy(Controller(hammer, driver_of(hammer), progress=tell))}, None

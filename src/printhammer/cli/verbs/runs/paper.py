@@ -45,8 +45,8 @@ def paper(
 
     if not job.force:
         check_place(out)
-    with job.telling() as say:
-        report = write_report(hammer, out, progress=say, pdf=pdf)
+    with job.counting("paper,") as count:
+        report = write_report(hammer, out, progress=count, pdf=pdf)
     counts = ", ".join(_verdict(verdict, f"{report.count(verdict)} {verdict}") for verdict in _STYLES)
     job.show(table(_COLUMNS, report.results), "", f"{len(report.results)} claims: {counts}")
     reports = [path for path in report.files if path.parent == out]

@@ -1,0 +1,59 @@
+"""Which functions a law has, and with which arguments: those of the absent part, by the name of the role."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.errors import InputError
+from printhammer.parts import absent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_FORCES: Final = {
+    "magnet": ("magnet_force",),
+    "spring": ("spring_force",),
+    "pack": ("pack_loading",),
+    "backstop": ("backstop_elastic", "backstop_rebound"),
+}
+"""Of each role functions of which a law has one at least."""
+
+
+@cache
+def check_functions(part: Any, *, complete: bool = False) -> None:
+    """Make sure that the law functions of a class of parts take the arguments that the kernel hands them.
+
+    Those that the module leaves out come from the absent part; where it has to be `complete`, it has a force.
+
+    Raises
+    ------
+    InputError
+        A function takes other arguments, or is none, or there is no force; names the module.
+    """
+    module = sys.modules.get(part.__module__)
+    where = getattr(module, "__file__", None) or part.__module__
+    prefix = f"{part.role}_"
+    for name, model in vars(absent).items():
+        if not name.startswith(prefix) or not hasattr(module, name):
+            continue
+        wanted, law = list(inspect.signature(model).parameters), getattr(module, name)
+        if not callable(law) or not _takes(law, len(wanted)):
+            has = f"{name}{inspect.signature(law)}" if callable(law) else f"{name} = {law!r}"
+            raise InputError(f"{where}: {has}, expected the function {name}({', '.join(wanted)})")
+    forces = _FORCES[part.role]
+    if complete and not any(hasattr(module, name) for name in forces):
+        raise InputError(
+            f"{where}: the {part.role} law {part.law!r} has no force, expected the function"
+            f" {' or '.join(forces)}"
+        )
+
+
+def _takes(law: Callable[..., Any], count: int) -> bool:
+    try:
+        inspect.signature(law).bind(*range(count))
+    except TypeError:
+        return False
+    return True

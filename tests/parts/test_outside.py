@@ -1,0 +1,145 @@
+"""Parts from elsewhere: a file named on the command line, an installed package, and laws that are none."""
+
+import sys
+from collections.abc import Callable, Iterator
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import printhammer as ph
+from printhammer.errors import InputError
+from printhammer.parts import PARTS, outside
+from printhammer.parts.outside import load_installed, load_parts
+
+CUBIC = (Path(__file__).parents[2] / "examples" / "cubic_spring.py").read_text(encoding="utf-8")
+HAMMER = """
+format = 1
+name = "oscillator"
+mass = {{ value = 1, unit = "kg", status = "assumed", source = "test" }}
+[spring]
+law = "{law}"
+stiffness = {{ value = 1, unit = "N/m", status = "assumed", source = "test" }}
+cubic = {{ value = 1, unit = "N/m^3", status = "assumed", source = "test" }}
+"""
+
+
+@pytest.fixture(autouse=True)
+def forgotten(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Forget the laws, modules and paths of a test."""
+    parts, modules = dict(PARTS), set(sys.modules)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    load_installed.cache_clear()
+    yield
+    PARTS.clear()
+    PARTS.update(parts)
+    for name in set(sys.modules) - modules:
+        if name.startswith("own_"):
+            del sys.modules[name]
+    load_installed.cache_clear()
+
+
+def written(folder: Path, name: str, text: str = CUBIC) -> Path:
+    """Write a part whose law has the name of the file."""
+    path = folder / f"{name}.py"
+    path.write_text(text.replace('law = "cubic"', f'law = "{name}"'), encoding="utf-8")
+    return path
+
+
+def run(*words: object) -> int:
+    from printhammer.cli.main import main
+
+    with pytest.raises(SystemExit) as end:
+        main([str(word) for word in words])
+    return int(end.value.code or 0)
+
+
+def test_a_file_brings_a_law_to_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    part, hammer = written(tmp_path, "own_first"), tmp_path / "hammer.toml"
+    hammer.write_text(HAMMER.format(law="own_first"))
+    assert run("hammer", "check", hammer) == 2
+    assert "spring.law = 'own_first': expected one of" in capsys.readouterr().err
+    assert run("hammer", "check", hammer, "--part", part) == 0
+    assert "ok" in capsys.readouterr().out
+    # Twice does no harm.
+    assert run("hammer", "show", hammer, "--part", part, "--part", part) == 0
+
+
+def test_a_package_brings_a_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(tmp_path, "own_installed")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    entry = EntryPoint("springs", "own_installed", outside.GROUP)
+    monkeypatch.setattr(outside, "entry_points", lambda group: [entry] if group == outside.GROUP else [])
+    hammer = tmp_path / "hammer.toml"
+    hammer.write_text(HAMMER.format(law="own_installed"))
+    assert ph.load(hammer).spring is not None
+    monkeypatch.setattr(outside, "entry_points", lambda group: [EntryPoint("springs", "own_missing", group)])
+    load_installed.cache_clear()
+    with pytest.raises(
+        InputError, match=r"'springs' = 'own_missing' of printhammer.parts cannot be imported"
+    ):
+        ph.load(hammer)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "spring_force(c, x)",
+            "spring_force(x)",
+            r"spring_force\(x\), expected the function spring_force\(c",
+        ),
+        ("spring_energy(c, x)", "spring_energy(c, x, v)", r"expected the function spring_energy\(c, x\)$"),
+        (
+            "def spring_force",
+            "def spring_forces",
+            r"law 'own_.*' has no force, expected the function spring_f",
+        ),
+        ("@register\n", "", "registers no part, expected a class marked with @register"),
+        ("class CubicSpring", "class Cubic Spring", "cannot be imported, SyntaxError: "),
+        ("from printhammer.parts", "from printhammer.prats", "cannot be imported, ModuleNotFoundError: "),
+        (
+            "def spring_energy(c, x):",
+            "spring_energy = 3\ndef other(c, x):",
+            "spring_energy = 3, expected the",
+        ),
+    ],
+)
+def test_a_law_that_is_none_is_a_sentence(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert old in CUBIC
+    path = written(tmp_path, f"own_{abs(hash(new))}", CUBIC.replace(old, new))
+    with pytest.raises(InputError, match=said) as caught:
+        load_parts(path)
+    assert path.name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_wrong_law_is_a_sentence_in_python_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(tmp_path, "own_wrong", CUBIC.replace("spring_force(c, x)", "spring_force(x)"))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    module: Any = __import__("own_wrong")
+    spring: dict[str, Any] = {"law": "own_wrong", "stiffness": "1 N/m", "cubic": "1 N/m^3"}
+    make: list[Callable[[], object]] = [
+        lambda: ph.Hammer.build("1 kg", spring=spring),
+        lambda: module.CubicSpring(stiffness=1.0, cubic=1.0),
+    ]
+    for made in make:
+        with pytest.raises(InputError, match=r"own_wrong.py: spring_force\(x\), expected the function"):
+            made()
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("none.py", "no such file"),
+        ("own-part.py", "expected a Python file whose name can be imported"),
+        ("own.txt", "expected a Python file whose name can be imported"),
+        ("random.py", "a module of the name 'random' is there already"),
+    ],
+)
+def test_a_file_that_cannot_be_imported_is_a_sentence(tmp_path: Path, name: str, said: str) -> None:
+    if name != "none.py":
+        (tmp_path / name).write_text(CUBIC)
+    with pytest.raises(InputError, match=said):
+        load_parts(tmp_path / name)
