@@ -44,10 +44,8 @@ def test_the_commands_on_a_page_can_be_read(page: Path) -> None:
         assert name is not None, words
         for part in name:
             command = command.commands[part]
-        try:
+        if "--help" not in words:
             command.make_context(" ".join(name), words[len(name) :])
-        except typer.Exit as end:
-            assert "--help" in words, (words, end)
 
 
 @pytest.mark.slow
