@@ -28,3 +28,10 @@ def located(where: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def missing_extra(needs: str, extra: str) -> InputError:
+    """Return the error that says what is not installed, such as "a store needs zarr", and how to get it."""
+    return InputError(
+        f"{needs}, which the extra printhammer[{extra}] installs: pip install 'printhammer[{extra}]'"
+    )
