@@ -3,9 +3,12 @@ PYTHON ?= python3
 WORKERS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
+PIP = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 PEERS ?= $(BIN)
-LOCKED := $(VENV)/requirements.stamp
-INSTALLED := $(VENV)/installed.stamp
+# One environment that grows: what the paper needs, what the fast tests need, everything.
+RUNTIME := $(VENV)/runtime.stamp
+TESTING := $(VENV)/test.stamp
+EVERYTHING := $(VENV)/dev.stamp
 CODE := src tests $(wildcard benchmarks examples docs)
 
 .DEFAULT_GOAL := help
@@ -15,54 +18,61 @@ CODE := src tests $(wildcard benchmarks examples docs)
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z.-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-.venv: $(INSTALLED) ## the local environment, every version and hash pinned
+.venv: $(EVERYTHING) ## the local environment with all extras, every version and hash pinned
 
-$(LOCKED): requirements/dev.txt
+$(VENV)/created.stamp:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "printhammer needs Python >= 3.11; set it with make PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements/dev.txt
 	@touch $@
 
-$(INSTALLED): $(LOCKED) pyproject.toml
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+$(RUNTIME): requirements/runtime.txt requirements/build.txt pyproject.toml | $(VENV)/created.stamp
+	$(PIP) --require-hashes --requirement requirements/runtime.txt --requirement requirements/build.txt
+	$(PIP) --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(TESTING) $(EVERYTHING): $(VENV)/%.stamp: requirements/%.txt $(RUNTIME)
+	$(PIP) --require-hashes --requirement $<
 	@touch $@
 
 test: lint types contract test-fast ## everything but the slow tests
 
-test-fast: $(INSTALLED) ## the fast tests alone
+test-fast: $(TESTING) ## the fast tests alone
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
-test-slow: $(INSTALLED) ## the slow tests alone
+test-slow: $(EVERYTHING) ## the slow tests alone
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m slow
 
 test-all: test test-slow ## everything
 
-lint: $(INSTALLED) ## ruff
+lint: $(TESTING) ## ruff
 	$(BIN)/ruff check $(CODE)
 	$(BIN)/ruff format --check $(CODE)
 
-types: $(INSTALLED) ## mypy --strict
+types: $(TESTING) ## mypy --strict
 	$(BIN)/mypy
 
-contract: $(INSTALLED) ## who may import whom
+contract: $(TESTING) ## who may import whom
 	$(BIN)/lint-imports
 
-format: $(INSTALLED) ## sort the imports and lay out the code
+format: $(TESTING) ## sort the imports and lay out the code
 	$(BIN)/ruff check --select I --fix $(CODE)
 	$(BIN)/ruff format $(CODE)
 
-paper: $(INSTALLED) ## every figure and claim of the paper, into build/paper
+paper: $(RUNTIME) ## every figure and claim of the paper, into build/paper
 	$(BIN)/printhammer paper --out build/paper
 
-docs: $(INSTALLED) ## the documentation, into build/docs; says which measured tables are stale
+docs: $(EVERYTHING) ## the documentation, into build/docs; says which measured tables are stale
 	$(BIN)/sphinx-build -W --keep-going -b html docs build/docs
 
-bench: $(INSTALLED) ## the benchmark table (PEERS=folder of another environment's programs)
+bench: $(EVERYTHING) ## the benchmark table (PEERS=folder of another environment's programs)
 	$(PEERS)/printhammer bench --peers benchmarks/peers --out docs/benchmarks.md --force
 
 # Resolve again; the files name versions and hashes only, never an address.
 LOCK := build/lock-venv/bin/uv pip compile --quiet --universal --fork-strategy fewest --python-version 3.11 \
 	--generate-hashes --no-emit-index-url --no-emit-find-links --no-header --no-annotate
+
+# What lint, types and the fast tests need; the docs need sphinx, which nothing else does.
+TESTED := tables netcdf sweep cluster identify studio notebook pdf test lint
 
 lock: ## resolve the pinned requirements again (UPGRADE=--upgrade for the newest)
 	$(PYTHON) -m venv build/lock-venv
@@ -70,6 +80,9 @@ lock: ## resolve the pinned requirements again (UPGRADE=--upgrade for the newest
 	$(LOCK) $(UPGRADE) requirements/lock.in --output-file requirements/lock.txt
 	$(LOCK) $(UPGRADE) pyproject.toml requirements/build.in --extra all --output-file requirements/dev.txt
 	$(LOCK) $(UPGRADE) pyproject.toml --constraint requirements/dev.txt --output-file requirements/runtime.txt
+	$(LOCK) $(UPGRADE) requirements/build.in --constraint requirements/dev.txt --output-file requirements/build.txt
+	$(LOCK) $(UPGRADE) pyproject.toml requirements/build.in $(foreach extra,$(TESTED),--extra $(extra)) \
+		--constraint requirements/dev.txt --output-file requirements/test.txt
 
 clean: ## remove the environment and everything built
 	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis docs/gallery

@@ -89,9 +89,14 @@ def test_locks_hold_no_address_and_a_hash_for_everything(lock: Path) -> None:
 
 
 def test_the_locks_agree() -> None:
-    assert {lock.name for lock in LOCKS} == {"dev.txt", "lock.txt", "runtime.txt"}
+    assert {lock.name for lock in LOCKS} == {"build.txt", "dev.txt", "lock.txt", "runtime.txt", "test.txt"}
     pins = {
         lock.name: set(re.findall(r"^([a-z0-9-]+==[\w.]+)", lock.read_text("utf-8"), re.MULTILINE))
         for lock in LOCKS
     }
-    assert pins["runtime.txt"] < pins["dev.txt"]
+    assert pins["runtime.txt"] | pins["build.txt"] < pins["test.txt"] < pins["dev.txt"]
+
+
+def test_sphinx_is_installed_for_the_docs_only() -> None:
+    text = (ROOT / "requirements/test.txt").read_text("utf-8")
+    assert not re.search(r"^(sphinx|furo|myst-parser|latex2mathml)", text, re.MULTILINE)

@@ -231,6 +231,7 @@ def test_how_cells_are_shown() -> None:
     assert measured.shown(12, measured.Column(name="")) == "12"
 
 
+@pytest.mark.slow  # the extension needs sphinx, which the fast tests do without
 def test_a_page_chooses_columns_and_formats() -> None:
     chosen = module("measured_tables", DOCS / "_ext").chosen
     columns, rows = chosen(table(), "ok; error", "error = .3e")
@@ -241,6 +242,7 @@ def test_a_page_chooses_columns_and_formats() -> None:
         chosen(table(), "place", "")
 
 
+@pytest.mark.slow  # the extension needs sphinx, which the fast tests do without
 def test_a_page_says_where_a_table_comes_from() -> None:
     origin = module("measured_tables", DOCS / "_ext").origin
     made = table(code="0123456789abcdef")

@@ -1,8 +1,9 @@
 """Set three ways to drive a hammer side by side: open loop, a compensation table, feedback.
 
-Run it with ``.venv/bin/python docs/measure/ways.py [HAMMER] [--rate RATE] [--picture FILE]``. It measures
-how good a page of several lines is at each rate and how far the second of two dots is off at all distances,
-and draws the first line of the page, printed in each way at the last rate. It takes a few minutes.
+Run it with ``.venv/bin/python docs/measure/ways.py [HAMMER] [--rate RATE]``. It measures how good a page of
+several lines is at each rate and how far the second of two dots is off at all distances, which takes a few
+minutes. With ``--picture FILE`` it only draws one line, printed in each way at the last rate: the picture of
+the README, ``docs/images/ways.png``.
 """
 
 import argparse
@@ -85,6 +86,11 @@ def main() -> None:
     given = parser.parse_args()
     hammer = ph.load(given.hammer)
     controller = Controller(hammer, driver_of(hammer))
+    if given.picture is not None:
+        rate = (given.rates or RATES)[-1]
+        ways = ways_at(hammer, rate, controller)
+        picture([ph.print_page(hammer, LINE, rate, strategy=way) for way in ways], given.picture)
+        return
     rows: list[list[Cell]] = []
     for rate in given.rates or RATES:
         ways = ways_at(hammer, rate, controller)
@@ -101,8 +107,6 @@ def main() -> None:
     ]
     settings = {"rates": given.rates or RATES, "text": TEXT}
     write("ways-pages", columns, rows, settings, ROOMS, (hammer.name,))
-    if given.picture is not None:
-        picture([ph.print_page(hammer, LINE, rate, strategy=way) for way in ways], given.picture)
     table = ph.tune(hammer, history=1)
     found = ph.feedback(
         hammer,

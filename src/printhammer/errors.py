@@ -40,3 +40,10 @@ def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
     names = list(known)
     close = get_close_matches(name, names, 1)
     return repr(close[0]) if close else otherwise or f"one of {', '.join(names)}"
+
+
+def missing_extra(needs: str, extra: str) -> InputError:
+    """Return the error that says what is not installed, such as "a store needs zarr", and how to get it."""
+    return InputError(
+        f"{needs}, which the extra printhammer[{extra}] installs: pip install 'printhammer[{extra}]'"
+    )

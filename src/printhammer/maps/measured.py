@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, missing_extra
 from printhammer.maps.layout import interpolated, map_dataset
 from printhammer.maps.records import RateRecord, checked, read_records
 from printhammer.results.files import need_for
@@ -149,9 +149,7 @@ def _opened(path: Path) -> Any:
     else:
         options = {"engine": "h5netcdf"}
         if find_spec("h5netcdf") is None or find_spec("h5py") is None:
-            raise InputError(
-                f"{path}: NetCDF-4 files need h5netcdf and h5py, which the extra printhammer[netcdf] installs"
-            )
+            raise missing_extra(f"{path}: NetCDF-4 files need h5netcdf and h5py", "netcdf")
     try:
         return xr.open_dataset(path, decode_times=False, **options)
     except Exception as error:  # noqa: BLE001 - the backends raise what they like

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from printhammer.claims import JudgedClaim
-from printhammer.errors import InputError
+from printhammer.errors import missing_extra
 from printhammer.reconstruction.judging.shares import Share
 from printhammer.report.page import view
 from printhammer.report.quantities import percent, typeset
@@ -39,7 +39,7 @@ def check_typesetter() -> None:
         Typst is not installed.
     """
     if find_spec("typst") is None:
-        raise InputError("a PDF of the report needs typst, which the extra printhammer[pdf] installs")
+        raise missing_extra("a PDF of the report needs typst", "pdf")
 
 
 def write_pdf(report: Report, path: Path) -> None:

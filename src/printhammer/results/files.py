@@ -26,7 +26,7 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, missing_extra
 from printhammer.results.declare import Column, Declared, heading, part
 from printhammer.results.provenance import KEYS
 from printhammer.support.outputs import write_file
@@ -151,7 +151,7 @@ def need_for(path: str | Path, kind: str = "") -> None:
     """
     package, what, extra = _NEEDED.get(kind or Path(path).suffix.lower(), ("json", "", ""))
     if find_spec(package) is None:
-        raise InputError(f"{path}: {what} {package}, which the extra printhammer[{extra}] installs")
+        raise missing_extra(f"{path}: {what} {package}", extra)
 
 
 def plain(value: Any) -> Any:

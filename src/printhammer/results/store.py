@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, missing_extra
 from printhammer.results.declare import Declared, part
 
 if TYPE_CHECKING:
@@ -235,7 +235,7 @@ def _require_zarr() -> None:
     try:
         import zarr  # noqa: F401
     except ImportError:
-        raise InputError("a store needs zarr, which the extra printhammer[sweep] installs") from None
+        raise missing_extra("a store needs zarr", "sweep") from None
 
 
 def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:

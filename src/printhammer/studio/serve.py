@@ -6,7 +6,7 @@ import socket
 import sys
 from typing import TYPE_CHECKING
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, missing_extra
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,9 +46,7 @@ def serve(
 
         from printhammer.studio.app import application
     except ImportError as error:
-        raise InputError(
-            f"the studio needs {error.name}, which the extra printhammer[studio] installs"
-        ) from None
+        raise missing_extra(f"the studio needs {error.name}", "studio") from None
     from printhammer.studio.bounds import LARGEST_MESSAGE
     from printhammer.studio.guard import HOSTS, Guard
     from printhammer.studio.states.shelf import Shelf

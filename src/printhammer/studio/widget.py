@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from printhammer.errors import InputError
+from printhammer.errors import missing_extra
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
@@ -36,9 +36,7 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
         import anywidget
         import traitlets
     except ImportError as error:
-        raise InputError(
-            f"the widget needs {error.name}, which the extra printhammer[notebook] installs"
-        ) from None
+        raise missing_extra(f"the widget needs {error.name}", "notebook") from None
     from printhammer.studio.bundle import module, style
     from printhammer.studio.session import Session
     from printhammer.studio.states.shelf import Shelf

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+from printhammer.results.files import need_for
 from printhammer.results.store import Store, open_store
 from printhammer.support.threads import thread_count
 from printhammer.sweep.local import Index, run_local
@@ -64,6 +65,7 @@ def sweep(
         be written; nobody answers at the address.
     """
     thread_count(threads)
+    need_for(out, ".zarr")
     plan = make_plan(read_spec(spec))
     with ExitStack() as stack:
         client = None

@@ -14,7 +14,7 @@ from importlib import import_module
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.errors import InputError, PrinthammerError
+from printhammer.errors import InputError, PrinthammerError, missing_extra
 from printhammer.results.provenance import versions
 from printhammer.sweep.outputs import WORKER_LOST, Outputs
 from printhammer.sweep.work import Results, run_chunk
@@ -227,7 +227,7 @@ def client_of(dask: Any) -> Iterator[Any]:
     try:
         distributed: Any = import_module("distributed")
     except ImportError:
-        raise InputError("dask is missing, which the extra printhammer[cluster] installs") from None
+        raise missing_extra("a cluster needs dask", "cluster") from None
     if isinstance(dask, distributed.Client):
         yield dask
         return

@@ -46,6 +46,13 @@ def test_a_check_does_nothing(cli, spec: Path, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["spec.toml"]
 
 
+def test_a_sweep_without_zarr_names_the_extra(
+    refused, tmp_path: Path, spec: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("printhammer.results.files.find_spec", lambda _name: None)
+    refused("sweep", spec, "--out", "out.zarr", said="zarr, which the extra printhammer[sweep] installs")
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.errors import InputError
+from printhammer.errors import InputError, missing_extra
 from printhammer.hammer.hammer import load
 from printhammer.reconstruction.search.evaluation import AIMS, WEIGHTS, Aim, losses_digest, scored
 from printhammer.reconstruction.search.explorer import Explorer
@@ -184,9 +184,7 @@ def _strategies() -> Any:
     try:
         from cmaes import CMA
     except ImportError:
-        raise InputError(
-            "the search needs cmaes, which is not installed: pip install 'printhammer[identify]'"
-        ) from None
+        raise missing_extra("the search needs cmaes", "identify") from None
     return CMA
 
 
