@@ -107,7 +107,7 @@ def main() -> None:
         Column(name="standard error", unit="%", format=".2g"),
         Column(name="mean error in standard errors", format="+.2f"),
     ]
-    rooms = (*MOTION, "identify")
+    rooms = (*MOTION, "cli/main", "cli/verbs/laboratory", "identify")
     write("recipe", columns, table(made, truth), {"laboratories": options.labs}, rooms)
 
 

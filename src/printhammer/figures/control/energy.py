@@ -56,8 +56,9 @@ def plot(burst: LeastWork) -> Figure:
         label="the coil gives",
         gid="given",
     )
-    back = {"label": "the coil takes back", "gid": "taken back"}
-    power.fill_between(ms * run.t, np.minimum(watts, 0.0), 0.0, color=style.GREEN, lw=0.0, **back)
+    power.fill_between(
+        ms * run.t, np.minimum(watts, 0.0), 0.0, color=style.GREEN, lw=0.0, gid="taken back"
+    ).set_label("the coil takes back")
     legend_above(power, power.get_legend_handles_labels()[0])
     power.set_ylabel("Coil power  [W]")
     power.set_xlabel("Time  [ms]")

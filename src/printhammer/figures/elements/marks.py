@@ -151,7 +151,7 @@ def legend_below(ax: Axes, *entries: Any, **options: Any) -> None:
     """
     from matplotlib.transforms import ScaledTranslation
 
-    down = ScaledTranslation(0.0, -_BELOW / 72.0, ax.get_figure(root=True).dpi_scale_trans)
+    down = ScaledTranslation(0.0, -_BELOW / 72.0, ax.figure.dpi_scale_trans)
     where: dict[str, Any] = {"bbox_to_anchor": (0.0, 0.0), "bbox_transform": ax.transAxes + down}
     ax.legend(
         *entries, loc="upper left", borderaxespad=0.0, fontsize=SMALL, frameon=False, **where, **options
