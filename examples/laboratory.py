@@ -85,7 +85,7 @@ fits = [
 built = hammer.replace("mass", "0.5 g")  # a first guess
 for fit in fits:
     built = fit.into(built)
-record = ph.fit("motion", folder / "motion.csv", hammer=built, earlier=fits)
+record = ph.fit("motion", folder / "motion.csv", hammer=built)
 built = record.into(built)
 
 figure, panel = plt.subplots()

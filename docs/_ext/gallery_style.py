@@ -5,6 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from cycler import cycler
+
+from printhammer.figures.elements import style
+
 ORDER = (
     "single_pulse",
     "two_pulses",
@@ -38,16 +42,15 @@ ORDER = (
 """The examples in the order in which one would teach them."""
 
 STYLE = {
-    "axes.spines.right": False,
-    "axes.spines.top": False,
+    **style.RC,
+    "axes.prop_cycle": cycler(color=(style.BLUE, style.ORANGE, style.GREEN, style.YELLOW, style.MUTED)),
     "figure.constrained_layout.use": True,
-    "figure.dpi": 100,
-    "figure.figsize": (6.8, 4.2),
-    "savefig.dpi": 160,
-    "font.size": 9.5,
+    "figure.figsize": (style.WIDTH, 4.2),
+    "legend.fontsize": style.SMALL,
     "legend.frameon": False,
-    "lines.linewidth": 1.3,
+    "savefig.dpi": 160,
 }
+"""That of the pictures of the program, so that those which an example draws itself look alike."""
 
 
 class TeachingOrder:

@@ -7,7 +7,7 @@ from matplotlib.colors import to_rgb
 import printhammer as ph
 from printhammer.chaos import Bifurcation
 from printhammer.figures.chaos import basins as basin_figures
-from printhammer.figures.chaos.bifurcation import SHADES
+from printhammer.figures.chaos.bifurcation import SHADES, WAYS
 
 
 def gids(figure: object) -> list[str]:
@@ -35,6 +35,16 @@ def test_points_of_both_directions_and_bands(both: Bifurcation) -> None:
     assert shades == {to_rgb(SHADES["period-1"]), to_rgb(SHADES["period-2"])}
     widths = [bar.get_width() for bar in strip.patches]
     assert sum(widths) == pytest.approx(2.0 * 1e3 * (both.values[-1] - both.values[0]))
+
+
+def test_the_legend_is_clear_of_the_foot_and_no_colour_means_two_things(both: Bifurcation) -> None:
+    assert not set(WAYS.values()) & set(SHADES.values())
+    figure = both.plot()
+    figure.draw_without_rendering()
+    legend = figure.axes[1].get_legend()
+    assert "up only" in {text.get_text() for text in legend.get_texts()}
+    assert not legend.get_window_extent().overlaps(figure._supxlabel.get_window_extent())
+    assert not legend.get_window_extent().overlaps(figure.axes[1].xaxis.label.get_window_extent())
 
 
 def test_velocities_and_limits(both: Bifurcation) -> None:

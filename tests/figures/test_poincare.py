@@ -49,6 +49,19 @@ def test_points_are_those_of_the_trains(drawn: Figure, trains: list[Strobe]) -> 
         assert len(x) == 200
 
 
+def test_a_small_attractor_is_drawn_once_more(drawn: Figure, trains: list[Strobe]) -> None:
+    for ax, train in zip(drawn.axes, trains, strict=True):
+        insets = [child for child in ax.child_axes if child.get_gid() == "attractor"]
+        area = np.ptp(train.x[100:]) * np.ptp(train.v[100:])
+        small = train.verdict.period is None and area < 0.04 * 2e-3 * INCH * 50.0 * INCH
+        assert len(insets) == small
+        if small:
+            x, v = data(insets[0], "attractor")
+            assert set(x) <= set(1e6 * train.x[100:])
+            assert np.ptp(x) > 0.8 * np.diff(insets[0].get_xlim())
+            assert np.ptp(v) > 0.8 * np.diff(insets[0].get_ylim())
+
+
 def test_the_window_is_that_of_the_paper(drawn: Figure) -> None:
     for ax in drawn.axes:
         assert ax.get_xlim() == pytest.approx((0.0015 * INCH * 1e6, 0.0035 * INCH * 1e6))

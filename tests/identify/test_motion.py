@@ -153,7 +153,8 @@ def test_earlier_fits_are_improved(tmp_path: Path) -> None:
         HAMMER, {"magnet.Am": 1e-3, "pack.stiffness": 5e-3, "backstop.stiffness": 1e-2}, 4
     )
     fit = fit_motion([path], static.into(FAR), earlier=[static])
-    alone = fit_motion([path], static.into(FAR))
+    carried = fit_motion([path], static.into(FAR))
+    alone = fit_motion([path], static.into(FAR).replace("uncertainty", None))
     assert set(fit.constants) == {"mass", "backstop.damping", *static.keys}
     for key in static.keys:
         assert fit[key].standard_error < static[key].standard_error
@@ -161,6 +162,24 @@ def test_earlier_fits_are_improved(tmp_path: Path) -> None:
     assert fit["mass"].standard_error > fit_motion([path], HAMMER)["mass"].standard_error
     assert not fit.rejected
     assert alone.rejected
+    # A hammer carries what the fit before it knew.
+    assert carried.keys == fit.keys
+    np.testing.assert_allclose(carried.covariance, fit.covariance, rtol=1e-12)
+    built = carried.into(static.into(FAR))
+    assert built.uncertainty is not None
+    assert set(built.uncertainty.keys) == set(fit.constants)
+    for key in fit.constants:
+        assert built.uncertainty.error(key) == pytest.approx(carried[key].standard_error, rel=1e-9)
+
+
+def test_a_record_counts_once(tmp_path: Path) -> None:
+    path = shots.write(tmp_path / "shot.csv", HAMMER, seed=11)
+    built = fit_motion([path], FAR).into(FAR)
+    with pytest.raises(ph.InputError, match=r"shot\.csv.*fitted to this record already, expected another"):
+        fit_motion([path], built)
+    other = shots.write(tmp_path / "other.csv", HAMMER, seed=12)
+    twice = fit_motion([other], built)
+    assert twice["mass"].standard_error < 0.85 * fit_motion([path], FAR)["mass"].standard_error
 
 
 def test_waveform_constants_can_be_free(tmp_path: Path) -> None:

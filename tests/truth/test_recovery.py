@@ -4,6 +4,7 @@ The measurements are those of an ordinary bench, `printhammer.identify.bench.lab
 """
 
 import functools
+import importlib
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -148,6 +149,22 @@ def count_all(found: list[Recovery]) -> dict[str, int]:
             truths = [lab.true(key) for lab in found]
             counts[f"{kind}: {key}"] = held([lab.fits[kind] for lab in found], key, truths)
     return counts
+
+
+@pytest.mark.slow
+def test_the_recipe_of_the_page_in_a_few_laboratories() -> None:
+    """Run as printed, through files, as `docs/measure/recipe.py` does a hundred times."""
+    path = Path(__file__).parents[2] / "docs" / "measure"
+    count = 10
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(path))
+        script = importlib.import_module("recipe")
+        truth = ph.load("hendriks-1983")
+        rows = script.table([script.laboratory(truth, seed, script.recipe()) for seed in range(count)], truth)
+    counts = {row[0]: int(row[1].split()[0]) for row in rows[:-1]}
+    assert {"`mass`", "`magnet.Am`", "`magnet.Bm`", "`pack.stiffness`"} <= set(counts)
+    allowed = binom.isf(CHANCE, count, 0.05)
+    assert {key: held for key, held in counts.items() if count - held > allowed} == {}
 
 
 @pytest.mark.slow

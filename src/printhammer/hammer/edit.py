@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.file import SELECTORS, TEXTS, Body, file_options, kinds_of, model_of, si_unit_of
+from printhammer.hammer.uncertainty import UNCERTAINTY
 from printhammer.support.constants import Constant, quantities, shown
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     section, _, name = key.rpartition(".")
     if key in SELECTORS:
         return key, None if value is None else _table(key, value, status, source)
+    if key == UNCERTAINTY:
+        return key, value
     if not section:
         model: type[BaseModel] | None = Body
     elif section in SELECTORS:
@@ -152,7 +155,7 @@ def changed_text(text: str, edits: Iterable[Edit]) -> str:
     document = tomlkit.parse(text)
     for key, value in edits:
         section, _, name = key.rpartition(".")
-        if key in SELECTORS and isinstance(value, Mapping):
+        if key in (*SELECTORS, UNCERTAINTY) and isinstance(value, Mapping):
             document[key] = table(value)
         elif section in SELECTORS and section not in document:
             document[section] = table({name: value})

@@ -2,7 +2,8 @@
 
 A file has ``format = 1``, ``name``, optionally ``title`` and ``note``, the constants ``mass`` and ``platen``,
 and a table for each part: ``[magnet]``, ``[spring]``, ``[pack]`` and ``[backstop]`` with their ``law``,
-``[waveform]`` with its ``shape``, and ``[coil]``. All but name and mass are optional. A constant is
+``[waveform]`` with its ``shape``, ``[coil]``, and ``[uncertainty]`` with standard errors of constants
+(`printhammer.hammer.uncertainty`). All but name and mass are optional. A constant is
 ``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a pure number.
 """
 
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from printhammer.errors import InputError, located, nearest
+from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty, read_uncertainty
 from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
 from printhammer.parts.functions import check_functions
 from printhammer.parts.outside import load_installed
@@ -85,6 +87,7 @@ class Contents:
     parts: dict[str, Part]
     waveform: Waveform | None
     constants: dict[str, Constant]
+    uncertainty: Uncertainty | None
 
 
 def read_document(text: str, where: str) -> dict[str, Any]:
@@ -146,7 +149,7 @@ def file_options(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _build(document: Mapping[str, Any], folder: Path) -> Contents:
-    _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS), "")
+    _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS, UNCERTAINTY), "")
     if "format" not in document:
         raise InputError(f"format is missing, expected format = {FORMAT}")
     version = document["format"]
@@ -178,6 +181,7 @@ def _build(document: Mapping[str, Any], folder: Path) -> Contents:
         waveform=made.pop("waveform", None),
         parts=made,
         constants=constants,
+        uncertainty=read_uncertainty(document[UNCERTAINTY], constants) if UNCERTAINTY in document else None,
     )
     _check_order(contents)
     return contents

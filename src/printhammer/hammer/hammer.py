@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
+from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart
 from printhammer.support.constants import Constant, quantities
 
@@ -230,12 +231,17 @@ class Hammer:
         """Every constant that the file gives, by dotted key such as "magnet.F0"."""
         return MappingProxyType(self._contents.constants)
 
+    @property
+    def uncertainty(self) -> Uncertainty | None:
+        """Standard errors and correlations of constants; None where the file has none, and all are exact."""
+        return self._contents.uncertainty
+
     @cached_property
     def fingerprint(self) -> str:
         """Digest of the physics: laws, SI values, options and tables, in hexadecimal.
 
-        Names, notes, units, sources, statuses, comments and file names do not enter; an option or constant at
-        its default counts as left out.
+        Names, notes, units, sources, statuses, errors, comments and file names do not enter; an option or
+        constant at its default counts as left out.
         """
         content: dict[str, Any] = {"mass": self.mass.hex()}
         if self.platen is not None:
@@ -268,6 +274,7 @@ class Hammer:
         value : object, optional
             For a constant: text with its unit ("60 lbf"), a float in SI, or a `Constant`; for an option: its
             value; for a part: a part, or a mapping of its keys with "law"; None takes away what is optional.
+            The standard errors of constants that are set go, unless "uncertainty" is set too.
         status, source : str, optional
             Of the constants set.
 
@@ -288,6 +295,13 @@ class Hammer:
                 edit = edit_of(document, name, entry, status, source)
                 document = changed(document, [edit])
                 edits.append(edit)
+            known = self.uncertainty
+            if known is not None and UNCERTAINTY not in wanted:
+                gone = {key for key in known.keys if key in wanted or key.rpartition(".")[0] in wanted}
+                if gone:
+                    units = {key: constant.si_unit for key, constant in self.constants.items()}
+                    edits.append((UNCERTAINTY, known.without(gone).table(units)))
+                    document = changed(document, edits[-1:])
         contents = build(document, where, self._folder)
         return Hammer(contents, document, self._text, (*self._edits, *edits), where, self._folder)
 

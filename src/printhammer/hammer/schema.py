@@ -16,6 +16,7 @@ from printhammer.hammer.file import (
     kinds_of,
     model_of,
 )
+from printhammer.hammer.uncertainty import ENTRIES, UNCERTAINTY
 from printhammer.support.constants import STATUSES, Quantity, quantities
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -37,6 +38,9 @@ def schema() -> dict[str, Any]:
             properties[section] = {"oneOf": tables}
         else:
             properties[section] = _object(_constants(model_of(section, "")), [])
+    properties[UNCERTAINTY] = _object(
+        {name: {"type": "array", "description": meaning} for name, meaning in ENTRIES.items()}, ["constants"]
+    )
     result = _object(properties, ["format", "name", *_required(Body)])
     return {
         "$schema": _DIALECT,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
+from printhammer.identify.result import with_error
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,7 +34,8 @@ def fit(
         without currents, that of the spring alone.
     hammer : Hammer, optional
         What is known already: position of the backstop, thickness of the pack, stiffness of the backstop; for
-        "motion", which needs one, all constants that are not fitted.
+        "motion", which needs one, all constants that are not fitted. What it knows with an error counts with
+        that error.
     **options
         Of the kind; lengths in m or with a unit. All: `robust` (true), whether rows that lie too far off are
         left out. "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the
@@ -89,8 +91,43 @@ def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
 
 
 def _static(kind: str, table: Any, hammer: Hammer | None, options: dict[str, Any]) -> Fit:
-    if kind in ("magnet", "spring") and options.get("position") is None:
-        options["position"] = None if hammer is None else hammer.position
+    """Fit a table; a constant that the hammer knows with an error has it counted."""
+    name, key = _TAKEN[kind]
+    known = None
+    if options.get(name) is None:
+        known = _known(hammer, key)
+        options[name] = known
+    fit = _fitted(kind, table, options)
+    error = hammer.uncertainty.error(key) if hammer is not None and hammer.uncertainty is not None else 0.0
+    if known is None or not error > 0.0:
+        return fit
+    up, down = (_fitted(kind, table, {**options, name: known + shift}) for shift in (error, -error))
+    return with_error(
+        fit, key, error, [0.5 * (up[each].value - down[each].value) / error for each in fit.keys]
+    )
+
+
+_TAKEN: Final = {
+    "magnet": ("position", "backstop.position"),
+    "spring": ("position", "backstop.position"),
+    "pack": ("thickness", "pack.thickness"),
+    "backstop": ("stiffness", "backstop.stiffness"),
+}
+"""What each static fit takes as known: its option, and the constant of the hammer."""
+
+
+def _known(hammer: Hammer | None, key: str) -> float | None:
+    """Return what a hammer says of a constant, SI; a stiffness also where it follows from bodies."""
+    if hammer is None:
+        return None
+    if key == "backstop.stiffness":
+        return getattr(hammer.backstop, "k", None)
+    if key == "backstop.position":
+        return hammer.position
+    return hammer.constants[key].si if key in hammer.constants else None
+
+
+def _fitted(kind: str, table: Any, options: dict[str, Any]) -> Fit:
     if kind == "magnet":
         from printhammer.identify.static.magnet import fit_magnet
 
@@ -104,16 +141,9 @@ def _static(kind: str, table: Any, hammer: Hammer | None, options: dict[str, Any
     if kind == "pack":
         from printhammer.identify.static.pack import fit_pack
 
-        if options.get("thickness") is None:
-            constant = None if hammer is None else hammer.constants.get("pack.thickness")
-            if constant is None:
-                raise InputError(
-                    "the thickness of the pack is missing, expected it, or a hammer that has one"
-                )
-            options["thickness"] = constant.si
+        if options["thickness"] is None:
+            raise InputError("the thickness of the pack is missing, expected it, or a hammer that has one")
         return fit_pack(table, **options)
     from printhammer.identify.static.backstop import fit_backstop
 
-    if options.get("stiffness") is None:
-        options["stiffness"] = getattr(hammer.backstop, "k", None) if hammer is not None else None
     return fit_backstop(table, **options)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.results import Column, Declared, Result, column, coordinate, part, scalar
 
 if TYPE_CHECKING:
@@ -151,6 +152,12 @@ class Fit(Result):
         default=float("nan"),
     )
     remarks: tuple[str, ...] = scalar("", "further sentences", default=())
+    slopes: Mapping[str, FloatArray] = part(
+        "changes of the constants in `keys` with one that was taken as known but has an error, by its key;"
+        " SI, shape (n,)",
+        default_factory=dict,
+    )
+    records: tuple[str, ...] = part("fingerprints of the records of motion", default=())
 
     @property
     def title(self) -> str:
@@ -257,7 +264,32 @@ class Fit(Result):
             _agrees(hammer, key, text)
         gone = [other for key in constants for other in REPLACED.get(key, ())]
         taken = {key: None for key in gone if key in hammer.constants}
-        return hammer.replace({**taken, **constants})
+        return hammer.replace(
+            {**taken, **constants, UNCERTAINTY: self._uncertainty(hammer, {*gone, *constants})}
+        )
+
+    def _uncertainty(self, hammer: Hammer, set_anew: set[str]) -> dict[str, Any] | None:
+        """Return how well a hammer with the constants is known: these, the others, and both together."""
+        own = [key for key, constant in self.constants.items() if constant.in_file]
+        before = hammer.uncertainty or Uncertainty((), np.empty((0, 0)))
+        rest = before.without(set_anew)
+        count = len(own)
+        covariance = np.zeros((count + len(rest.keys),) * 2)
+        covariance[count:, count:] = rest.covariance
+        for i, key in enumerate(own):
+            covariance[i, i] = self[key].standard_error ** 2
+        rows = [(i, self.keys.index(key)) for i, key in enumerate(own) if key in self.keys]
+        here, there = [i for i, _ in rows], [row for _, row in rows]
+        covariance[np.ix_(here, here)] = self.covariance[np.ix_(there, there)]
+        for known, slope in self.slopes.items():
+            if known in rest.keys:
+                shared = np.outer(slope[there], rest.covariance[rest.keys.index(known)])
+                covariance[np.ix_(here, range(count, len(covariance)))] += shared
+        covariance[count:, :count] = covariance[:count, count:].T
+        units = {key: constant.si_unit for key, constant in hammer.constants.items()}
+        units |= {key: constant.unit for key, constant in self.constants.items()}
+        records = (*rest.records, *self.records)
+        return Uncertainty((*own, *rest.keys), covariance, records).table(units)
 
     @property
     def report(self) -> list[str]:
@@ -297,6 +329,32 @@ class Fit(Result):
             ]
         more = ", …" if len(rows) > most else ""
         return f"{count}: line{'s' if len(rows) > 1 else ''} {', '.join(listed)}{more}"
+
+
+def with_error(fit: Fit, key: str, error: float, slopes: list[float]) -> Fit:
+    """Return a fit whose constants also have the error of one that was taken as known.
+
+    `slopes` are their changes with it, for each of `Fit.keys`; all SI.
+    """
+    slope = np.array(slopes)
+    constants = dict(fit.constants)
+    for each, change in zip(fit.keys, slope.tolist(), strict=True):
+        constant, added = fit[each], abs(change) * error
+        # The error of what was known is normal, that of the fit has Student's t of its own freedom.
+        half = math.hypot(0.5 * (constant.interval[1] - constant.interval[0]), student(math.inf) * added)
+        constants[each] = replace(
+            constant,
+            standard_error=math.hypot(constant.standard_error, added),
+            interval=(constant.value - half, constant.value + half),
+        )
+    remark = f"the standard error of {key}, {error:.2g} in SI, is in those of the constants"
+    return replace(
+        fit,
+        constants=constants,
+        covariance=fit.covariance + np.outer(slope, slope) * error * error,
+        slopes={**fit.slopes, key: slope},
+        remarks=(*fit.remarks, remark),
+    )
 
 
 def student(degrees_of_freedom: float) -> float:

@@ -165,6 +165,11 @@ def test_the_comparison(controller: Controller, monkeypatch: pytest.MonkeyPatch,
     assert forces == pytest.approx([dot.peak_force for dot in found.run.motion.dots], rel=1e-3)
     figure = found.plot()
     assert [line.get_gid() for line in figure.axes[2].get_lines()][:2] == ["open loop", "feedback"]
+    shares = figure.axes[1]
+    assert max(shares.get_yticks()) <= 1.0
+    figure.draw_without_rendering()
+    legend = shares.get_legend().get_window_extent()
+    assert not any(legend.overlaps(line.get_window_extent()) for line in shares.get_lines())
     run = found.plot_run()
     samples = next(line for line in run.axes[0].get_lines() if line.get_gid() == "samples")
     assert len(samples.get_xdata()) == len(found.run.times)

@@ -121,6 +121,11 @@ def test_the_picture_shows_motion_current_power_and_ledger(burst: LeastWork) -> 
     assert [area.get_gid() for area in power.collections] == ["given", "taken back"]
     widths = [bar.get_width() for bar in ledger.patches]
     assert widths[:3] == pytest.approx([1.0, burst.net_ratio, burst.positive_ratio])
+    assert [text.get_text() for text in power.get_legend().get_texts()] == [
+        "the coil gives",
+        "the coil takes back",
+    ]
+    assert "-0.000" not in [text.get_text() for text in ledger.texts]
 
 
 def test_no_current_found_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -90,7 +90,7 @@ def plot(basins: Basins, *, attractors: bool = True) -> Figure:
             patch = Patch(facecolor=colour, edgecolor=INK, lw=0.5)
             handles.append((patch, patch, f"{name}: {cells} cells"))
     signs, names = [entry[:2] for entry in handles], [entry[2] for entry in handles]
-    legend_below(figure, signs, names, ncols=1 + (len(handles) > _FEW), handlelength=1.2)
+    legend_below(ax, signs, names, ncols=1 + (len(handles) > _FEW), handlelength=1.2)
     heading(ax, f"Every {shown_period(basins.regime.period)}")
     label(ax, "x", way, "Displacement at the first firing")
     label(ax, "y", speed, "Velocity at the first firing")

@@ -31,12 +31,12 @@ SHADES: Final = {
     "other period": "#cc79a7",
     "strange": "#4d4d4d",
     "no period": "#c4c4c4",
-    "run ended early": style.ORANGE,
+    "run ended early": "#7a1f1f",
 }
 """Colour of the band of a verdict; "no period" is what is not known to be strange."""
 
-WAYS: Final = {"from rest": style.INK, "up": style.BLUE, "down": style.ORANGE}
-"""Colours of points that one direction alone leads to."""
+WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
+"""Colours of points that one direction alone leads to; none is that of a band."""
 
 _POINT: Final = 0.7
 _MOST: Final = 3_000_000
@@ -56,8 +56,8 @@ def plot(
 ) -> Figure:
     """Draw a bifurcation diagram.
 
-    Black: points to which all directions lead; blue and orange: points to which only rising or falling values
-    do. The bands below tell the verdicts.
+    Black: points to which all directions lead; orange and violet: points to which only rising or
+    falling values do. The bands below tell the verdicts.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def plot(
     ax.tick_params(axis="x", labelbottom=False, top=True, bottom=True)
     _bands(strip, diagram, across)
     label(strip, "x", across)
-    _key(figure, diagram)
+    _key(strip, diagram)
     bad = int((diagram.status != "ok").sum())
     sign(figure, diagram.regime.hammer, f"{bad} of {diagram.status.size} runs ended early." if bad else "")
     return figure
@@ -225,7 +225,7 @@ def _kind(verdict: str, stopped: bool) -> str:
     return verdict if verdict in SHADES else "other period"
 
 
-def _key(figure: Figure, diagram: Bifurcation) -> None:
+def _key(strip: Axes, diagram: Bifurcation) -> None:
     """Write below what the colours mean: of the bands that are there, and of points of one direction."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -243,4 +243,4 @@ def _key(figure: Figure, diagram: Bifurcation) -> None:
             for name in diagram.directions
         ]
     apart = {"handlelength": 1.0, "handletextpad": 0.4, "columnspacing": 1.2}
-    legend_below(figure, handles=handles, ncols=5, **apart)
+    legend_below(strip, handles=handles, ncols=4, **apart)

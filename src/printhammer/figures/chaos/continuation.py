@@ -35,7 +35,7 @@ _MARKS: Final[dict[str, dict[str, Any]]] = {
     "period doubling": {"marker": "s", "ms": 4.5, "mfc": "white"},
     "Neimark-Sacker": {"marker": "D", "ms": 4.5, "mfc": "white"},
     "branching": {"marker": "x", "ms": 5.0},
-    "grazing": {"marker": "|", "ms": 5.0},
+    "grazing": {"marker": "|", "ms": 13.0},
 }
 _UNSTABLE: Final[dict[str, Any]] = {"lw": style.HAIR, "ls": (0, (4, 2)), "zorder": 2.0}
 _AXIS: Final = {"s": ("ms", 1e3), "1": ("", 1.0)}
@@ -155,7 +155,7 @@ def _mark(
             if event.kind == "grazing" and not grazings:
                 continue
             row = _at_event(branch, event, table)
-            colour = style.MUTED if event.kind == "grazing" else colour_of(branch.firings)
+            colour = style.INK if event.kind == "grazing" else colour_of(branch.firings)
             places = np.full(branch.firings, factors[0] * event.value)
             look = {"ls": "none", "mec": colour, "mew": style.THIN, "zorder": 4.0, **_MARKS[event.kind]}
             ax.plot(places, factors[1] * row, gid=event.kind, **look)
@@ -179,8 +179,7 @@ def _legend(ax: Axes, branches: Sequence[Branch], kinds: Sequence[str]) -> None:
     handles.append(Line2D([], [], color=style.MUTED, lw=style.HAIR, ls=_UNSTABLE["ls"], label="unstable"))
     for kind, look in _MARKS.items():
         if kind in kinds:
-            colour = style.MUTED if kind == "grazing" else style.INK
-            handles.append(Line2D([], [], ls="none", mec=colour, mew=style.THIN, label=kind, **look))
+            handles.append(Line2D([], [], ls="none", mec=style.INK, mew=style.THIN, label=kind, **look))
     size = style.TINY + 0.5 if len(handles) > 6 else style.SMALL
     legend_in_columns(ax, handles, 3 if len(handles) > 4 else len(handles), size)
 

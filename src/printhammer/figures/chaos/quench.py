@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.figures.elements.map_marks import edges
-from printhammer.figures.elements.marks import dashed, dots
+from printhammer.figures.elements.marks import dashed, dots, legend_above
 from printhammer.figures.elements.scales import Scale, label
 from printhammer.figures.elements.style import INK, MUTED, SMALL, new_panel, sign, styled
 from printhammer.figures.paper.two_pulses import DELAYS
@@ -52,10 +52,27 @@ def plot(quenches: QuenchMap) -> Figure:
         bar.set_label("Lost: second peak, parts of the way to the pack", fontsize=SMALL)
     width = getattr(quenches.waveform, "width", None)
     if width is not None and y[0] < up.shown(width) < y[-1]:
-        dashed(ax.axhline, float(up.shown(width)), color="white", gid="first width")
+        dashed(
+            ax.axhline,
+            float(up.shown(width)),
+            color="white",
+            label="width of the first pulse",
+            gid="first width",
+        )
         shown = [delay for delay in DELAYS if quenches.gaps[0] <= delay <= quenches.gaps[-1]]
         level = np.full(len(shown), float(up.shown(width)))
-        dots(ax, across.shown(shown), level, 6.0, "white", marker="x", mew=1.4, gid="Fig. 6")
+        crosses = {"marker": "x", "mew": 1.4, "label": "the two cases of Fig. 6", "gid": "Fig. 6"}
+        if shown:
+            dots(ax, across.shown(shown), level, 6.0, "white", **crosses)
+        # White on grey, as the marks are white on the map.
+        box = {
+            "frameon": True,
+            "facecolor": MUTED,
+            "edgecolor": "none",
+            "framealpha": 1.0,
+            "labelcolor": "white",
+        }
+        legend_above(ax, ax.get_legend_handles_labels()[0], **box)
     ax.set_xlim(float(x[0]), float(x[-1]))
     ax.set_ylim(float(y[0]), float(y[-1]))
     label(ax, "x", across)

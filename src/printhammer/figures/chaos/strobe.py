@@ -9,6 +9,7 @@ import numpy as np
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import HALO, dots, heading, note
+from printhammer.figures.elements.room import freest
 from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_panel, sign, styled
 from printhammer.run.window import Window
@@ -20,8 +21,16 @@ if TYPE_CHECKING:
 
     from printhammer.chaos import Strobe
 
+_FEW: Final = 20
+"""Points that an inset needs."""
 _CYCLE: Final = 8
 """Largest period whose points are ringed."""
+
+_SMALL: Final = 0.04
+"""Share of the window that an attractor without a period fills at most to be drawn larger in an inset."""
+_PLACES: Final = ((0.55, 0.36), (0.06, 0.36), (0.06, 0.06), (0.55, 0.06))
+_INSET: Final = (0.38, 0.42)
+"""Lower left corners and size of insets, fractions of the axes."""
 
 RING: Final[dict[str, Any]] = {
     "ls": "none",
@@ -101,6 +110,7 @@ def panel(
     if judged is not None and judged.period is not None and judged.period <= min(_CYCLE, len(x)):
         cycle = slice(len(x) - judged.period, None)
         ax.plot(x[cycle], v[cycle], **{**RING, "ms": size + 4.0}, gid="cycle", zorder=4.0)
+    _enlarged(ax, strobe, window, way, speed, size)
     if named:
         note(ax, shown_period(strobe.period), (0.97, 0.96), ha="right", color=style.INK)
     if named and judged is not None:
@@ -111,6 +121,36 @@ def panel(
     outside = int(np.count_nonzero(np.isfinite(strobe.x) & ~window.inside(strobe.x, strobe.v)))
     if outside:
         note(ax, f"{outside} outside", (0.97, 0.86), ha="right", fontsize=style.TINY)
+
+
+def _enlarged(ax: Axes, strobe: Strobe, window: Window, way: Scale, speed: Scale, size: float) -> None:
+    """Draw the attractor of a train without a period once more, larger, where it fills little of the panel.
+
+    The first half of the points may be a transient, and does not count.
+    """
+    judged = strobe.verdict
+    later = slice(len(strobe.x) // 2, None)
+    x, v = strobe.x[later], strobe.v[later]
+    inside = np.isfinite(x) & window.inside(x, v)
+    if judged is None or judged.period is not None or inside.sum() < _FEW:
+        return
+    width, height = (float(np.ptp(values[inside])) for values in (x, v))
+    whole = (window.x[1] - window.x[0]) * (window.v[1] - window.v[0])
+    if not 0.0 < width * height < _SMALL * whole:
+        return
+    shown = np.column_stack(
+        [
+            (strobe.x - window.x[0]) / (window.x[1] - window.x[0]),
+            (strobe.v - window.v[0]) / (window.v[1] - window.v[0]),
+        ]
+    )
+    corner, _covered = freest(shown[np.isfinite(shown).all(axis=1)], _INSET, _PLACES)
+    inset = ax.inset_axes((*corner, *_INSET), zorder=5.0)
+    inset.set_gid("attractor")
+    dots(inset, way.shown(x[inside]), speed.shown(v[inside]), 0.6 * size, style.BLUE, gid="attractor")
+    inset.margins(0.08)
+    inset.set(xticks=[], yticks=[])
+    ax.indicate_inset_zoom(inset, edgecolor=style.MUTED, lw=style.HAIR, alpha=1.0)
 
 
 def shown_period(period: float) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import beside, heading
+from printhammer.figures.elements.marks import beside, heading, legend_above
 from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_figure, new_panel, sign, styled
 from printhammer.figures.elements.timeline import between_surfaces, current_between
@@ -47,8 +47,19 @@ def plot(burst: LeastWork) -> Figure:
     span = 1.15 * burst.largest
     current.set_ylim(min(1.15 * float(run.current.min()), -0.2 * span), span)
     watts = coil_power(hammer, run.x, run.v, run.force["magnet"])
-    power.fill_between(ms * run.t, np.maximum(watts, 0.0), 0.0, color=style.ORANGE, lw=0.0, gid="given")
-    power.fill_between(ms * run.t, np.minimum(watts, 0.0), 0.0, color=style.GREEN, lw=0.0, gid="taken back")
+    power.fill_between(
+        ms * run.t,
+        np.maximum(watts, 0.0),
+        0.0,
+        color=style.ORANGE,
+        lw=0.0,
+        label="the coil gives",
+        gid="given",
+    )
+    power.fill_between(
+        ms * run.t, np.minimum(watts, 0.0), 0.0, color=style.GREEN, lw=0.0, gid="taken back"
+    ).set_label("the coil takes back")
+    legend_above(power, power.get_legend_handles_labels()[0])
     power.set_ylabel("Coil power  [W]")
     power.set_xlabel("Time  [ms]")
     motion.set_xlim(0.0, ms * min((1.0 + _AFTER) * burst.rest_time, run.end))
@@ -77,7 +88,9 @@ def _ledger(ax: Axes, burst: LeastWork) -> None:
     longest = max(value for _name, value, _colour in bars)
     ax.barh(rows, [value for _, value, _ in bars], color=[colour for *_, colour in bars], height=0.66)
     for row, (_name, value, _colour) in zip(rows.tolist(), bars, strict=True):
-        ax.text(value + 0.01 * longest, row, f"{value:.3f}", va="center", fontsize=style.SMALL)
+        ax.text(
+            value + 0.01 * longest, row, f"{round(value, 3) + 0.0:.3f}", va="center", fontsize=style.SMALL
+        )
     ends = [rows[2] - 0.45, rows[2] + 0.45]
     ax.plot([burst.bound_ratio] * 2, ends, color=style.INK, lw=style.LINE, gid="least positive work")
     ax.set_yticks(rows, [name for name, *_ in bars], fontsize=style.SMALL)

@@ -53,7 +53,12 @@ def plot(feedback: Feedback) -> Figure:
     heading(above[1], "what is farther off: at the ends", loc="right")
     heading(below[0], "The second of two dots")
     # Room for the legend above the bars.
-    above[1].set_ylim(0.0, (1.1 + 0.14 * len(feedback.strategies)) * above[1].get_ylim()[1])
+    room = 1.1 + 0.14 * len(feedback.strategies)
+    highest = above[1].get_ylim()[1]
+    above[1].set_ylim(0.0, room * highest)
+    for ax, top, limit, (_name, factor) in zip(above, (1.0, 1.0 / room), limits, units, strict=True):
+        dashed(ax.axvline, -limit * factor, limit * factor, ymax=top)
+        ax.set_yticks([tick for tick in ax.get_yticks() if 0.0 <= tick <= min(1.0, highest)])
     above[1].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
     remarks = [
         f"{name}: {int(lost)} dots are lost"
@@ -91,7 +96,6 @@ def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -
             "gid": name,
         }
         ax.stairs(counts / known.size, edges, color=colour, **how)
-    dashed(ax.axvline, -limit, limit)
     ax.set_xlim(-reach, reach)
 
 

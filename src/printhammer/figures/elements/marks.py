@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.text import Text
 
     from printhammer.hammer.hammer import Hammer
@@ -45,12 +44,12 @@ ALONG_Y: Final = ("axes fraction", "data")
 _LINE_NAME: Final = (0.095, 0.06)
 """Width and height of a name on a horizontal line, of the axes."""
 
-_APART: Final = 1.3
-"""Half the distance of the two lines of a double line, points."""
+_BELOW: Final = 30.0
+"""From a panel down to a legend below its numbers and name, points."""
 
 
 def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] = "y") -> None:
-    """Draw lines at backstop, pack and platen: horizontal single ones, or vertical double ones as in Fig. 2.
+    """Draw lines at backstop, pack and platen, the vertical ones with their names.
 
     The displacement is along `side` of the axes, whose limits are set before.
     """
@@ -59,11 +58,10 @@ def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] 
         at = float(shown.shown(place))
         if not low <= at <= high:
             continue
-        if side == "y":
-            line = ax.axhline(at, color=MUTED, lw=HAIR, zorder=1.0)
-            line.set_gid(name)
-        else:
-            _double_line(ax, at, name)
+        (ax.axhline if side == "y" else ax.axvline)(at, color=MUTED, lw=HAIR, zorder=1.0, gid=name)
+        if side == "x":
+            how = {"rotation": 90, "fontsize": SMALL, "zorder": 4.0, "bbox": HALO}
+            beside(ax, name, (at, 1.0), (-2.5, -4), "right top", xycoords=ALONG_X, **how)
 
 
 def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
@@ -91,28 +89,6 @@ def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
             fontsize=SMALL,
             zorder=4.0,
         )
-
-
-def _double_line(ax: Axes, at: float, name: str) -> None:
-    from matplotlib.transforms import ScaledTranslation
-
-    for number, shift in enumerate((-_APART, _APART)):
-        offset = ScaledTranslation(shift / 72.0, 0.0, ax.figure.dpi_scale_trans)
-        line = ax.axvline(at, color=MUTED, lw=HAIR, zorder=1.0)
-        line.set_transform(ax.get_xaxis_transform() + offset)
-        line.set_gid(f"{name}-{number}")
-    beside(
-        ax,
-        name,
-        (at, 1.0),
-        (-_APART - 2.0, -4),
-        "right top",
-        xycoords=ALONG_X,
-        rotation=90,
-        fontsize=SMALL,
-        zorder=4.0,
-        bbox=HALO,
-    )
 
 
 def note(ax: Axes, text: str, at: tuple[float, float], **options: Any) -> Text:
@@ -159,7 +135,7 @@ def dashed(line: Callable[..., Any], *levels: float, **options: Any) -> None:
 def legend_above(ax: Axes, handles: Sequence[Artist], **options: Any) -> None:
     """Write a legend in one line above the axes, from the left."""
     where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
-    ax.legend(handles=handles, fontsize=SMALL, frameon=False, ncols=len(handles), **where, **options)
+    ax.legend(handles=handles, fontsize=SMALL, ncols=len(handles), **{"frameon": False, **where, **options})
 
 
 def legend_in_columns(ax: Axes, handles: Sequence[Artist], columns: int, size: float = SMALL) -> None:
@@ -168,9 +144,18 @@ def legend_in_columns(ax: Axes, handles: Sequence[Artist], columns: int, size: f
     ax.legend(handles=handles, ncols=columns, fontsize=size, frameon=False, **where)
 
 
-def legend_below(figure: Figure, *entries: Any, **options: Any) -> None:
-    """Write a legend below all panels, from the left; `entries` and options are those of `Figure.legend`."""
-    figure.legend(*entries, loc="outside lower left", fontsize=SMALL, frameon=False, **options)
+def legend_below(ax: Axes, *entries: Any, **options: Any) -> None:
+    """Write a legend below a panel that has a name on its axis; options are those of `Axes.legend`.
+
+    What stands at the foot of the figure comes below it, as it does not with a legend of the figure.
+    """
+    from matplotlib.transforms import ScaledTranslation
+
+    down = ScaledTranslation(0.0, -_BELOW / 72.0, ax.figure.dpi_scale_trans)
+    where: dict[str, Any] = {"bbox_to_anchor": (0.0, 0.0), "bbox_transform": ax.transAxes + down}
+    ax.legend(
+        *entries, loc="upper left", borderaxespad=0.0, fontsize=SMALL, frameon=False, **where, **options
+    )
 
 
 def contact_spans(ax: Axes, motion: Motion, until: float, shown: Scale) -> None:

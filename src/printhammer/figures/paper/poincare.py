@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final, Literal
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import RING, panel, scales_of, shown_period
 from printhammer.figures.elements.curves import waveform_of
-from printhammer.figures.elements.marks import legend_below, note
+from printhammer.figures.elements.marks import note
 from printhammer.figures.elements.scales import Scale, label
-from printhammer.figures.elements.style import INK, new_figure, sign, styled
+from printhammer.figures.elements.style import INK, SMALL, new_figure, sign, styled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -91,7 +91,9 @@ def poincare(
         _edge(ax, "y", speed, column == 0, i + 1 == len(shown) or column == columns - 1)
     if any(line.get_gid() == "cycle" for ax in figure.axes for line in ax.lines):
         circles = Line2D([], [], label="last points of a periodic train", **RING)
-        legend_below(figure, handles=[circles], handletextpad=0.2)
+        figure.legend(
+            handles=[circles], loc="outside lower left", fontsize=SMALL, frameon=False, handletextpad=0.2
+        )
     by_scheme = [f"As {scheme} computes it on the schedule of 1983, short step: {reading}."] if scheme else []
     early = (
         f"The run at {shown_period(strobe.period)} ended early: {strobe.status}."

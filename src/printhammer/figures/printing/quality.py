@@ -52,21 +52,23 @@ def plot(quality: Quality) -> Figure:
     plane.legend(loc="upper right", fontsize=style.TINY, frameon=False, handletextpad=0.2)
     begin = _window(quality)
     shown = (quality.slot >= begin) & (quality.slot < begin + _MOST_SLOTS)
-    where, colours = quality.slot[shown], np.where(good[shown], style.BLUE, style.ORANGE)
+    first = quality.judged_from
+    where, colours = quality.slot[shown] - first, np.where(good[shown], style.BLUE, style.ORANGE)
     for ax, values, bound in ((force, share, 100.0 * limits.force), (arrival, late, _US * limits.arrival)):
         ax.axhspan(-bound, bound, color=style.FAINT, alpha=0.5, lw=0.0)
         ax.axhline(0.0, color=style.MUTED, lw=style.HAIR)
         ax.vlines(where, 0.0, values[shown], color=colours, lw=style.THIN)
         ax.scatter(where, values[shown], s=7.0, color=colours, lw=0.0)
-        gone = quality.slot[shown & np.isnan(values)]
+        gone = quality.slot[shown & np.isnan(values)] - first
         ax.plot(gone, np.zeros(gone.size), "x", ms=5.0, color=style.INK, gid="lost")
         reach = _reach(values, bound)
         ax.set_ylim(-reach, reach)
     force.set_ylabel("Force  [%]")
     arrival.set_ylabel("Arrival  [µs]")
     force.tick_params(axis="x", labelbottom=False)
-    arrival.set_xlabel("Slot" if begin == 0 else f"Slot; the {_MOST_SLOTS} with the worst dot")
-    arrival.set_xlim(begin - 1.0, min(begin + _MOST_SLOTS, len(quality.wanted)))
+    name = "Slot of the cycle" if first else "Slot"
+    arrival.set_xlabel(name if begin == 0 else f"{name}; the {_MOST_SLOTS} with the worst dot")
+    arrival.set_xlim(begin - first - 1.0, min(begin + _MOST_SLOTS, len(quality.wanted)) - first)
     within = f"{int(good.sum())} of {good.size} dots within limits"
     heading(force, f"{quality.rate:g} Hz, {quality.strategy}: {within}")
     sign(figure, quality.hammer, "" if quality.ok else f"The run ended early: {quality.status}.")

@@ -93,7 +93,7 @@ def recover(
     built = hammer.replace("mass", hammer.mass * (1.0 + _START * float(rng.uniform(-1.0, 1.0))))
     for fit in fits.values():
         built = fit.into(built)
-    fits["motion"] = fit_motion([paths["motion"]], built, earlier=tuple(fits.values()))
+    fits["motion"] = fit_motion([paths["motion"]], built)
     constants = {
         key: constant for fit in fits.values() for key, constant in fit.constants.items() if constant.in_file
     }

@@ -6,11 +6,15 @@ forces only over the mass: if the mass and all forces are multiplied by one numb
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.errors import InputError, located, nearest
+from printhammer.hammer.uncertainty import Uncertainty
 from printhammer.identify.lowpass import time_constant
 from printhammer.identify.result import REPLACED, Fit, FittedConstant
 from printhammer.identify.shots.approach import Prior
@@ -23,7 +27,6 @@ from printhammer.identify.shots.shot import FEWEST, Shot, read_shot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
@@ -54,7 +57,9 @@ def fit_motion(
         Records with the columns ``time``, ``displacement`` and perhaps ``current``, units in the heading; one
         shot a file, the firing at time 0, from rest.
     hammer : Hammer
-        Holds all constants that are not fitted, and is where the fit begins.
+        Holds all constants that are not fitted, and is where the fit begins. Those that it knows with an
+        error, `Hammer.uncertainty`, are not exact but known with their covariance; the records improve them,
+        and they are among the constants found.
     free : sequence of str, optional
         Keys of the constants to fit; by default the mass, and the damping of a Hertz backstop if a record
         touches it.
@@ -64,9 +69,7 @@ def fit_motion(
         Of the sensor (-3 dB), Hz; by default what a comment ``# bandwidth: 200 kHz`` of a record says, and
         else unlimited. The column of currents is taken to come through a like sensor.
     earlier : sequence of Fit, optional
-        Fits from which constants of the hammer come. Theirs are then not exact, but known with their
-        covariance; the records may improve them, and they are among the constants found. Of a constant in
-        several fits, the first counts.
+        Fits that are put into the hammer first. Of a constant in several fits, the first counts.
 
     Returns
     -------
@@ -76,20 +79,24 @@ def fit_motion(
     Raises
     ------
     InputError
-        A record cannot be used, misses the impact, or is too short or too coarse; a constant cannot be found
-        from it, or not be told apart from others.
+        A record cannot be used, misses the impact, or is too short or too coarse; the constants of the hammer
+        were fitted to it before; a constant cannot be found from it, or not be told apart from others.
     """
     if isinstance(paths, str) or not paths:
         raise InputError(f"paths = {paths!r}, expected a sequence of at least one record")
     if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0.0):
         raise InputError(f"bandwidth = {bandwidth!r} Hz, expected a positive number")
+    for each in reversed(earlier):
+        hammer = each.into(hammer)
     shots = [read_shot(path, hammer, bandwidth) for path in paths]
+    records = _unused(paths, hammer)
     touched = any(shot.touching("backstop") for shot in shots)
     keys = _free_keys(hammer, free, shots, touched=touched)
     hammer = _plain(hammer, keys)
-    keys = tuple(dict.fromkeys([*keys, *(key for fit in earlier for key in _usable(hammer, fit))]))
     pulses, notes = _pulses(hammer, shots)
-    start, parameters, priors, own = _assembled(hammer, keys, pulses, earlier)
+    known = _known(hammer, own_waveform=None in pulses)
+    keys = tuple(dict.fromkeys([*keys, *known.keys]))
+    start, parameters, priors, own = _assembled(hammer, keys, pulses, known)
     shooting = Shooting(hammer, shots, own, parameters)
     where = " and ".join(shot.name for shot in shots)
     with located(where):
@@ -101,7 +108,7 @@ def fit_motion(
         solution = fit.solve(start, states)
     if not touched and hammer.backstop is not None:
         notes.append("no record touches the backstop after the shot: its damping cannot be found from them")
-    return _result(hammer, shots, fit, solution, keys, notes)
+    return replace(_result(hammer, shots, fit, solution, keys, notes), records=records)
 
 
 def _free_keys(
@@ -156,9 +163,24 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
     return hammer
 
 
-def _usable(hammer: Hammer, fit: Fit) -> list[str]:
-    """Return the constants of an earlier fit that the hammer has."""
-    return [key for key in fit.keys if key in hammer.constants and fit.constants[key].in_file]
+def _known(hammer: Hammer, *, own_waveform: bool) -> Uncertainty:
+    """Return which constants that move the armature are known with an error, and how well."""
+    known = hammer.uncertainty or Uncertainty((), np.empty((0, 0)))
+    idle = ("platen", "coil.") if own_waveform else ("platen", "coil.", "waveform.")
+    return known.without([key for key in known.keys if key.startswith(idle)])
+
+
+def _unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
+    """Return the fingerprints of records; refuse one that the constants of the hammer come from already."""
+    prints = tuple(hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16] for path in paths)
+    used = hammer.uncertainty.records if hammer.uncertainty is not None else ()
+    for path, print_ in zip(paths, prints, strict=True):
+        if print_ in used:
+            raise InputError(
+                f"{path}: the constants of {hammer.path} were fitted to this record already, expected"
+                " another record, or the hammer from before that fit"
+            )
+    return prints
 
 
 def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], list[str]]:
@@ -179,20 +201,15 @@ def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], 
 
 
 def _assembled(
-    hammer: Hammer, keys: tuple[str, ...], pulses: Sequence[Pulse | None], earlier: Sequence[Fit]
+    hammer: Hammer, keys: tuple[str, ...], pulses: Sequence[Pulse | None], known: Uncertainty
 ) -> tuple[FloatArray, Parameters, list[Prior], list[Pulse | None]]:
     """Return where to begin, the parameters, what is known of them, and the current of each shot."""
     start = [hammer.constants[key].si for key in keys]
     priors: list[Prior] = []
-    taken: set[str] = set()
-    for fit in earlier:
-        here = [key for key in _usable(hammer, fit) if key not in taken]
-        taken |= set(here)
-        if here:
-            rows = [fit.keys.index(key) for key in here]
-            mean = np.array([fit.constants[key].value for key in here])
-            which = np.array([keys.index(key) for key in here])
-            priors.append(Prior(which, mean, _definite(fit.covariance[np.ix_(rows, rows)], mean)))
+    if known.keys:
+        mean = np.array([hammer.constants[key].si for key in known.keys])
+        which = np.array([keys.index(key) for key in known.keys])
+        priors.append(Prior(which, mean, _definite(known.covariance, mean)))
     own: list[Pulse | None] = []
     owners: list[int] = []
     common = [key for key in keys if key.startswith("waveform.")]
@@ -225,7 +242,7 @@ def _assembled(
 
 def _definite(covariance: FloatArray, values: FloatArray) -> FloatArray:
     """Return a covariance with a little added, so that what is exactly known can be inverted."""
-    return covariance + np.diag((1e-12 * values) ** 2)
+    return covariance + np.diag((1e-12 * values) ** 2 + 1e-13 * covariance.diagonal())
 
 
 def _result(

@@ -198,8 +198,9 @@ def motion(
 ) -> Answer:
     """Find the mass, the damping of the backstop and what else single shots tell.
 
-    Constants of the hammer count as exact. Those found in tables given with --magnet, --spring, --pack and
-    --backstop count as known with their errors instead, and the shots may improve them.
+    Constants of the hammer that have standard errors in its file, as --into of other fits writes them, count
+    as known with these errors, and the shots improve them; the others count as exact. Tables given with
+    --magnet, --spring, --pack and --backstop are fitted first.
     """
 
     def made(known: Hammer | None) -> Fit:
@@ -209,10 +210,9 @@ def motion(
             raise InputError("the hammer is missing, expected --hammer with the constants known already")
         keys = [key.strip() for key in free.split(",")] if free is not None else None
         tables = opt.given(magnet=magnet, spring=spring, pack=pack, backstop=backstop)
-        fits = _earlier_fits(tables, known, passed["robust"])
-        for fit in fits:
+        for fit in _earlier_fits(tables, known, passed["robust"]):
             known = fit.into(known)
-        return fit_motion(files, known, free=keys, earlier=fits, **passed)
+        return fit_motion(files, known, free=keys, **passed)
 
     return _fitted(job, hammer, strict, made)
 

@@ -1,0 +1,112 @@
+"""Measure how often the intervals at the end of the recipe of ``docs/howto/fitting.md`` hold, run as printed.
+
+Run it with ``.venv/bin/python docs/measure/recipe.py``; it takes some 25 minutes. ``--labs N`` for another
+number of synthetic laboratories, whose seeds are 0 to N - 1.
+"""
+
+import argparse
+import math
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from measured import MOTION, ROOT, Cell, Column, write
+from scipy.stats import beta
+
+import printhammer as ph
+from printhammer.identify.bench.recovery import true_value
+from printhammer.identify.result import CONFIDENCE, student
+
+PAGE = ROOT / "docs" / "howto" / "fitting.md"
+GUESS = 1.15
+"""Of the mass, which the recipe begins with, over the true one."""
+
+
+def recipe() -> list[list[str]]:
+    """Return the commands of the page, without the pictures."""
+    block = next(
+        text for text in re.findall(r"```sh\n(.*?)```", PAGE.read_text("utf-8"), re.S) if "motion" in text
+    )
+    lines = [re.sub(r" --plot \S+", "", line) for line in block.splitlines() if line]
+    return [shlex.split(line)[1:] for line in lines]
+
+
+def run(arguments: list[str], folder: str) -> None:
+    """Run a command of the program in a folder, silently."""
+    done = subprocess.run(
+        [sys.executable, "-m", "printhammer", *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise RuntimeError(f"{shlex.join(arguments)}: {done.stderr}")
+
+
+def laboratory(hammer: ph.Hammer, seed: int, commands: list[list[str]]) -> ph.Hammer:
+    """Measure a hammer and return what the recipe makes of the tables."""
+    with tempfile.TemporaryDirectory() as folder:
+        hammer.save(Path(folder) / "true.toml")
+        hammer.replace("mass", GUESS * hammer.mass).save(Path(folder) / "base.toml")
+        run(["measure", "all", "true.toml", "--out", ".", "--seed", str(seed)], folder)
+        for command in commands:
+            run(command, folder)
+        return ph.load(Path(folder) / "hammer.toml")
+
+
+def table(made: list[ph.Hammer], truth: ph.Hammer) -> list[list[Cell]]:
+    """Return a row for each constant, and one for all."""
+    rows: list[list[Cell]] = []
+    every = made[0].uncertainty
+    keys = every.keys if every is not None else ()
+    total = 0
+    for key in keys:
+        true = true_value(truth, key)
+        errors = np.array([one.uncertainty.error(key) for one in made if one.uncertainty is not None])
+        off = np.array([one.constants[key].si - true for one in made]) / errors
+        held = int((np.abs(off) <= student(math.inf)).sum())
+        total += held
+        share = 100.0 * float(np.median(errors)) / true
+        rows.append(
+            [f"`{key}`", f"{held} of {len(made)}", _between(held, len(made)), share, float(off.mean())]
+        )
+    rows.append(["all", f"{total} of {len(made) * len(keys)}", None, None, None])
+    return rows
+
+
+def _between(held: int, count: int) -> str:
+    """Return the 95 % interval of the share of intervals that hold, after Clopper and Pearson."""
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    low = beta.ppf(tail, held, count - held + 1) if held else 0.0
+    high = beta.ppf(1.0 - tail, held + 1, count - held) if held < count else 1.0
+    return f"{100.0 * low:.1f} to {100.0 * high:.1f}"
+
+
+def main() -> None:
+    """Measure the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--labs", type=int, default=100)
+    options = parser.parse_args()
+    truth, commands = ph.load("hendriks-1983"), recipe()
+    made = []
+    for seed in range(options.labs):
+        made.append(laboratory(truth, seed, commands))
+        print(f"laboratory {seed}", flush=True)
+    columns = [
+        Column(name="constant"),
+        Column(name="intervals that hold"),
+        Column(name="their share, 95 % interval", unit="%"),
+        Column(name="standard error", unit="%", format=".2g"),
+        Column(name="mean error in standard errors", format="+.2f"),
+    ]
+    rooms = (*MOTION, "identify")
+    write("recipe", columns, table(made, truth), {"laboratories": options.labs}, rooms)
+
+
+if __name__ == "__main__":
+    main()

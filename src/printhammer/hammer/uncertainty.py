@@ -1,0 +1,147 @@
+"""How well the constants of a hammer are known: standard errors and correlations, as its file keeps them.
+
+A fit writes them beside its constants, and the next fit that takes these as known counts with them. In the
+file they are a table ``[uncertainty]``: ``constants``, their ``standard_errors`` with units, the
+``correlation`` of each constant with those before it, and the ``records`` of motions that are used up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError, located
+from printhammer.support.constants import Constant, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Container
+
+    from printhammer.support.arrays import FloatArray
+
+UNCERTAINTY: Final = "uncertainty"
+"""Name of the table in a hammer file."""
+
+ENTRIES: Final = {
+    "constants": "dotted keys of the constants that are not known exactly",
+    "standard_errors": "of each, text with its unit",
+    "correlation": "of each constant but the first, with all those before it",
+    "records": "fingerprints of the records of motion that the constants were fitted to",
+}
+_NEGATIVE: Final = -1e-9
+"""Least eigenvalue of a matrix of correlations that may be one, but for rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """What is known of the errors of constants."""
+
+    keys: tuple[str, ...]
+    """Dotted keys."""
+    covariance: FloatArray
+    """SI, shape (n, n)."""
+    records: tuple[str, ...] = ()
+    """Fingerprints of the records of motion that went into it."""
+
+    def error(self, key: str) -> float:
+        """Return a standard error, SI; 0 of a constant that is not among them."""
+        return float(np.sqrt(self.covariance.diagonal()[self.keys.index(key)])) if key in self.keys else 0.0
+
+    def without(self, gone: Container[str]) -> Uncertainty:
+        """Return what is known of the other constants."""
+        rows = [row for row, key in enumerate(self.keys) if key not in gone]
+        keys = tuple(self.keys[row] for row in rows)
+        return Uncertainty(keys, self.covariance[np.ix_(rows, rows)], self.records)
+
+    def table(self, units: Mapping[str, str]) -> dict[str, Any] | None:
+        """Return the table of a file, SI units by key; None where every constant is exact."""
+        errors = np.sqrt(self.covariance.diagonal())
+        exact = [key for key, error in zip(self.keys, errors.tolist(), strict=True) if not error > 0.0]
+        if exact:
+            return self.without(exact).table(units)
+        if not self.keys:
+            return None
+        correlation = self.covariance / np.outer(errors, errors)
+        return {
+            "constants": list(self.keys),
+            "standard_errors": [
+                f"{e!r} {units[key]}" for key, e in zip(self.keys, errors.tolist(), strict=True)
+            ],
+            "correlation": [correlation[row, :row].tolist() for row in range(1, len(self.keys))],
+            "records": list(self.records),
+        }
+
+
+def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertainty:
+    """Read the table of a file, given the constants of the hammer.
+
+    Raises
+    ------
+    InputError
+        It names what is no constant of the hammer, a standard error is no positive quantity of its
+        dimension, or the correlations are none.
+    """
+    if not isinstance(table, Mapping):
+        raise InputError(f"{UNCERTAINTY} = {shown(table)}: expected a table [{UNCERTAINTY}]")
+    unknown = [name for name in table if name not in ENTRIES]
+    if unknown:
+        raise InputError(
+            f"the key {UNCERTAINTY}.{unknown[0]} is not known, expected one of {', '.join(ENTRIES)}"
+        )
+    keys, errors, records = (_texts(table, name) for name in ("constants", "standard_errors", "records"))
+    for row, key in enumerate(keys):
+        if key not in constants or key in keys[:row]:
+            why = "the hammer has no such constant" if key not in constants else "it is there twice"
+            raise InputError(
+                f"{UNCERTAINTY}.constants: {key!r}, {why}, expected each constant of the hammer at most once"
+            )
+    if len(errors) != len(keys):
+        raise InputError(
+            f"{UNCERTAINTY}.standard_errors has {len(errors)} entries, expected {len(keys)}, one a constant"
+        )
+    sizes = np.array([_error(key, text, constants[key]) for key, text in zip(keys, errors, strict=True)])
+    return Uncertainty(keys, _correlation(table, len(keys)) * np.outer(sizes, sizes), records)
+
+
+def _texts(table: Mapping[str, Any], name: str) -> tuple[str, ...]:
+    values = table.get(name, [])
+    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        raise InputError(f"{UNCERTAINTY}.{name} = {shown(values)}: expected a list of texts")
+    return tuple(values)
+
+
+def _error(key: str, text: str, constant: Constant) -> float:
+    from printhammer.units import parse
+
+    with located(f"{UNCERTAINTY}: the standard error of {key} = {text}"):
+        size = parse(text, constant.si_unit)
+    if not 0.0 < size < float("inf"):
+        raise InputError(f"{UNCERTAINTY}: the standard error of {key} is {text}, expected more than 0")
+    return size
+
+
+def _correlation(table: Mapping[str, Any], count: int) -> FloatArray:
+    """Return the matrix of correlations; without any written, the constants are independent."""
+    matrix = np.eye(count)
+    rows = table.get("correlation", [])
+    wanted = f"expected {max(count - 1, 0)} rows of 1, 2, ... numbers, those of a covariance"
+    if not isinstance(rows, list) or len(rows) not in (0, max(count - 1, 0)):
+        raise InputError(f"{UNCERTAINTY}.correlation = {shown(rows)}: {wanted}")
+    for number, row in enumerate(rows, 1):
+        if not _numbers(row, number):
+            raise InputError(f"{UNCERTAINTY}.correlation, row {number} = {shown(row)}: {wanted}")
+        matrix[number, :number] = matrix[:number, number] = row
+    if count and not np.linalg.eigvalsh(matrix)[0] > _NEGATIVE:
+        raise InputError(f"{UNCERTAINTY}.correlation is that of no covariance, {wanted}")
+    return matrix
+
+
+def _numbers(row: Any, count: int) -> bool:
+    if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != count:
+        return False
+    return all(
+        isinstance(entry, (int, float)) and not isinstance(entry, bool) and abs(entry) <= 1.0 + 1e-9
+        for entry in row
+    )
