@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 from tests.candidates import near_points, random_points, some_candidates
 
 from printhammer.claims import Context, claims, judge
-from printhammer.reconstruction.search import losses
+from printhammer.claims.verdicts import printed_verdicts
+from printhammer.reconstruction.search import losses, panel_losses
 from printhammer.reconstruction.search.candidates import Candidate, candidates
 from printhammer.reconstruction.search.evaluation import AIMS, WEIGHTS, evaluate, rows
 from printhammer.reconstruction.search.losses import Score, hinge
+from printhammer.reconstruction.search.map_losses import sensitivity
 from printhammer.reconstruction.search.panel_losses import FIRINGS, panels
 
 QUICK = (
@@ -68,7 +70,7 @@ def test_what_is_not_known_counts_in_full() -> None:
 def test_only_stated_claims_lead_one_search_and_typical_ones_neither() -> None:
     kinds = {aim: {claims()[name].kind for name in weights} for aim, weights in WEIGHTS.items()}
     led = {"stated", "shape"}
-    assert kinds == {"stated": {"stated"}, "all": led, "panels": led, "buzz": led}
+    assert kinds == {"stated": {"stated"}, "all": led, "panels": led, "buzz": led, "claims": led}
     # What leads the first search leads the second too, with the same weight.
     assert WEIGHTS["stated"].items() <= WEIGHTS["all"].items()
 
@@ -232,3 +234,34 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
     # A short train tells period from chaos in most panels; the claim alone decides.
     assert right > 0.75 * seen
     assert seen > 12
+
+
+@pytest.mark.slow
+def test_the_looks_of_map_and_cloud_are_about_those_of_the_claims() -> None:
+    shipped = candidates(near_points(3, 5, 0.002, "hendriks-1983"))
+    chosen = tuple(each for each in shipped if each is not None)
+    scores = looked_at(chosen)
+    panels(chosen, scores)
+    losses.hung(chosen, scores)
+    sensitivity(chosen, scores)
+    for candidate, score in zip(chosen, scores, strict=True):
+        context = Context(candidate.hammer)
+        apart = judge(context, claims()["successive_points_apart"])
+        assert (score.losses["successive_points_apart"] == 0.0) == (apart.verdict == "holds")
+        value = judge(context, claims()["map_sensitivity"]).value
+        assert value is not None
+        # A few bursts make most of it, and the claim looks at twice as many.
+        assert score.measured["sensitivity"] == pytest.approx(value["erratic_over_low"], rel=0.6)
+
+
+@pytest.mark.parametrize(("late", "loss"), [(0.3, 0.0), (0.15, 0.5), (0.0, 1.0)])
+def test_six_panels_of_eight_are_to_jump_about(late: float, loss: float) -> None:
+    strange = [period for period, name in printed_verdicts().items() if name == "strange"]
+    ratios = dict.fromkeys(printed_verdicts(), 1.0) | dict.fromkeys(strange[5:], late)
+    assert panel_losses._successive(ratios) == pytest.approx(loss)
+
+
+def test_what_just_fails_counts_where_the_number_of_claims_leads() -> None:
+    score = Score({"settle_out": 0.1, "low_restitution": 0.0})
+    weights = {"settle_out": 2.0, "low_restitution": 1.0, "poincare": 4.0}
+    assert score.total(weights, 0.4) == pytest.approx(2.0 * (0.4 + 0.6 * 0.1) + 4.0)
