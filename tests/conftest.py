@@ -1,6 +1,7 @@
 """Fixtures and settings shared by all tests."""
 
 import os
+import signal
 
 import pytest
 from hypothesis import settings
@@ -9,6 +10,10 @@ from tests.hammers import CRUDE
 import printhammer as ph
 
 os.environ["MPLBACKEND"] = "Agg"
+
+# A job in the background ignores Ctrl-C, and so would every program that a test starts and interrupts.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Compilation makes first examples slow; the same examples on every run make a failure somebody else's too.
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import printhammer as ph
 from printhammer.drive.batch import firings_of, joined
+from printhammer.drive.ragged import Ragged
 from printhammer.drive.waveforms.shapes import HalfSine, Sine
-from printhammer.support.ragged import Ragged
 
 PULSE = HalfSine(amplitude=1.0, width=3e-4)
 

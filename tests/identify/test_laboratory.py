@@ -158,7 +158,7 @@ def test_a_record_begins_before_the_firing_at_rest() -> None:
     np.testing.assert_allclose(np.diff(t), 2e-6, rtol=1e-9)
     assert (x[t <= 0.0] == ph.rest_state(HAMMER)).all()
     assert (measured.values["current"][t < 0.0] == 0.0).all()
-    motion = ph.simulate(HAMMER, ph.PulseTrain(HAMMER.waveform), times=t[t >= 0.0], duration=2e-3)
+    motion = ph.simulate(HAMMER, ph.PulseTrain(HAMMER.waveform), times=t[t >= 0.0], duration=1e-3)
     np.testing.assert_array_equal(x[t >= 0.0], motion.x)
 
 

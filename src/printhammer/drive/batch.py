@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Self, SupportsIndex, overload
 import numpy as np
 
 from printhammer.drive.input import MOST_PULSES, PULSES, checked_times, read_array, read_count, read_positive
+from printhammer.drive.ragged import Ragged, starts_of
 from printhammer.drive.trains import Drive, Overlap, PulseTrain
 from printhammer.errors import InputError
-from printhammer.support.ragged import Ragged, starts_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -15,6 +15,7 @@ import numpy as np
 
 from printhammer.drive.batch import PulseTrains, firings_of
 from printhammer.drive.input import read_array
+from printhammer.drive.ragged import Ragged
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
@@ -23,7 +24,6 @@ from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job
 from printhammer.run.fired import Fired
 from printhammer.run.problem import TOLERANCE, check_tolerance, laws_of
 from printhammer.run.start import check_branch, initial_state
-from printhammer.support.ragged import Ragged
 from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, thread_count
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.drive.ragged import Ragged, starts_of
 from printhammer.kernel.lanes import layout as lane_layout
 from printhammer.kernel.model.layout import MAGNET, PLACES
 from printhammer.kernel.single import carry
 from printhammer.run.problem import MAX_STEPS, Problem, scales_of
-from printhammer.support.ragged import Ragged, starts_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -50,7 +50,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     studio.sentAt.set(message("state", { state: studio.store.state }), now);
     studio.changedAt = null;
     clearTimeout(patience);
-    patience = setTimeout(() => { if (studio.busy) studio.say("computing; laws that are new to this machine are compiled once, for some seconds"); }, 1200);
+    patience = setTimeout(() => { if (studio.busy) studio.say("computing; laws that are new to this machine are compiled once: some ten seconds before the curves, as many before the map"); }, 1200);
     for (const serial of studio.sentAt.keys()) if (serial < studio.serial - 64) studio.sentAt.delete(serial);
   };
 
