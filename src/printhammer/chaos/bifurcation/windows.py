@@ -64,9 +64,9 @@ class Route(Declared):
     @property
     def sentence(self) -> str:
         """The finding in a sentence, with the value in SI."""
-        return self.told_with("{:.9g}".format)
+        return self.worded("{:.9g}".format)
 
-    def told_with(self, shown: Callable[[float], str]) -> str:
+    def worded(self, shown: Callable[[float], str]) -> str:
         """Return the finding in a sentence, with the value as `shown` writes it."""
         way = ", ".join(window.verdict for window in self.before) or "nothing"
         if not self.complete:

@@ -183,7 +183,7 @@ def sentences(result: Bifurcation) -> list[str]:
     several = len(result.directions) > 1
     for direction in result.directions:
         lines += [
-            (f"{direction}: " if several else "") + route.told_with(lambda value: f"{shown(value)} {unit}")
+            (f"{direction}: " if several else "") + route.worded(lambda value: f"{shown(value)} {unit}")
             for route in result.routes(direction)
         ]
     if several:
