@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 
 import pytest
 from hypothesis import settings
@@ -19,6 +21,26 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 settings.register_profile("explore", deadline=None, max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile what most tests need once, before workers of their own do it side by side."""
+    if config.getoption("numprocesses", None) and not hasattr(config, "workerinput") and not compiled():
+        subprocess.run([sys.executable, "-m", "printhammer", "warm", CRUDE], check=True, capture_output=True)
+
+
+def compiled() -> bool:
+    """Tell whether the machine code for the hammer of most tests is on disk."""
+    from printhammer.kernel.compile import specialise
+    from printhammer.run.problem import laws_of
+
+    hammer = ph.load(CRUDE)
+    assert hammer.waveform is not None
+    needed: list[str] = []
+    specialise.announce = needed.append
+    _ = specialise.specialise(laws_of(hammer, ph.PulseTrain(hammer.waveform))).run
+    specialise.announce = None
+    return not needed
 
 
 @pytest.fixture(scope="session")
