@@ -140,7 +140,8 @@ def test_the_comparison(controller: Controller, monkeypatch: pytest.MonkeyPatch,
         controller.hammer, RATE, gaps=[0.6e-3, 1.1e-3], progress=lambda *step: steps.append(step)
     )
     assert steps == sorted(steps)
-    assert len(steps) > 8
+    # The controller is there already, whose making is most of the steps.
+    assert len(steps) > 3
     assert steps[0][0] == 0
     assert 0.9 < steps[-1][0] / steps[-1][1] < 1.0
     assert isinstance(found, Feedback)
