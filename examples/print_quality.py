@@ -18,9 +18,9 @@ contact.
 import printhammer as ph
 
 hammer = ph.load("hendriks-1983")
-found = ph.safe_rate(hammer, first=600, last=1100, step=25, stop=False, tolerance=5e-7)
-found.plot()
-print(f"safe up to {found.rate:g} Hz. {found.failure.text}")
+safe = ph.safe_rate(hammer, first=600, last=1100, step=25, stop=False, tolerance=5e-7)
+picture = safe.plot()
+print(f"safe up to {safe.rate:g} Hz. {safe.failure.text}")
 
 # %%
 # Beyond the safe rate there are good and bad rates. Of the worst of them the quality
@@ -28,9 +28,9 @@ print(f"safe up to {found.rate:g} Hz. {found.failure.text}")
 # paper tells of 200 µs from peak to peak for dot matrix printing, and of a few tens of
 # microseconds for engraved characters.
 
-worst = found.rates[(found.force_high - found.force_low).argmax()]
+worst = safe.rates[(safe.force_high - safe.force_low).argmax()]
 report = ph.quality(hammer, worst)
-report.plot()
+picture = report.plot()
 good = (report.fault < 0).sum()
 print(f"{good} of {len(report.fault)} dots within limits at {worst:g} Hz")
 print(f"flight times differ by {1e6 * report.flight_time_spread.peak_to_peak:.0f} µs")
@@ -43,5 +43,5 @@ print(f"the backstop takes {1e3 * report.backstop_loss:.2f} mJ a dot")
 # within 1 % of those of the design, and tried at one rate.
 
 hammers = ph.tolerance_yield(hammer, 825, number=32, spreads=0.01)
-hammers.plot()
+picture = hammers.plot()
 print(f"{100 * hammers.share:.0f} % of the hammers print well at {hammers.rate:g} Hz")

@@ -42,6 +42,22 @@ def test_an_example_uses_the_public_names(script: Path) -> None:
     assert ours == {"printhammer"}
 
 
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_a_picture_is_the_last_value_of_its_block_or_has_a_name(script: Path) -> None:
+    # What the gallery does not find it does not show.
+    lost = [
+        ast.unparse(node)
+        for block in script.read_text("utf-8").split("# %%")
+        for node in ast.parse(block).body[:-1]
+        if isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Call)
+        and isinstance(node.value.func, ast.Attribute)
+        and node.value.func.attr == "plot"
+        and not node.value.args
+    ]
+    assert lost == []
+
+
 @pytest.mark.parametrize("name", sorted(PARTS))
 def test_a_part_from_outside_uses_what_parts_are_made_of(name: str) -> None:
     ours = {name for name in imported(EXAMPLES / f"{name}.py") if name.startswith("printhammer")}
