@@ -43,7 +43,7 @@ axes[-1].set_xlabel("place of the dot (slots)")
 # What the firmware gets: a pulse fired later and for less time where the hammer
 # is caught on the rise from the backstop.
 
-table.plot()
+picture = table.plot()
 
 # %%
 # A table sees nothing. Beside its gain stands what it loses when the hammer is not
@@ -51,6 +51,6 @@ table.plot()
 
 cases = (ph.Perturbation(), ph.Perturbation(current=0.03), ph.Perturbation(current=0.1))
 report = ph.judge_table(hammer, table, perturbations=cases)
-report.plot()
+picture = report.plot()
 for name, share in zip(report.hammers, report.good.mean(axis=(2, 3)).T, strict=True):
     print(f"{name:15}  open loop {share[0]:6.1%}  table {share[1]:6.1%}")

@@ -58,7 +58,7 @@ for hammer in (ideal, paper):
 # number of bounces that fit into a period changes.
 
 overview = ph.bifurcation(ideal, periods=np.linspace(1.1e-3, 1.6e-3, 121), refine=0)
-overview.plot()
+picture = overview.plot()
 
 # %%
 # One of the windows, followed by continuation. The orbit of one firing is born in a
@@ -95,7 +95,7 @@ cascade = ph.bifurcation(
     firings=1000,
     transient=800,
 )
-cascade.plot()
+picture = cascade.plot()
 print(*sorted({w.period for w in cascade.windows("from rest") if w.period}))
 
 # %%
