@@ -96,12 +96,11 @@ def read_drive(
         As for `load_drive`.
     """
     try:
-        return drive_of(tomllib.loads(text), waveform, name=name, folder=folder)
-    except InputError:
-        raise
+        data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         # tomllib raises a bare ValueError for a number of thousands of digits.
         raise InputError(f"{name}: expected TOML ({' '.join(str(error).split())})") from None
+    return drive_of(data, waveform, name=name, folder=folder)
 
 
 def drive_of(
