@@ -89,8 +89,8 @@ class _Whole(_Part):
 
 
 def _library(state: Any, kind: type[_Part]) -> None:
-    state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
-    state.library.enable_object_caching()
+    library = state["library"] = kind(state.targetctx.codegen(), state.func_id.func_qualname)
+    library.enable_object_caching()  # type: ignore[no-untyped-call]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
@@ -105,7 +105,7 @@ class _LowerPart(NativeLowering):
         lowered = state["cr"]
         # Callers know a function by its entry point, which has to be a built-in; nobody calls this one.
         key = dict[str, str]().__getitem__
-        state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
+        state.targetctx.insert_user_function(key, lowered.fndesc, [state["library"]])
         state["cr"] = _LowerResult(lowered.fndesc, lowered.call_helper, cfunc=key, env=lowered.env)
         return True
 

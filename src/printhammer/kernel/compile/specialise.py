@@ -53,6 +53,7 @@ _PLAIN = (
     "lanes.batch",
     "methods.hermite",
     "compile.compiling",
+    "compile.linking",
     "methods.dop853_tableau",
     "methods.nystrom8_tableau",
 )
