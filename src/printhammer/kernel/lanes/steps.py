@@ -94,7 +94,9 @@ def settle(
     event = R.SWITCH if (small and not sure) else 0.0
     event += R.SAMPLED if (valid and t1 >= pool[R.SAMPLE * BLOCK + i]) else 0.0
     event += R.AT_EDGE if (valid and edge) else 0.0
-    most = R.MANY_STEPS if following < R.SHORT * abs(t1) else R.MOST_STEPS
+    most = pool[R.MOST_STEPS * BLOCK + i]
+    # In the backstop lengths are in s, which says nothing about time.
+    most = min(most, R.MANY_STEPS) if abs(t1 - t) < R.SHORT * abs(t1) else most
     stuck = not (small or following > 1e-14 * scale) or steps > most
     event = R.STUCK if (stuck or (small and outside)) else event
     pool[R.EVENT * BLOCK + i] = event
