@@ -102,11 +102,13 @@ def simulate(
 def announce_compiling(callback: Callable[[str], None] | None) -> None:
     """Have `callback` called with one sentence before machine code is made that is not kept on disk yet.
 
-    And, once, where it cannot be kept there.
+    And, once, where it cannot be kept there. A second process then helps to compile.
     """
     from printhammer.kernel.compile import cache, specialise
+    from printhammer.run import ahead
 
     specialise.announce = cache.announce = callback
+    specialise.begin_ahead = None if callback is None else ahead.begin
 
 
 def end_of_run(drive: Drive, duration: float | str | None) -> float:

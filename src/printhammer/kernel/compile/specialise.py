@@ -74,6 +74,15 @@ _LAW_FUNCTIONS = {
 announce: Callable[[str], None] | None = None
 """Called with one sentence before machine code is made that is not in the cache on disk."""
 
+begin_ahead: Callable[[Laws], Callable[[], None]] | None = None
+"""Called with the laws before `run` is compiled: has the entry points `AHEAD` compiled elsewhere meanwhile.
+
+What it returns waits for these.
+"""
+
+AHEAD = ("peaks", "quadratures", "resample")
+"""Entry points that whoever runs a hammer wants next."""
+
 
 class Kernel:
     """The compiled functions of one combination of laws.
@@ -83,6 +92,9 @@ class Kernel:
     `lanes` or `flow`. The `label` says what the kernel is for, the `digest` is that of all its sources, and
     the `namespace` has all that its modules define, for what builds on them.
     """
+
+    laws: Laws | None = None
+    _wait: Callable[[], None] | None = None
 
     def __init__(
         self, modules: dict[str, ModuleType], label: str, namespace: dict[str, Any], digest: str
@@ -104,11 +116,18 @@ class Kernel:
             function = self.__dict__["_entries"][name]
         except KeyError:
             raise AttributeError(name) from None
-        if announce is not None and not self._announced and not _is_ready(function):
-            from printhammer.kernel.compile.cache import kept
+        if announce is not None and not _is_ready(function):
+            if not self._announced:
+                from printhammer.kernel.compile.cache import kept
 
-            self._announced = True
-            announce(f"compiling the kernel for {self.label} ({kept(function)})")
+                self._announced = True
+                announce(f"compiling the kernel for {self.label} ({kept(function)})")
+            kept_on_disk = function.stats.cache_path is not None
+            if name == "run" and kept_on_disk and begin_ahead is not None and self.laws is not None:
+                self._wait = begin_ahead(self.laws)
+            elif name in AHEAD and self._wait is not None:
+                wait, self._wait = self._wait, None
+                wait()
         return function
 
 
@@ -182,7 +201,9 @@ def _specialised(laws: Laws) -> Kernel:
         for name, value in bindings.items()
     }
     parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
-    return execute_all(TEMPLATES, namespace, sources, ", ".join(parts) or "a free mass")
+    kernel = execute_all(TEMPLATES, namespace, sources, ", ".join(parts) or "a free mass")
+    kernel.laws = laws
+    return kernel
 
 
 def execute_all(
