@@ -210,10 +210,13 @@ class Ensemble:
                 " these with branch and memory"
             )
         full[:, 1 : 1 + rows.shape[-1]] = rows
-        for hammer, row in zip(self.hammers, full, strict=True):
-            initial_state(hammer, (float(row[1]), float(row[2])))
+        hammers, hammer_of = self._own_hammers
+        different = np.unique(np.column_stack([hammer_of, full[:, 1:]]), axis=0, return_index=True)[1]
+        for i in np.sort(different):
+            hammer, row = hammers[hammer_of[i]], full[i, 1:].tolist()
+            initial_state(hammer, row[:2])
             if rows.shape[-1] == 4:
-                check_branch(hammer, row[1:].tolist())
+                check_branch(hammer, row)
         return full
 
     def _checked_starts(self, begun: FloatArray) -> FloatArray:
