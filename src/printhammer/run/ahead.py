@@ -60,8 +60,8 @@ def prepare(laws: Laws) -> None:
     none, nodes, contacts, constants = np.empty(0), np.empty((0, 5)), np.empty((0, 7)), np.zeros(64)
     drive = (none, np.zeros(0, np.int64), np.empty((0, 7)), False, np.zeros(0, np.int64), np.zeros(1))
     kernel.peaks(contacts, nodes, drive, constants, np.empty((0, 3)))
-    kernel.quadratures(np.zeros(0, np.int64), none, none, nodes, drive, constants, np.empty((0, 4)))
-    kernel.resample(none, nodes, drive, constants, np.empty((0, 9)))
+    kernel.quadratures(np.zeros(0, np.int64), none, none, nodes, drive, constants, np.empty((0, 5)))
+    kernel.resample(none, nodes, drive, constants, np.empty((0, 10)))
 
 
 if __name__ == "__main__":

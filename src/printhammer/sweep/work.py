@@ -180,6 +180,7 @@ def _from_motion(motion: Motion, row: int, results: Results) -> None:
         "drive_work": energy.drive_work,
         "pack_loss": energy.pack_loss,
         "backstop_loss": energy.backstop_loss,
+        "damping_loss": energy.damping_loss,
         "energy_residual": energy.residual,
     }
     for name, value in scalars.items():

@@ -48,6 +48,7 @@ def suits(laws: Laws) -> bool:
     bindings = law_bindings(laws)[0]
     return bool(
         bindings["HAS_BACKSTOP"]
+        and not bindings["HAS_DAMPING"]
         and not bindings["RIGID"]
         and bindings["HAS_PACK"]
         and bindings["MEMORY"]

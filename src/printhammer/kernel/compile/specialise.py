@@ -69,6 +69,7 @@ _LAW_FUNCTIONS = {
         "backstop_switch",
         "backstop_rebound",
     ),
+    "damping": ("damping_force",),
 }
 
 announce: Callable[[str], None] | None = None
