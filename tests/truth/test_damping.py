@@ -10,6 +10,7 @@ from tests.hammers import (
     PACKS,
     SPRINGS,
     STOP,
+    STROKE,
     compare,
     drives,
     idle,
@@ -125,16 +126,35 @@ def test_what_the_constant_does_against_differences(row: int, constant: str) -> 
         )
 
 
-def test_an_ensemble_takes_damped_hammers_one_by_one(hammer: ph.Hammer) -> None:
-    damped = hammer.replace({"damping": {"law": "viscous", "coefficient": "0.5 N s/m"}})
+def test_lanes_take_damped_hammers_too(hammer: ph.Hammer) -> None:
+    """Dots, states and pictures are those of members that run one by one."""
+    coefficients = np.linspace(0.0, 8.0, 40)
+    damped = [
+        hammer.replace({"damping": {"law": "viscous", "coefficient": f"{c} N s/m"}}) for c in coefficients
+    ]
     drive = ph.PulseTrain(hammer.waveform, rate=900.0, pulses=2)
-    with interpreted():
-        motion = ph.simulate(damped, drive)
-        dots = ph.Ensemble(damped, drive, motion.end).run(dots=True).dots
-    assert dots is not None
-    assert dots.flight_time[0].tolist() == [dot.flight_time for dot in motion.dots]
+    times = np.linspace(0.0, 3e-3, 301)
+    ensemble = ph.Ensemble(damped, drive, 3e-3)
+    lanes = ensemble.run(dots=True, strobes=[times] * 40, times=times, engine="lanes")
+    plain = ensemble.run(dots=True, strobes=[times] * 40, times=times, engine="plain")
+    assert lanes.dots is not None
+    assert plain.dots is not None
+    assert lanes.strobes is not None
+    assert plain.strobes is not None
+    assert lanes.x is not None
+    assert plain.x is not None
+    np.testing.assert_array_equal(lanes.status, 0)
+    np.testing.assert_array_equal(lanes.dots.struck, plain.dots.struck)
+    np.testing.assert_allclose(lanes.strobes.x, plain.strobes.x, rtol=0.0, atol=2e-8 * STROKE)
+    np.testing.assert_allclose(lanes.x, plain.x, rtol=0.0, atol=1e-7 * STROKE)
+    np.testing.assert_allclose(lanes.dots.peak_force, plain.dots.peak_force, rtol=1e-6)
+    assert not lanes.dots.struck[-1].any()
+
+
+def test_the_schemes_of_1983_have_no_damping(hammer: ph.Hammer) -> None:
+    damped = hammer.replace({"damping": {"law": "viscous", "coefficient": "0.5 N s/m"}})
     with pytest.raises(ph.InputError, match=r"the schemes of 1983 expect a hammer without \[damping\]"):
-        ph.simulate(damped, drive, scheme="trapezoid")
+        ph.simulate(damped, ph.PulseTrain(hammer.waveform), scheme="trapezoid")
 
 
 def test_a_file_says_it_with_a_unit(hammer: ph.Hammer) -> None:

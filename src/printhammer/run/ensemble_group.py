@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.drive.ragged import Ragged, starts_of
 from printhammer.kernel.lanes import layout as lane_layout
-from printhammer.kernel.model.layout import MAGNET, PLACES
+from printhammer.kernel.model.layout import MAGNET, PLACES, ROOM
 from printhammer.kernel.single import carry
 from printhammer.run.problem import Problem, scales_of
 
@@ -93,7 +93,7 @@ class Group:
         if self.lane_kinds is None or not suits(self.laws):
             return False
         hammers = self.batch.hammers
-        used = {role: hammers[:, place : place + 16] for role, place in PLACES.items()}
+        used = {role: hammers[:, PLACES[role] : PLACES[role] + room] for role, room in ROOM.items()}
         used["magnet"] = hammers[:, MAGNET:]
         return all(
             not used[role][:, count:].any() for role, (_place, count) in lane_layout.PLACES.items()

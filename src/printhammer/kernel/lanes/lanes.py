@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import compiled, entry, inlined
 from printhammer.kernel.lanes import layout as R
 from printhammer.kernel.lanes.batch import control_of, train_of
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING, Train
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    DAMPING,
+    FRONT,
+    MAGNET,
+    PACK,
+    POSITION,
+    SPRING,
+    Train,
+)
 from printhammer.kernel.model.modes import BACKSTOP, EDGE, FREE, NEAR_TOUCH, NO_SWITCH, OK, UNRESOLVED
 
 if TYPE_CHECKING:
@@ -64,6 +73,8 @@ def place_constants(
         pool[at + row * R.BLOCK] = 0.0
     for row in range(3):
         pool[at + row * R.BLOCK] = hammer[row]
+    for row in range(R.SPRING - R.DAMPING):
+        pool[at + (R.DAMPING + row) * R.BLOCK] = hammer[DAMPING + row]
     for row in range(R.PACK - R.SPRING):
         pool[at + (R.SPRING + row) * R.BLOCK] = hammer[SPRING + row]
     for row in range(R.BACKSTOP_PART - R.PACK):

@@ -30,12 +30,19 @@ STILL = 1e-8
 INVERSE_MASS = 0
 POSITION = 1
 FRONT = 2
-SPRING = 3
-PACK = 7
-BACKSTOP_PART = 13
-MAGNET = 19
-CONSTANTS = 25
-PLACES = {"spring": (SPRING, 4), "pack": (PACK, 6), "backstop": (BACKSTOP_PART, 6), "magnet": (MAGNET, 6)}
+DAMPING = 3
+SPRING = 5
+PACK = 9
+BACKSTOP_PART = 15
+MAGNET = 21
+CONSTANTS = 27
+PLACES = {
+    "damping": (DAMPING, 2),
+    "spring": (SPRING, 4),
+    "pack": (PACK, 6),
+    "backstop": (BACKSTOP_PART, 6),
+    "magnet": (MAGNET, 6),
+}
 """First place and number of places of the constants of each part."""
 
 # The drive between two of its edges, in the order: time of reference, constant, amplitudes of two
