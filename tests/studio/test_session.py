@@ -19,6 +19,9 @@ from printhammer.studio.pictures.section import AT_ONCE, LATER
 from printhammer.studio.session import Session, read_message
 from printhammer.studio.states.shelf import Shelf
 from printhammer.studio.states.state import ProtocolError
+from printhammer.studio.workers import jobs
+from printhammer.studio.workers.crew import Crew
+from printhammer.studio.workers.worker import ThreadWorker
 
 TEXT = CRUDE.read_text("utf-8")
 
@@ -53,7 +56,7 @@ class Page:
 @contextmanager
 def opened(shelf: Shelf | None = None) -> Iterator[tuple[Session, Page]]:
     page = Page()
-    made = Session(page.take, shelf)
+    made = Session(page.take, shelf, Crew(ThreadWorker))
     try:
         yield made, page
     finally:
@@ -128,9 +131,9 @@ def test_a_reason_is_no_longer_than_it_can_be_read() -> None:
     assert len(told["reason"]) == bounds.LONGEST_REASON
 
 
-def test_nothing_is_sent_after_the_end_and_both_threads_end() -> None:
+def test_nothing_is_sent_after_the_end_and_all_threads_end() -> None:
     page = Page()
-    made = Session(page.take)
+    made = Session(page.take, crew=Crew(ThreadWorker))
     made.receive(state(1, views=["motion", "map", "strobe"]))
     page.until("motion")
     made.close()
@@ -145,7 +148,7 @@ def test_a_page_that_is_gone_ends_the_work() -> None:
     def gone(_data: bytes) -> None:
         raise ConnectionError
 
-    made = Session(gone)
+    made = Session(gone, crew=Crew(ThreadWorker))
     made.receive(state(1))
     made.join(60)
     assert not any(thread.is_alive() for thread in made._threads)
@@ -176,7 +179,7 @@ def test_a_malformed_message_is_refused_with_a_reason(text: str, reason: str) ->
 def test_too_many_questions_at_once_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     hold = threading.Event()
     monkeypatch.setattr(sessions, "answer", lambda *_: hold.wait(60) and b"")
-    made = Session(lambda _data: None)
+    made = Session(lambda _data: None, crew=Crew(ThreadWorker))
     question = json.dumps({"kind": "hammer", "serial": 1, "name": "", "text": ""})
 
     def ask(times: int) -> None:
@@ -230,7 +233,7 @@ def test_what_nobody_thought_of_is_told_and_the_page_lives_on(
 
     with opened() as (made, page):
         with monkeypatch.context() as patched:
-            patched.setattr(sessions, "motion_frame", broken)
+            patched.setattr(jobs, "motion_frame", broken)
             made.receive(state(1))
             (told,) = page.until("refusal", serial=1)
         made.receive(state(2, views=["motion"]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-import sys
 from typing import TYPE_CHECKING
 
 from printhammer.errors import InputError, missing_extra
@@ -12,8 +11,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.hammer.hammer import Hammer
-
-_SLICE = 5e-4
 
 
 def serve(
@@ -50,11 +47,13 @@ def serve(
     from printhammer.studio.bounds import LARGEST_MESSAGE
     from printhammer.studio.guard import HOSTS, Guard
     from printhammer.studio.states.shelf import Shelf
+    from printhammer.studio.workers.crew import Crew
 
     listening = _listen(HOSTS[0], port)
     guard = Guard(listening.getsockname()[1], token)
+    crew = Crew()
     config = uvicorn.Config(
-        application(guard, Shelf(hammer)),
+        application(guard, Shelf(hammer), crew),
         log_level="warning",
         access_log=False,
         lifespan="off",
@@ -64,11 +63,13 @@ def serve(
         server_header=False,
         timeout_graceful_shutdown=1,
     )
-    # A thread that draws no longer waits several milliseconds for one that computes.
-    sys.setswitchinterval(_SLICE)
-    if ready is not None:
-        ready(guard.address)
-    uvicorn.Server(config).run(sockets=[listening])
+    crew.warm("curves", "map", "detail")
+    try:
+        if ready is not None:
+            ready(guard.address)
+        uvicorn.Server(config).run(sockets=[listening])
+    finally:
+        crew.close()
 
 
 def _listen(host: str, port: int) -> socket.socket:

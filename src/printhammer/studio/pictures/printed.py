@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from operator import attrgetter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -18,9 +17,6 @@ if TYPE_CHECKING:
 
     from printhammer.printing.page.pattern import Pattern
     from printhammer.studio.states.state import State
-
-line_key: Final = attrgetter("hammer", "text", "constants", "waveform", "rate", "line")
-"""Returns what the line of a state depends on."""
 
 _TRIED: Final = 16
 
