@@ -103,6 +103,18 @@ def test_a_map_that_is_shown_is_not_computed_again() -> None:
     assert [frame["serial"] for frame in found if frame["kind"] == "map"] == [1, 1, 3, 3]
 
 
+def test_views_that_do_not_belong_to_a_state_are_told_with_its_curves() -> None:
+    with opened() as (made, page):
+        made.receive(state(1, views=["motion", "map"]))
+        page.until("map", detail="full")
+        made.receive(state(2, views=["motion", "map"], rate=900.0))
+        page.until("dots", serial=2)
+        made.receive(state(3, views=["motion", "map"], pulses=3))
+        found = page.until("dots", serial=3)
+    told = [frame["outdated"] for frame in found if frame["kind"] == "motion"]
+    assert told == [{}, {}, {"map": "this still belongs to what was set before"}]
+
+
 def test_what_describes_no_hammer_is_told_and_the_next_state_is_served() -> None:
     with opened() as (made, page):
         made.receive(state(1, constants={"mass": 1.0}))

@@ -39,7 +39,7 @@ class Hired:
         self.workers: list[ProcessWorker] = []
 
     def __call__(self) -> ProcessWorker:
-        self.workers.append(ProcessWorker(("-c", CHILD)))
+        self.workers.append(ProcessWorker(command=("-c", CHILD)))
         return self.workers[-1]
 
     def running(self) -> int:

@@ -47,7 +47,8 @@ def application(guard: Guard, shelf: Shelf, crew: Crew) -> Starlette:
     tabs: set[Session] = set()
 
     def page(request: Request) -> Response:
-        if reason := guard.refuse(request.headers, request.query_params.get("token", "")):
+        # The page itself is the same for everybody; what it may ask of the socket depends on the token.
+        if reason := guard.refuse(request.headers, request.query_params.get("token")):
             return _refused(reason)
         return _file("index.html")
 

@@ -63,6 +63,7 @@ class Session:
         self._questions: list[tuple[str, int, Any]] = []
         self._closed = False
         self._served: dict[str, int] = {}
+        self._told: dict[str, float] = {}
         # What the page shows, and what it has in its last form, by view.
         self._shown: dict[str, Any] = {}
         self._whole: dict[str, Any] = {}
@@ -190,12 +191,13 @@ class Session:
             raise
         if done:
             self._crew.give_back(role, worker)
+        self._end_progress(order)
 
     def _follow(self, order: Order, worker: Worker, newer: Callable[[], bool]) -> bool:
         """Pass on what a worker tells of an order; return whether it is done, and not ended or left alone."""
-        role, serial = order.role, order.serial
+        role = order.role
         worker.begin(order)
-        superseded, told = False, 0.0
+        superseded = False
         while True:
             message = worker.next(_TICK)
             if newer() and not superseded:
@@ -209,9 +211,9 @@ class Session:
                     self._crew.dismiss(role, worker)
                     self._give_up(order, f"would take more than {PATIENCE:g} s for this hammer")
                     return False
-                if worker.compiling and time.monotonic() > told + _TOLD:
-                    told = time.monotonic()
-                    self._tell(frame("progress", serial, role=role, what=worker.compiling))
+                if worker.compiling and time.monotonic() > self._told.get(role, 0.0) + _TOLD:
+                    self._told[role] = time.monotonic()
+                    self._progress(order, worker.compiling, worker.compiled)
             elif message[0] == "done":
                 return True
             elif message[0] == "ended":
@@ -223,7 +225,14 @@ class Session:
                 self._note(order, view, whole)
                 self._tell(data)
             elif not message[1]:
-                self._tell(frame("progress", serial, role=role, what=""))
+                self._end_progress(order)
+
+    def _progress(self, order: Order, what: str, seconds: float = 0.0) -> None:
+        self._tell(frame("progress", order.serial, role=order.role, what=what, seconds=seconds))
+
+    def _end_progress(self, order: Order) -> None:
+        if self._told.pop(order.role, None) is not None:
+            self._progress(order, "")
 
     def _note(self, order: Order, view: str, whole: bool) -> None:
         """Note what the page comes to show."""
@@ -285,13 +294,21 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
     kind, serial = message.get("kind"), message.get("serial")
     if isinstance(serial, bool) or not isinstance(serial, int) or not 0 < serial < 2**53:
         raise ProtocolError("serial is expected to be a positive whole number")
-    contents = {"state": {"state"}, "hammer": {"name", "text"}, "texts": {"state"}, "drop": {"name", "text"}}
+    contents = {
+        "state": {"state"},
+        "open": {"state"},
+        "hammer": {"name", "text"},
+        "texts": {"state"},
+        "drop": {"name", "text"},
+    }
     if not isinstance(kind, str) or kind not in contents:
         raise ProtocolError(f"kind is expected to be one of {', '.join(contents)}")
     if set(message) != {"kind", "serial", *contents[kind]}:
         raise ProtocolError(
             f"a message of kind {kind} has the keys kind, serial, {', '.join(sorted(contents[kind]))}"
         )
+    if kind == "open":
+        return kind, serial, message["state"]
     if "state" in contents[kind]:
         return kind, serial, read_state(message["state"], shelf)
     pair = (message["name"], message["text"])
@@ -301,9 +318,10 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
 
 
 def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
-    """Return the answer to a question: what a hammer is, what a dropped file holds, a state as texts."""
+    """Return the answer to a question: what a link or a file holds, what a hammer is, a state as texts."""
     from printhammer.studio.states.controls import describe, vocabulary
     from printhammer.studio.states.drops import dropped
+    from printhammer.studio.states.links import taken
     from printhammer.studio.states.state import dropped_hammer
     from printhammer.studio.states.texts import texts_of
 
@@ -313,8 +331,13 @@ def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
             hammer = dropped_hammer(text) if text else shelf.hammer(name or shelf.names[0])
             heading = {"offered": shelf.names, "asked": name or shelf.names[0], "text": text, **vocabulary()}
             return frame("hammer", serial, hammer=describe(hammer), **heading)
+        if kind == "open":
+            # A page without a state of its own opens with that of the studio.
+            table, notes = taken(content, shelf) if content else shelf.start
+            return frame("open", serial, state=table, notes=notes)
         if kind == "drop":
-            return dropped(serial, *content)
+            name, text = content
+            return dropped(serial, name, text, shelf)
         return frame("texts", serial, texts=texts_of(content))
     except InputError as error:
         return refusal(serial, str(error))

@@ -52,12 +52,12 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
     from printhammer.printing.page.pattern import Pattern
 
     try:
-        hammer = state.changed
-        if state.waveform is not None:
-            hammer = hammer.replace("waveform", state.fired, source="set in the studio")
         pattern = Pattern.from_text(state.line)
         check_line(state, pattern)
-        page = print_page(hammer, pattern, state.rate, progress=Patience(newer, "the line").progress)
+        patience = Patience(newer, "the line")
+        page = print_page(
+            state.changed, pattern, state.rate, waveform=state.fired, progress=patience.progress
+        )
     except InputError as error:
         return frame("line", serial, reason=str(error))
     (x, y), (wanted_x, wanted_y) = page.places, page.intended

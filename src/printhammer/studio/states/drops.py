@@ -10,6 +10,8 @@ import numpy as np
 from printhammer.errors import InputError, located
 from printhammer.studio.bounds import MOST_SAMPLES
 from printhammer.studio.frames import frame
+from printhammer.studio.states.links import read_file
+from printhammer.studio.states.shelf import Shelf
 from printhammer.studio.states.state import dropped_hammer
 from printhammer.support.sheets import sheet_of, split_heading
 from printhammer.units import to_si
@@ -18,15 +20,18 @@ _COLUMNS: Final = {"displacement": "m", "current": "A", "force": "N"}
 _EXPECTED: Final = "'time [us],displacement [um]', 'time [us],current [A]' or 'time [us],force [N]'"
 
 
-def dropped(serial: int, name: str, text: str) -> bytes:
-    """Return what a dropped file holds: a hammer, or a curve of displacement, current or force.
+def dropped(serial: int, name: str, text: str, shelf: Shelf | None = None) -> bytes:
+    """Return what a dropped file holds: a state, a hammer, or a curve of displacement, current or force.
 
     Raises
     ------
     InputError
-        It is neither.
+        It is none of these.
     """
     where = name[-80:] or "dropped file"
+    if name.lower().endswith(".json"):
+        table, notes = read_file(text, where, shelf or Shelf())
+        return frame("dropped", serial, what="state", name=where, state=table, notes=notes)
     if name.lower().endswith(".toml"):
         hammer = dropped_hammer(text)
         return frame("dropped", serial, what="hammer", name=hammer.name, text=text)

@@ -1,8 +1,8 @@
 """The inside of a worker: takes orders, does them one by one, and hears meanwhile of newer states.
 
-``python -m printhammer.studio.workers.child`` reads orders from its input and writes messages to its output,
-pickled both: it is started by the studio, whose pipes nobody else holds. It ends where its input does, so
-that nothing computes on behind a studio that was killed.
+``python -m printhammer.studio.workers.child`` imports the modules that are named behind it, reads orders from
+its input and writes messages to its output, pickled both: it is started by the studio, whose pipes nobody
+else holds. It ends where its input does, so that nothing computes on behind a studio that was killed.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import signal
 import sys
 import threading
 from contextlib import suppress
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from printhammer.studio import compiling
@@ -102,6 +103,8 @@ def main() -> None:
             pickle.dump(message, target, pickle.HIGHEST_PROTOCOL)
             target.flush()
 
+    for module in sys.argv[1:]:
+        import_module(module)
     workshop = Workshop(send)
 
     def listen() -> None:

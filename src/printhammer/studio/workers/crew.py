@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.studio.workers.worker import ProcessWorker, Worker
+from printhammer.studio.workers.worker import Worker, hire
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,12 +19,12 @@ class Crew:
 
     Parameters
     ----------
-    hire : callable, optional
-        Makes a worker; by default a process.
+    new : callable, optional
+        Makes a worker; by default `printhammer.studio.workers.worker.hire`.
     """
 
-    def __init__(self, hire: Callable[[], Worker] = ProcessWorker) -> None:
-        self._hire = hire
+    def __init__(self, new: Callable[[], Worker] = hire) -> None:
+        self._hire = new
         self._change = threading.Condition()
         self._idle: dict[str, list[Worker]] = {}
         self._busy: dict[str, list[Worker]] = {}

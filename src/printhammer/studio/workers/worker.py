@@ -1,4 +1,4 @@
-"""A worker as the studio sees it: a process, or, where none can be had and in tests, a thread."""
+"""A worker as the studio sees it: a process, or a thread where a process would not know a hammer's parts."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from printhammer.studio.workers.jobs import Order
 
 
@@ -26,6 +28,7 @@ class Worker:
         self.messages: queue.SimpleQueue[tuple[Any, ...]] = queue.SimpleQueue()
         self.key: Any = None
         self.compiling = ""
+        self._since = 0.0
         self.heard = time.monotonic()
 
     def begin(self, order: Order) -> None:
@@ -48,8 +51,13 @@ class Worker:
             return None
         self.heard = time.monotonic()
         if message[0] == "compiling":
-            self.compiling = message[1]
+            self.compiling, self._since = message[1], self.heard
         return message
+
+    @property
+    def compiled(self) -> float:
+        """For how long it has been compiling, s."""
+        return time.monotonic() - self._since if self.compiling else 0.0
 
     @property
     def silent(self) -> float:
@@ -62,16 +70,22 @@ class ProcessWorker(Worker):
 
     Parameters
     ----------
+    modules : sequence of str, optional
+        What it imports first: modules with parts that do not come with the program.
     command : tuple of str, optional
         What the interpreter is started with; it has to end in `printhammer.studio.workers.child.main`.
     """
 
-    def __init__(self, command: tuple[str, ...] = ("-m", "printhammer.studio.workers.child")) -> None:
+    def __init__(
+        self,
+        modules: Sequence[str] = (),
+        command: tuple[str, ...] = ("-m", "printhammer.studio.workers.child"),
+    ) -> None:
         super().__init__()
         # Found where this process has found it, also where a notebook has changed the path.
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self.process = subprocess.Popen(
-            (sys.executable, *command),
+            (sys.executable, *command, *modules),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=environment,
@@ -135,3 +149,12 @@ class ThreadWorker(Worker):
         """Have it end when it can."""
         self._workshop.take(None)
         self._workshop.supersede()
+
+
+def hire() -> Worker:
+    """Return a new worker: a process, or a thread where parts were registered in the program that runs."""
+    from printhammer.parts import PARTS
+
+    modules = {part.__module__ for part in PARTS.values()}
+    outside = sorted(name for name in modules if not name.startswith("printhammer."))
+    return ThreadWorker() if "__main__" in outside else ProcessWorker(outside)

@@ -1,0 +1,116 @@
+"""Links, files, marks and connections, in a headless Chromium."""
+
+import json
+import socket
+from typing import Any
+
+import pytest
+from tests.hammers import CRUDE
+from tests.studio.browser import Page
+from tests.studio.server import Studio, studio
+from tests.studio.test_browser import HELPERS, drop, saved, settled, state
+
+import printhammer as ph
+
+STATUS = "document.querySelector('.status').textContent"
+OUTDATED = "[...document.querySelectorAll('.outdated')].map((panel) => panel.dataset.why)"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("link", "reason"),
+    [
+        ("pulses=999&pattern=zzz", "pulses is expected to be a whole number from 1 to 64"),
+        ("rate=1e99", "rate is expected to be a finite number from 10 to 20000"),
+        ("line=" + 300 * "x", "line is expected to be a text of at most 200 characters"),
+        ("waveform=[1]", "waveform.shape is expected"),
+        ("hammer=no-such", "hendriks-1983 is shown instead"),
+        ("text=<img src=x onerror=alert(1)>", "expected a TOML file"),
+        ("views=sky&colour=5", "constants.colour is not known"),
+    ],
+)
+def test_a_link_that_cannot_be_taken_is_told_and_the_page_lives(
+    running: Studio, opened_browser: Any, link: str, reason: str
+) -> None:
+    page = opened_browser()
+    page.open(running.address + "#" + link)
+    page.wait("window.studio?.studio?.frames.motion")
+    text = page.run(STATUS)
+    assert reason.replace("hendriks-1983", running.name) in text
+    page.run("window.studio.studio.store.set({ rate: 1000 }); 1")
+    settled(page, "state.rate === 1000")
+    page.wait(f"{STATUS}.includes('steps')")
+    assert page.complaints == []
+    page.call("Page.close")
+
+
+@pytest.mark.slow
+def test_a_refused_state_leaves_nothing_that_looks_like_its_own(page: Page) -> None:
+    views = page.run("document.querySelectorAll('.panel:not([hidden])').length")
+    page.run("window.studio.studio.store.set({ constants: { mass: 1 } }); 1")
+    page.wait(f"{OUTDATED}.length === {views}")
+    assert all(why.startswith("not computed: mass = 1 kg, expected") for why in page.run(OUTDATED))
+    page.run("document.querySelector('.undo').click()")
+    page.wait(f"{OUTDATED}.length === 0")
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+def test_a_studio_that_is_restarted_is_found_again(opened_browser: Any) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    token = 32 * "t"
+    with studio(port=port, token=token) as running:
+        page = opened_browser()
+        page.open(running.address)
+        page.wait("window.studio?.studio?.frames.motion")
+        page.run("window.studio.studio.store.set({ rate: 777 }); 1")
+        settled(page, "state.rate === 777")
+        page.wait("location.hash.includes('rate=777')")
+        link = page.run("window.studio.studio.address()")
+        assert token not in link
+        assert token not in page.run("location.href")
+    page.wait(f"{OUTDATED}.length > 0")
+    assert "trying to connect again" in page.run(STATUS)
+    with studio(port=port, token=token):
+        page.wait(f"{OUTDATED}.length === 0")
+        assert state(page)["rate"] == 777
+        # In this browser the link works without the token, also in another tab.
+        other = opened_browser()
+        other.open(link)
+        other.wait("window.studio?.studio?.frames.motion")
+        assert state(other)["rate"] == 777
+        other.call("Page.close")
+    page.call("Page.close")
+
+
+@pytest.mark.slow
+def test_a_page_that_has_no_token_says_what_to_do(opened_browser: Any) -> None:
+    with studio() as running:
+        page = opened_browser()
+        page.open(f"http://{running.host}/")
+        page.wait(f"{STATUS}.includes('open the address that the studio printed')")
+        page.call("Page.close")
+
+
+@pytest.mark.slow
+def test_a_state_goes_out_as_a_file_and_comes_back(page: Page) -> None:
+    page.run(HELPERS)
+    drop(page, "mine.toml", ph.load(CRUDE).replace("name", "mine").to_toml())
+    settled(page, "state.text.length > 100")
+    chosen = "document.querySelector('[aria-label=hammer]').selectedOptions[0].textContent"
+    assert page.run(chosen) == "mine (dropped)"
+    page.run("window.studio.studio.store.set({ rate: 850 }); 1")
+    settled(page, "state.rate === 850")
+    text = saved(page, "select.out", "state, file")
+    assert json.loads(text)["state"]["rate"] == 850
+    page.run("window.studio.studio.choose(window.studio.studio.offered[0]); 1")
+    settled(page, "state.text === ''")
+    page.run("window.studio.studio.store.set({ rate: 900 }); 1")
+    drop(page, "state.json", text)
+    settled(page, "state.rate === 850")
+    assert page.run(chosen) == "mine (dropped)"
+    drop(page, "bad.json", "{")
+    page.wait(f"{STATUS}.includes('bad.json: expected a state file')")
+    assert page.complaints == []
