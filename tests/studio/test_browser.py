@@ -14,8 +14,8 @@ from tests.studio.server import Studio
 
 import printhammer as ph
 from printhammer.studio.bundle import module
+from printhammer.studio.messages import answer, read_message
 from printhammer.studio.pictures.engine import motion_frame
-from printhammer.studio.session import answer, read_message
 from printhammer.studio.states.shelf import Shelf
 
 CTRL, SHIFT = 2, 8

@@ -2,6 +2,7 @@
 
 import json
 import socket
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -114,3 +115,50 @@ def test_a_state_goes_out_as_a_file_and_comes_back(page: Page) -> None:
     drop(page, "bad.json", "{")
     page.wait(f"{STATUS}.includes('bad.json: expected a state file')")
     assert page.complaints == []
+
+
+@pytest.mark.slow
+def test_what_an_oscilloscope_wrote_is_seen_after_its_units_were_asked_for(page: Page) -> None:
+    page.run(HELPERS)
+    rows = "".join(f"{10 * k};{50 + 4 * k},5;0,{min(k, 9)}\n" for k in range(40))
+    drop(page, "scope.csv", "time;displacement;current\n" + rows)
+    page.wait("document.querySelector('dialog').open")
+    page.run("document.querySelector('dialog button[value=use]').click()")
+    settled(page, "state.waveform?.shape === 'sampled' && state.pulses === 1")
+    assert page.run("window.studio.studio.overlay.data.values[1]") == pytest.approx(54.5e-6)
+    assert state(page)["waveform"]["values"][9] == pytest.approx(0.9)
+    page.wait(f"{STATUS}.includes('its displacement is laid over the motion, its current is the pulse')")
+    drop(page, "scope.csv", "a;b\n0;1\n1;2\n")
+    page.wait("document.querySelector('dialog').open")
+    page.run("document.querySelector('dialog button[value=\"\"]').click()")
+    page.wait("!document.querySelector('dialog').open")
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+def test_a_saved_page_shows_its_curves_without_a_server(
+    page: Page, opened_browser: Any, tmp_path: Path
+) -> None:
+    page.run(HELPERS)
+    page.run("window.studio.studio.store.set({ rate: 925, line: '</script><b>' }); 1")
+    settled(page, "state.rate === 925")
+    page.wait("window.studio.studio.frames.line?.serial === window.studio.studio.serial")
+    page.wait("window.studio.studio.frames.strobe?.rate === 925")
+    file = tmp_path / "studio-page.html"
+    file.write_text(saved(page, "select.out", "page, read only"), "utf-8")
+    shown = opened_browser()
+    shown.size(1280, 720)
+    shown.open(file.as_uri())
+    shown.wait("!!document.querySelector('.saved')")
+    shown.run(HELPERS)
+    shown.wait(f"{STATUS}.includes('steps')")
+    for view in ("motion", "map", "forces", "phase", "strobe", "loops", "energy", "line"):
+        shown.wait(f"helpers.inked({view!r}) > 3")
+    assert shown.run("document.querySelector('[data-number=rate]').value") == "925"
+    assert shown.run("document.querySelector('.side').inert")
+    assert shown.run(f"{OUTDATED}.length") == 0
+    shown.press("z", "KeyZ", 2)
+    assert shown.complaints == []
+    assert all(address.startswith(("file:", "data:", "blob:")) for address in shown.requests)
+    shown.picture(tmp_path / "kept.png")
+    shown.call("Page.close")

@@ -13,7 +13,7 @@ from tests.studio.test_state import JSON, SAMPLES
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import load
 from printhammer.studio.frames import unframe
-from printhammer.studio.session import answer
+from printhammer.studio.messages import answer
 from printhammer.studio.states.drops import dropped
 from printhammer.studio.states.links import file_of, read_file, taken
 from printhammer.studio.states.shelf import Shelf

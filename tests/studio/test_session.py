@@ -15,8 +15,9 @@ from printhammer.studio import bounds
 from printhammer.studio import session as sessions
 from printhammer.studio.bounds import LARGEST_MESSAGE
 from printhammer.studio.frames import unframe
+from printhammer.studio.messages import read_message
 from printhammer.studio.pictures.section import AT_ONCE, LATER
-from printhammer.studio.session import Session, read_message
+from printhammer.studio.session import Session
 from printhammer.studio.states.shelf import Shelf
 from printhammer.studio.states.state import ProtocolError
 from printhammer.studio.workers import jobs
@@ -136,7 +137,7 @@ def test_questions_are_answered() -> None:
 
 
 def test_a_reason_is_no_longer_than_it_can_be_read() -> None:
-    question = {"kind": "drop", "serial": 1, "name": "a.csv", "text": "x" * 100_000}
+    question = {"kind": "hammer", "serial": 1, "name": "x" * 100_000, "text": ""}
     with opened() as (made, page):
         made.receive(json.dumps(question))
         (told,) = page.until("refusal")
@@ -179,7 +180,7 @@ def test_a_page_that_is_gone_ends_the_work() -> None:
         ('{"kind": "shell", "serial": 1}', "kind"),
         ('{"kind": ["state"], "serial": 1}', "kind"),
         ('{"kind": "state", "serial": 1, "state": {}, "more": 1}', "has the keys"),
-        ('{"kind": "drop", "serial": 1, "name": 1, "text": ""}', "texts"),
+        ('{"kind": "hammer", "serial": 1, "name": 1, "text": ""}', "texts"),
         (" " * (LARGEST_MESSAGE + 1), "characters"),
     ],
 )

@@ -8,18 +8,18 @@ it, since that will be needed, and another one serves the newer state meanwhile.
 
 from __future__ import annotations
 
-import json
 import logging
 import threading
 import time
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
-from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE, PATIENCE
+from printhammer.studio.bounds import PATIENCE
 from printhammer.studio.frames import frame, nothing, refusal
+from printhammer.studio.messages import answer, read_message
 from printhammer.studio.pictures.keys import KEYS, kernel_key
 from printhammer.studio.states.shelf import Shelf
-from printhammer.studio.states.state import ProtocolError, State, read_state
+from printhammer.studio.states.state import ProtocolError, State
 from printhammer.studio.workers.crew import PATIENT, Crew
 from printhammer.studio.workers.jobs import Order
 
@@ -273,71 +273,3 @@ class Session:
             if self._whole.get(view) != KEYS[view](order.state):
                 self._note(order, view, whole=True)
                 self._tell(nothing(view, order.serial, f"{_FAILING[view]} {why}"))
-
-
-def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
-    """Read a message: its kind, the serial number of the page, and its content.
-
-    Raises
-    ------
-    ProtocolError
-        It is none that the page would send.
-    """
-    if len(text) > LARGEST_MESSAGE:
-        raise ProtocolError(f"the message has {len(text)} characters, expected at most {LARGEST_MESSAGE}")
-    try:
-        message = json.loads(text)
-    except (ValueError, RecursionError):
-        raise ProtocolError("the message is expected to be JSON") from None
-    if not isinstance(message, dict):
-        raise ProtocolError("the message is expected to be a table")
-    kind, serial = message.get("kind"), message.get("serial")
-    if isinstance(serial, bool) or not isinstance(serial, int) or not 0 < serial < 2**53:
-        raise ProtocolError("serial is expected to be a positive whole number")
-    contents = {
-        "state": {"state"},
-        "open": {"state"},
-        "hammer": {"name", "text"},
-        "texts": {"state"},
-        "drop": {"name", "text"},
-    }
-    if not isinstance(kind, str) or kind not in contents:
-        raise ProtocolError(f"kind is expected to be one of {', '.join(contents)}")
-    if set(message) != {"kind", "serial", *contents[kind]}:
-        raise ProtocolError(
-            f"a message of kind {kind} has the keys kind, serial, {', '.join(sorted(contents[kind]))}"
-        )
-    if kind == "open":
-        return kind, serial, message["state"]
-    if "state" in contents[kind]:
-        return kind, serial, read_state(message["state"], shelf)
-    pair = (message["name"], message["text"])
-    if not all(isinstance(part, str) and len(part) <= LARGEST_FILE for part in pair):
-        raise ProtocolError(f"name and text are expected to be texts of at most {LARGEST_FILE} characters")
-    return kind, serial, pair
-
-
-def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
-    """Return the answer to a question: what a link or a file holds, what a hammer is, a state as texts."""
-    from printhammer.studio.states.controls import describe, vocabulary
-    from printhammer.studio.states.drops import dropped
-    from printhammer.studio.states.links import taken
-    from printhammer.studio.states.state import dropped_hammer
-    from printhammer.studio.states.texts import texts_of
-
-    try:
-        if kind == "hammer":
-            name, text = content
-            hammer = dropped_hammer(text) if text else shelf.hammer(name or shelf.names[0])
-            heading = {"offered": shelf.names, "asked": name or shelf.names[0], "text": text, **vocabulary()}
-            return frame("hammer", serial, hammer=describe(hammer), **heading)
-        if kind == "open":
-            # A page without a state of its own opens with that of the studio.
-            table, notes = taken(content, shelf) if content else shelf.start
-            return frame("open", serial, state=table, notes=notes)
-        if kind == "drop":
-            name, text = content
-            return dropped(serial, name, text, shelf)
-        return frame("texts", serial, texts=texts_of(content))
-    except InputError as error:
-        return refusal(serial, str(error))

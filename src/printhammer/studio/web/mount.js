@@ -1,4 +1,5 @@
 // The studio in an element: `mount(element, send)` returns what takes the server's frames.
+import { askColumns } from "./asking.js";
 import { energyView, lineView } from "./bars.js";
 import { buildControls } from "./controls.js";
 import { forcesView, motionView } from "./curves.js";
@@ -16,6 +17,7 @@ import { setSystem, setUnits } from "./units.js";
 
 const MAKERS = { motion: motionView, sketch: sketchView, map: mapView, forces: forcesView, phase: phaseView, strobe: strobeView, loops: loopsView, energy: energyView, line: lineView };
 const MOST_GHOSTS = 4;
+const SHOWN = ["motion", "dots", "map", "strobe", "line"]; // frames that views are drawn from
 const DROPPED = "dropped ";
 const LONGEST = 800000; // characters of a link
 const QUICK = ["motion", "forces", "phase"];
@@ -26,7 +28,7 @@ const QUICK = ["motion", "forces", "phase"];
  */
 export function mount(element, send, address = { read: () => "", write: () => {}, address: () => "" }) {
   const studio = {
-    element, store: new Store({ ...START }), frames: {}, ghosts: [], overlay: null, cursor: 0, cursorFrom: null, window: null,
+    element, store: new Store({ ...START }), frames: {}, buffers: {}, ghosts: [], overlay: null, cursor: 0, cursorFrom: null, window: null,
     described: null, offered: [], limits: {}, shapes: {}, views: {}, serial: Math.floor(Math.random() * 2 ** 40), sentAt: new Map(), busy: false, stale: false,
   };
   let follow = () => {};
@@ -150,7 +152,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   async function load(state, step = true, fresh = false) {
     const frame = await studio.ask("hammer", { name: state.text ? "" : state.hammer, text: state.text });
     if (frame.kind === "refusal") { studio.say(frame.reason, true); return; }
-    Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes });
+    Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes, unitTable: frame.units });
     setUnits(frame.units);
     // A hammer without a pulse opens with one that shows it; what a link sets stays.
     const start = state.waveform ? {} : Object.fromEntries(Object.entries(frame.hammer.start).filter(([key]) => fresh || state[key] === START[key]));
@@ -196,16 +198,37 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       studio.say(`${file.name} has ${file.size} bytes, expected at most ${studio.limits.file}`, true);
       return;
     }
-    const frame = await studio.ask("drop", { name: file.name, text: await file.text() });
+    const text = await file.text();
+    const ask = (columns) => studio.ask("drop", { name: file.name, text, columns });
+    let frame = await ask(null);
+    if (frame.what === "columns") {
+      const columns = await askColumns(studio.parts.dialog, frame);
+      if (!columns) return;
+      frame = await ask(columns);
+    }
     if (frame.kind === "refusal") studio.say(frame.reason, true);
     else if (frame.what === "state") take(frame);
     else if (frame.what === "hammer") load({ ...studio.store.state, hammer: "", text: frame.text, constants: {}, waveform: null });
-    else if (frame.what === "displacement") {
-      studio.overlay = frame;
-      studio.say(`${frame.name} laid over the motion`);
-      redrawAll();
-    } else studio.store.set({ waveform: { shape: "sampled", times: [...frame.data.t], values: [...frame.data.values], quantity: frame.what } });
+    else if (frame.what === "curves") lay(frame);
   };
+  /** Show measured curves: a displacement over the motion, a current or force as the pulse that is fired. */
+  function lay({ name, data }) {
+    const quantity = ["current", "force"].find((kind) => kind in data);
+    const shown = [];
+    if (data.displacement) {
+      studio.overlay = { what: "displacement", name, data: { t: data.t, values: data.displacement } };
+      shown.push("its displacement is laid over the motion");
+    }
+    if (quantity) {
+      shown.push(`its ${quantity} is the pulse that is fired`);
+      const waveform = { shape: "sampled", times: [...data.t], values: [...data[quantity]], quantity };
+      // What was measured together is compared with one such pulse.
+      studio.store.set({ waveform, ...(data.displacement ? { pulses: 1, pattern: "" } : {}) });
+    }
+    studio.notes = `${name}: ${shown.join(", ")}`;
+    studio.say(studio.notes);
+    redrawAll();
+  }
 
   studio.store.listeners.add((state) => {
     const wanted = state.text || state.hammer;
@@ -253,6 +276,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     },
     receive: (buffer) => {
       const frame = decode(buffer);
+      if (SHOWN.includes(frame.kind)) studio.buffers[frame.kind] = buffer;
       if (asked.has(frame.serial)) {
         asked.get(frame.serial)(frame);
         asked.delete(frame.serial);

@@ -1,6 +1,6 @@
 // The page: a bar, the controls, the views in a grid, and a line for hints.
 import { element as make } from "./dom.js";
-import { copy, csvOf, pngOf, save, svgOf } from "./exports.js";
+import { copy, csvOf, pngOf, save, savePage, svgOf } from "./exports.js";
 import { HELP } from "./keys.js";
 import { VIEWS } from "./state.js";
 
@@ -31,6 +31,7 @@ export function layout(studio, makers) {
     "copy as Python": () => text("python", (content) => copy(content, studio, "Python")),
     "copy as command": () => text("command", (content) => copy(content, studio, "command")),
     "copy address": () => copy(studio.address(), studio, "address"),
+    "page, read only": () => savePage(studio),
     "state, file": () => text("state", (content) => save("studio-state.json", content, "application/json")),
   };
   out.append(...Object.keys(leaving).map((name) => make("option", { value: name }, name)));

@@ -18,10 +18,15 @@ export class Store {
     this.future = [];
     this.listeners = new Set();
     this.last = { control: null, at: 0 };
+    this.free = null;
   }
+
+  /** Let nothing be changed any more but some entries. */
+  keep(names) { this.free = names; }
 
   /** Change the state; changes of one control shortly after each other are undone together. */
   set(patch, control = null) {
+    if (this.free && !Object.keys(patch).every((name) => this.free.includes(name))) return;
     const now = performance.now();
     const same = control !== null && control === this.last.control && now - this.last.at < JOINED;
     if (!same) {
