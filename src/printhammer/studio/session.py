@@ -17,6 +17,7 @@ from printhammer.errors import InputError
 from printhammer.studio.bounds import PATIENCE
 from printhammer.studio.frames import frame, nothing, refusal
 from printhammer.studio.messages import answer, read_message
+from printhammer.studio.pictures.ahead import frames_ahead
 from printhammer.studio.pictures.keys import KEYS, kernel_key
 from printhammer.studio.states.shelf import Shelf
 from printhammer.studio.states.state import ProtocolError, State
@@ -34,6 +35,7 @@ _VIEWS: Final = {"curves": (), "map": ("map",), "detail": ("line", "strobe")}
 _FAILING: Final = {"map": "the map", "line": "the printed line", "strobe": "the strobe section"}
 _TICK: Final = 0.02
 _TOLD: Final = 1.0
+_LATE: Final = 0.25
 _SPARE: Final = 5.0
 
 
@@ -197,7 +199,8 @@ class Session:
         """Pass on what a worker tells of an order; return whether it is done, and not ended or left alone."""
         role = order.role
         worker.begin(order)
-        superseded = False
+        superseded, ahead = False, role == "curves"
+        begun = time.monotonic()
         while True:
             message = worker.next(_TICK)
             if newer() and not superseded:
@@ -205,6 +208,9 @@ class Session:
                 worker.supersede()
                 worker.heard = time.monotonic()
             if message is None:
+                if ahead and time.monotonic() > begun + _LATE:
+                    ahead = False
+                    self._tell_ahead(order)
                 if superseded and self._ends(order, worker):
                     return False
                 if worker.silent > PATIENCE + _SPARE:
@@ -221,11 +227,17 @@ class Session:
                 self._give_up(order, "could not be computed: its process has ended")
                 return False
             elif message[0] == "frame":
+                ahead = False
                 _kind, view, whole, data = message
                 self._note(order, view, whole)
                 self._tell(data)
             elif not message[1]:
                 self._end_progress(order)
+
+    def _tell_ahead(self, order: Order) -> None:
+        """Show what was drawn ahead, where that is a state with which a hammer opens."""
+        for data in frames_ahead(order.state, order.serial):
+            self._tell(data)
 
     def _progress(self, order: Order, what: str, seconds: float = 0.0) -> None:
         self._tell(frame("progress", order.serial, role=order.role, what=what, seconds=seconds))

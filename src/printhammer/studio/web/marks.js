@@ -48,7 +48,11 @@ export function marksFor(panel) {
     progress: (role, why) => mark(ROLES[role].filter((view) => reasons.has(view)), why, true),
     /** A frame has come. */
     arrived(frame) {
-      if (frame.ahead || frame.serial <= refused) return;
+      if (frame.ahead) {
+        mark(frame.kind === "motion" ? CURVES : OF_FRAMES[frame.kind], "drawn ahead, of this hammer as it ships; what is set is being computed", true);
+        return;
+      }
+      if (frame.serial <= refused) return;
       if (frame.kind !== "motion") { clear(OF_FRAMES[frame.kind] ?? []); return; }
       clear(CURVES);
       for (const view of OWN) {

@@ -282,7 +282,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
         asked.delete(frame.serial);
         return;
       }
-      if (frame.kind === "motion" || frame.kind === "refusal") {
+      if ((frame.kind === "motion" && !frame.ahead) || frame.kind === "refusal") {
         studio.busy = false;
         if (studio.stale) studio.sendState();
       }
@@ -297,7 +297,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       if (frame.kind === "motion") {
         const text = frame.message || `${frame.steps} steps, ${frame.status}`;
         // What a link or a file held, and could not be taken, is told until something else is set.
-        if (!studio.notes) studio.say(text, frame.status !== "ok");
+        if (!studio.notes && !frame.ahead) studio.say(text, frame.status !== "ok");
         const t = frame.data.t;
         studio.cursor = Math.min(studio.cursor, t[t.length - 1]);
       }
