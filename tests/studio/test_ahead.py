@@ -39,12 +39,8 @@ def test_they_are_what_is_computed(name: str) -> None:
 def test_only_an_opening_has_them() -> None:
     content = {**STATE, "hammer": "hendriks-1983", "views": VIEWS}
     assert len(frames_ahead(read_state(content), 1)) == 3
-    for changed in (
-        {"rate": 1201.0},
-        {"constants": {"mass": 1e-3}},
-        {"pulses": 2},
-        {"hammer": "bouncing-ball"},
-    ):
+    other = {"hammer": "bouncing-ball"}
+    for changed in ({"rate": 1201.0}, {"constants": {"mass": 1e-3}}, {"pulses": 2}, other):
         assert frames_ahead(read_state({**content, **changed}), 1) == []
     text = load("hendriks-1983").to_toml()
     assert frames_ahead(read_state({**content, "hammer": "", "text": text}), 1) == []

@@ -150,11 +150,19 @@ class Session:
         views = tuple(view for view in shown if self._whole.get(view) != KEYS[view](state))
         if views or role == "curves":
             self._work(Order(role, serial, state, views, self._outdated(state) if role == "curves" else {}))
-        self._served[role] = serial
+        with self._change:
+            self._served[role] = serial
+            self._change.notify_all()
 
     def _waiting(self, role: str) -> tuple[int, State] | None:
         latest = self._latest if role == "curves" else self._accepted
-        return latest if latest is not None and latest[0] != self._served.get(role) else None
+        if latest is None or latest[0] == self._served.get(role):
+            return None
+        serial, state = latest
+        if role == "detail" and "map" in state.views and self._served.get("map") != serial:
+            # The map makes machine code that the printed line needs too.
+            return latest if self._shown.get("map") == KEYS["map"](state) else None
+        return latest
 
     def _outdated(self, state: State) -> dict[str, str]:
         """Return why views that the page shows do not belong to a state."""
@@ -248,14 +256,14 @@ class Session:
 
     def _note(self, order: Order, view: str, whole: bool) -> None:
         """Note what the page comes to show."""
-        if view in KEYS:
-            self._shown[view] = KEYS[view](order.state)
-            if whole:
-                self._whole[view] = self._shown[view]
-        elif view == "motion":
-            with self._change:
+        with self._change:
+            if view in KEYS:
+                self._shown[view] = KEYS[view](order.state)
+                if whole:
+                    self._whole[view] = self._shown[view]
+            elif view == "motion":
                 self._accepted = (order.serial, order.state)
-                self._change.notify_all()
+            self._change.notify_all()
 
     def _ends(self, order: Order, worker: Worker) -> bool:
         """End or leave a worker that is to stop and does not; return whether it is gone."""

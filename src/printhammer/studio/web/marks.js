@@ -45,7 +45,12 @@ export function marksFor(panel) {
       mark(all(), why, true);
     },
     /** Work of a role takes long: what it waits for. */
-    progress: (role, why) => mark(ROLES[role].filter((view) => reasons.has(view)), why, true),
+    progress(role, why) {
+      for (const view of ROLES[role].filter((name) => reasons.has(name))) {
+        show(view);
+        panel(view).dataset.why = `${reasons.get(view)}; ${why}`;
+      }
+    },
     /** A frame has come. */
     arrived(frame) {
       if (frame.ahead) {
