@@ -16,7 +16,7 @@ from printhammer.studio.session import Session
 from printhammer.studio.states.state import read_state
 from printhammer.studio.workers import crew as crews
 from printhammer.studio.workers.crew import Crew
-from printhammer.studio.workers.jobs import Order
+from printhammer.studio.workers.order import Order
 from printhammer.studio.workers.worker import ProcessWorker, Worker
 
 STUCK = 999.0

@@ -67,6 +67,7 @@ def application(guard: Guard, shelf: Shelf, crew: Crew) -> Starlette:
         if len(tabs) >= MOST_TABS:
             await connection.close(BUSY, f"the studio is open {MOST_TABS} times already")
             return
+        crew.warm("curves", "map")
         session = Session(_sender(connection), shelf, crew)
         tabs.add(session)
         try:

@@ -75,7 +75,7 @@ def serve(
         server_header=False,
         timeout_graceful_shutdown=1,
     )
-    crew.warm("curves", "map", "detail")
+    crew.warm("curves")
     try:
         if ready is not None:
             ready(guard.address)

@@ -22,7 +22,7 @@ from printhammer.studio.pictures.keys import KEYS, kernel_key
 from printhammer.studio.states.shelf import Shelf
 from printhammer.studio.states.state import ProtocolError, State
 from printhammer.studio.workers.crew import PATIENT, Crew
-from printhammer.studio.workers.jobs import Order
+from printhammer.studio.workers.order import Order
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.studio.states.state import State
-    from printhammer.studio.workers.jobs import Order
+    from printhammer.studio.workers.order import Order
 
 logger = logging.getLogger(__name__)
 
@@ -39,10 +39,13 @@ class Workshop:
     send : callable
         Takes a message: ``("frame", view, whole, data)``, ``("compiling", sentence)``, empty at its end, and
         ``("done",)`` after every order.
+    alone : bool, optional
+        Whether the process is for it alone.
     """
 
-    def __init__(self, send: Callable[[tuple[Any, ...]], None]) -> None:
+    def __init__(self, send: Callable[[tuple[Any, ...]], None], *, alone: bool = False) -> None:
         self.tried: State | None = None
+        self._alone = alone
         self._send = send
         self._newer = threading.Event()
         self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
@@ -63,6 +66,8 @@ class Workshop:
 
         compiling.listen(lambda sentence: self._send(("compiling", sentence)))
         while (order := self._orders.get()) is not None:
+            if order.role == "detail":
+                self._step_back()
             try:
                 ROLES[order.role](order, self)
             except GivenUp:
@@ -74,6 +79,13 @@ class Workshop:
                 reason = f"this could not be computed, {type(error).__name__}: {error}"
                 self.tell(refusal(order.serial, reason), "refusal")
             self._send(("done",))
+
+    def _step_back(self) -> None:
+        """Leave the cores to what is looked at first, where this is a process of its own."""
+        if self._alone:
+            self._alone = False
+            with suppress(AttributeError, OSError):
+                os.nice(5)
 
     def tell(self, data: bytes, view: str, *, whole: bool = True) -> None:
         """Hand over a frame."""
@@ -105,7 +117,7 @@ def main() -> None:
 
     for module in sys.argv[1:]:
         import_module(module)
-    workshop = Workshop(send)
+    workshop = Workshop(send, alone=True)
 
     def listen() -> None:
         with suppress(EOFError, OSError, pickle.UnpicklingError):

@@ -5,7 +5,7 @@ Each is done by a worker of its own, so that curves never wait for a map, nor fo
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from printhammer.errors import InputError
 from printhammer.studio.frames import nothing, refusal
@@ -19,22 +19,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.studio.states.state import State
+    from printhammer.studio.workers.order import Order
 
 REST: Final = 0.3
 """Seconds without a newer state after which more strobe points and the verdict on a train follow."""
-
-
-class Order(NamedTuple):
-    """What a worker is to do."""
-
-    role: str
-    """ "curves", "map" or "detail"."""
-    serial: int
-    state: State
-    views: tuple[str, ...]
-    """Views to be drawn anew, of those that are the matter of the role."""
-    outdated: dict[str, str]
-    """Why views that the page shows do not belong to this state, by their names."""
 
 
 class Desk(Protocol):

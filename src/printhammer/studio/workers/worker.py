@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.studio.workers.jobs import Order
+    from printhammer.studio.workers.order import Order
 
 
 class Worker:
