@@ -255,6 +255,22 @@ def test_what_nobody_thought_of_is_told_and_the_page_lives_on(
     assert "nobody thought of this" in caplog.text
 
 
+def test_what_fails_before_a_worker_is_asked_is_told_and_the_page_lives_on(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(*_: Any) -> Any:
+        raise ZeroDivisionError("nobody thought of this")
+
+    with opened() as (made, page):
+        with monkeypatch.context() as patched:
+            patched.setattr(sessions, "kernel_key", broken)
+            made.receive(state(1))
+            page.until("refusal", serial=1)
+        made.receive(state(2, views=["motion"]))
+        page.until("dots", serial=2)
+    assert "nobody thought of this" in caplog.text
+
+
 def test_two_studios_in_one_process_have_hammers_of_their_own() -> None:
     hammer = Hammer.from_toml(TEXT.replace('"hendriks-1983"', '"mine"', 1), name="mine.toml")
     question = json.dumps({"kind": "hammer", "serial": 1, "name": hammer.name, "text": ""})

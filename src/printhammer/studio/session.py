@@ -149,20 +149,29 @@ class Session:
         ]
         views = tuple(view for view in shown if self._whole.get(view) != KEYS[view](state))
         if views or role == "curves":
-            self._work(Order(role, serial, state, views, self._outdated(state) if role == "curves" else {}))
+            self._safely(Order(role, serial, state, views, self._outdated(state) if role == "curves" else {}))
         with self._change:
             self._served[role] = serial
             self._change.notify_all()
+
+    def _safely(self, order: Order) -> None:
+        """Have an order done; where that fails as nobody thought of, it is told, and the page lives on."""
+        try:
+            self._work(order)
+        except OSError:
+            raise
+        except Exception as error:
+            logger.exception("%s, message %d", order.role, order.serial)
+            self._tell(refusal(order.serial, f"this could not be computed, {type(error).__name__}: {error}"))
 
     def _waiting(self, role: str) -> tuple[int, State] | None:
         latest = self._latest if role == "curves" else self._accepted
         if latest is None or latest[0] == self._served.get(role):
             return None
         serial, state = latest
-        if role == "detail" and "map" in state.views and self._served.get("map") != serial:
-            # The map makes machine code that the printed line needs too.
-            return latest if self._shown.get("map") == KEYS["map"](state) else None
-        return latest
+        # The map is looked at first, and makes machine code that the printed line needs too.
+        behind = role == "detail" and "map" in state.views and self._served.get("map") != serial
+        return None if behind else latest
 
     def _outdated(self, state: State) -> dict[str, str]:
         """Return why views that the page shows do not belong to a state."""
