@@ -113,7 +113,7 @@ def test_views_that_do_not_belong_to_a_state_are_told_with_its_curves() -> None:
         made.receive(state(3, views=["motion", "map"], pulses=3))
         found = page.until("dots", serial=3)
     told = [frame["outdated"] for frame in found if frame["kind"] == "motion"]
-    assert told == [{}, {}, {"map": "this still belongs to what was set before"}]
+    assert told == [{"map": "being computed"}, {}, {"map": "this still belongs to what was set before"}]
 
 
 def test_what_describes_no_hammer_is_told_and_the_next_state_is_served() -> None:

@@ -33,6 +33,8 @@ logger = logging.getLogger(__name__)
 
 _VIEWS: Final = {"curves": (), "map": ("map",), "detail": ("line", "strobe")}
 _FAILING: Final = {"map": "the map", "line": "the printed line", "strobe": "the strobe section"}
+_BEFORE: Final = "this still belongs to what was set before"
+_NOT_YET: Final = "being computed"
 _TICK: Final = 0.02
 _TOLD: Final = 1.0
 _LATE: Final = 0.25
@@ -144,10 +146,8 @@ class Session:
         if self._closed or taken is None:
             return
         serial, state = taken
-        shown = [
-            view for view in _VIEWS[role] if view in state.views and (view != "line" or state.line.strip())
-        ]
-        views = tuple(view for view in shown if self._whole.get(view) != KEYS[view](state))
+        own = [view for view in _VIEWS[role] if view in _computed(state)]
+        views = tuple(view for view in own if self._whole.get(view) != KEYS[view](state))
         if views or role == "curves":
             self._safely(Order(role, serial, state, views, self._outdated(state) if role == "curves" else {}))
         with self._change:
@@ -176,9 +176,9 @@ class Session:
     def _outdated(self, state: State) -> dict[str, str]:
         """Return why views that the page shows do not belong to a state."""
         return {
-            view: "this still belongs to what was set before"
-            for view, key in KEYS.items()
-            if view in state.views and view in self._shown and self._shown[view] != key(state)
+            view: _BEFORE if view in self._shown else _NOT_YET
+            for view in _computed(state)
+            if self._shown.get(view) != KEYS[view](state)
         }
 
     def _work(self, order: Order) -> None:
@@ -302,3 +302,8 @@ class Session:
             if self._whole.get(view) != KEYS[view](order.state):
                 self._note(order, view, whole=True)
                 self._tell(nothing(view, order.serial, f"{_FAILING[view]} {why}"))
+
+
+def _computed(state: State) -> list[str]:
+    """Return those views of a state that are computed apart from its curves; a line without a text is not."""
+    return [view for view in KEYS if view in state.views and (view != "line" or state.line.strip())]
