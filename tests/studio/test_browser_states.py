@@ -128,6 +128,11 @@ def test_what_an_oscilloscope_wrote_is_seen_after_its_units_were_asked_for(page:
     assert page.run("window.studio.studio.overlay.data.values[1]") == pytest.approx(54.5e-6)
     assert state(page)["waveform"]["values"][9] == pytest.approx(0.9)
     page.wait(f"{STATUS}.includes('its displacement is laid over the motion, its current is the pulse')")
+    # Longer than a message may be.
+    long = "".join(f"{k / 40:.5f},{k % 5}.000000\n" for k in range(40_000))
+    drop(page, "long.csv", "time [us],current [mA]\n" + long)
+    settled(page, "state.waveform?.times.length > 1900")
+    assert state(page)["waveform"]["times"][-1] == pytest.approx(1e-3, rel=1e-3)
     drop(page, "scope.csv", "a;b\n0;1\n1;2\n")
     page.wait("document.querySelector('dialog').open")
     page.run("document.querySelector('dialog button[value=\"\"]').click()")

@@ -17,6 +17,7 @@ import { setSystem, setUnits } from "./units.js";
 
 const MAKERS = { motion: motionView, sketch: sketchView, map: mapView, forces: forcesView, phase: phaseView, strobe: strobeView, loops: loopsView, energy: energyView, line: lineView };
 const MOST_GHOSTS = 4;
+const LARGEST_TABLE = 50e6; // bytes of a measured table
 const SHOWN = ["motion", "dots", "map", "strobe", "line"]; // frames that views are drawn from
 const DROPPED = "dropped ";
 const LONGEST = 800000; // characters of a link
@@ -194,11 +195,12 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   studio.preset = (patch) => studio.store.set(patch);
 
   studio.drop = async (file) => {
-    if (file.size > studio.limits.file) {
-      studio.say(`${file.name} has ${file.size} bytes, expected at most ${studio.limits.file}`, true);
+    const most = /\.(toml|json)$/i.test(file.name) ? studio.limits.file : LARGEST_TABLE;
+    if (file.size > most) {
+      studio.say(`${file.name} has ${file.size} bytes, expected at most ${most}`, true);
       return;
     }
-    const text = await file.text();
+    const text = thinned(await file.text(), studio.limits.file);
     const ask = (columns) => studio.ask("drop", { name: file.name, text, columns });
     let frame = await ask(null);
     if (frame.what === "columns") {
@@ -310,4 +312,12 @@ function honesty(hammer) {
   const counts = {};
   for (const { status } of hammer.constants) counts[status] = (counts[status] ?? 0) + 1;
   return Object.entries(counts).map(([status, count]) => `${count} ${status}`).join(", ");
+}
+
+/** Return a text with every so many of its lines, so that it is not too long; the first hundred stay. */
+function thinned(text, most) {
+  if (text.length <= most) return text;
+  const lines = text.split("\n");
+  const step = Math.ceil(text.length / (0.8 * most));
+  return lines.filter((_line, k) => k < 100 || k % step === 0).join("\n");
 }
