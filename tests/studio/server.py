@@ -1,6 +1,7 @@
 """A studio of its own process, and a page that is only its messages; helpers only."""
 
 import json
+import secrets
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -17,7 +18,8 @@ SCRIPT = """
 import sys
 from printhammer.hammer.hammer import load
 from printhammer.studio import serve
-serve(load(sys.argv[1]), ready=lambda address: print(address, flush=True))
+ready = lambda address: print(address, flush=True)
+serve(load(sys.argv[1]), port=int(sys.argv[2]), token=sys.argv[3], ready=ready)
 """
 STATE: dict[str, Any] = {
     "hammer": "",
@@ -62,11 +64,12 @@ class Studio:
 
 
 @contextmanager
-def studio(hammer: str = str(CRUDE)) -> Iterator[Studio]:
-    """Run a studio with a hammer, by default the crude one."""
+def studio(hammer: str = str(CRUDE), port: int = 0, token: str = "") -> Iterator[Studio]:
+    """Run a studio with a hammer, by default the crude one, and a token of its own."""
     from printhammer.hammer.hammer import load
 
-    command = (sys.executable, "-c", SCRIPT, hammer)
+    token = token or secrets.token_urlsafe(24)
+    command = (sys.executable, "-c", SCRIPT, hammer, str(port), token)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     try:

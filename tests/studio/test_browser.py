@@ -14,8 +14,8 @@ from tests.studio.server import Studio
 
 import printhammer as ph
 from printhammer.studio.bundle import module
+from printhammer.studio.messages import answer, read_message
 from printhammer.studio.pictures.engine import motion_frame
-from printhammer.studio.session import answer, read_message
 from printhammer.studio.states.shelf import Shelf
 
 CTRL, SHIFT = 2, 8
@@ -251,9 +251,10 @@ def test_the_widget_is_the_same_page(opened_browser: Any) -> None:
         ".then((made) => made.default.render({ model: window.model, el: document.body })).then(() => 1)"
     )
     assert page.run("document.querySelectorAll('.panel').length") == len(VIEWS)
-    kind, serial, content = read_message(json.dumps(page.run("window.sent[0]")))
-    page.run(answered(answer(kind, serial, content, Shelf())))
-    kind, serial, found = read_message(json.dumps(page.wait("window.sent[1]")))
+    for number in range(2):
+        kind, serial, content = read_message(json.dumps(page.wait(f"window.sent[{number}]")))
+        page.run(answered(answer(kind, serial, content, Shelf())))
+    kind, serial, found = read_message(json.dumps(page.wait("window.sent[2]")))
     assert (kind, found.rate) == ("state", 900.0)
     data, _ = motion_frame(found, serial)
     page.run(answered(data))

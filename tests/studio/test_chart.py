@@ -13,7 +13,8 @@ from printhammer.maps.frequency import TAIL
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.studio import bounds
 from printhammer.studio.frames import unframe
-from printhammer.studio.pictures.chart import GAP, codes_of, map_frame, map_key, try_map
+from printhammer.studio.pictures.chart import GAP, codes_of, map_frame, try_map
+from printhammer.studio.pictures.keys import KEYS
 from printhammer.studio.states.state import State, read_state
 from printhammer.studio.work import GivenUp
 
@@ -53,11 +54,11 @@ def test_it_follows_the_pattern() -> None:
     runs = ph.Ensemble(state.changed, drives, end, tolerance=DISPLAY_TOLERANCE)
     x = np.clip(runs.run(times=np.linspace(0.0, end, 60)).x, heading["low"], heading["high"])
     assert np.abs(shown - x).max() <= 1.01 * (heading["high"] - heading["low"]) / (GAP - 1)
-    assert map_key(state) != map_key(of(low=700.0, high=1500.0, pulses=9))
+    assert KEYS["map"](state) != KEYS["map"](of(low=700.0, high=1500.0, pulses=9))
 
 
 def test_a_pattern_of_all_pulses_is_the_train() -> None:
-    assert map_key(of(pattern="111", pulses=9)) == map_key(of(pulses=3))
+    assert KEYS["map"](of(pattern="111", pulses=9)) == KEYS["map"](of(pulses=3))
 
 
 def test_a_gap_has_a_code_of_its_own() -> None:

@@ -2,10 +2,15 @@
 
 import pytest
 from tests.hammers import CRUDE
+from tests.studio.server import STATE
 
 from printhammer.hammer.hammer import Hammer, load, shipped
 from printhammer.hammer.names import range_of
+from printhammer.run.simulate import end_of_run
+from printhammer.studio import bounds
+from printhammer.studio.pictures.engine import limited_run
 from printhammer.studio.states import controls
+from printhammer.studio.states.state import read_state
 from printhammer.units import to_si
 
 HAMMERS = [*shipped(), str(CRUDE)]
@@ -61,3 +66,14 @@ def test_units_are_shown_by_factors_of_the_unit_table() -> None:
         for shown in systems:
             plain = shown["name"].replace("µ", "u").replace("·", " ")
             assert shown["factor"] * to_si(1.0, plain, si) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_a_shipped_hammer_opens_with_something_that_strikes_its_backstop(name: str) -> None:
+    hammer = load(name)
+    opening = controls.describe(hammer)["start"]
+    assert bool(opening) == (hammer.waveform is None)
+    state = read_state({**STATE, "hammer": name, **opening})
+    motion = limited_run(state.changed, state.drive, end_of_run(state.drive, None), bounds.MOST_STEPS)
+    assert motion.status == "ok"
+    assert any(contact.surface == "backstop" for contact in motion.contacts)

@@ -1,4 +1,6 @@
-"""Dropped files: a hammer or a curve, or one sentence."""
+"""Dropped files: a state, a hammer or curves, a question what columns hold, or one sentence."""
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +11,31 @@ from tests.hammers import CRUDE
 from printhammer.errors import InputError
 from printhammer.studio.bounds import MOST_SAMPLES
 from printhammer.studio.frames import unframe
-from printhammer.studio.states.drops import dropped, read_curve
+from printhammer.studio.messages import read_message
+from printhammer.studio.states.drops import dropped
+from printhammer.studio.states.records import Record, read_record
+from printhammer.studio.states.state import ProtocolError
+
+TIMES = np.array([0.0, 1e-5, 2e-5])
+PLACES = np.array([50e-6, 51.5e-6, 52e-6])
+CURRENTS = np.array([0.0, 0.5, 1.25])
+# The same three samples, as programs write them.
+WRITTEN = {
+    "ours": "# by hand\ntime [us],displacement [um],current [A]\n0,50,0\n10,51.5,0.5\n20,52,1.25\n",
+    "semicolons": "time (us);displacement (um);current (A)\n0;50;0\n10;51,5;0,5\n20;52;1,25\n",
+    "tabs": "Time [us]\tPosition [um]\tCurrent [mA]\n0\t50\t0\n10\t51.5\t500\n20\t52\t1250\n",
+    "units below": "x-axis,Position,Current\nsecond,mm,A\n0,0.05,0\n1e-5,0.0515,0.5\n2E-5,0.052,1.25\n",
+    "lines above": (
+        "Model,XYZ\nSample Interval,1e-5\n\n"
+        "time [s],displacement [m],current [A]\n-1e-5,50e-6,0\n0,51.5e-6,.5\n1e-5,52e-6,1.25\n"
+    ),
+}
+
+
+def record_of(text: str, told: Any = None) -> Record:
+    found = read_record(text, "a.csv", told)
+    assert isinstance(found, Record)
+    return found
 
 
 def test_a_hammer_file_is_told_by_its_name() -> None:
@@ -20,37 +46,95 @@ def test_a_hammer_file_is_told_by_its_name() -> None:
 
 def test_a_curve_is_converted_to_si() -> None:
     heading, found = unframe(dropped(3, "a.csv", "# by hand\ntime [us],displacement [mil]\n0,2\n10,4\n"))
-    assert heading["what"] == "displacement"
+    assert heading["what"] == "curves"
     np.testing.assert_allclose(found["t"], [0.0, 1e-5], rtol=1e-7)
-    np.testing.assert_allclose(found["values"], [50.8e-6, 101.6e-6], rtol=1e-7)
+    np.testing.assert_allclose(found["displacement"], [50.8e-6, 101.6e-6], rtol=1e-7)
+
+
+@pytest.mark.parametrize("written", WRITTEN.values(), ids=list(WRITTEN))
+def test_what_oscilloscopes_write_is_read(written: str) -> None:
+    found = record_of(written)
+    np.testing.assert_allclose(found.times, TIMES, rtol=1e-12, atol=1e-20)
+    np.testing.assert_allclose(found.curves["displacement"], PLACES, rtol=1e-12)
+    np.testing.assert_allclose(found.curves["current"], CURRENTS, rtol=1e-12)
+
+
+def test_what_columns_hold_is_asked_for_where_the_heading_does_not_say_it() -> None:
+    text = "time,displacement,current\n0,50,0\n10,51.5,0.5\n20,52,1.25\n"
+    heading, _ = unframe(dropped(3, "a.csv", text))
+    assert heading["what"] == "columns"
+    assert [column["quantity"] for column in heading["columns"]] == ["time", "displacement", "current"]
+    assert heading["columns"][1]["first"] == ["50", "51.5", "52"]
+    told = [("time", "us"), ("displacement", "um"), ("current", "1 A")]
+    found = record_of(text, told)
+    np.testing.assert_allclose(found.curves["displacement"], PLACES)
+    np.testing.assert_allclose(found.curves["current"], CURRENTS)
+    # A probe of 0.1 V/A, and a column that nobody needs.
+    found = record_of(
+        "sec,CH1,CH2\n0,0,7\n1e-5,0.05,7\n2e-5,0.125,7\n", [("time", "s"), ("current", "10 A"), ("", "")]
+    )
+    np.testing.assert_allclose(found.curves["current"], CURRENTS)
+    assert set(found.curves) == {"current"}
 
 
 def test_a_long_curve_is_thinned_and_keeps_its_ends() -> None:
-    rows = "\n".join(f"{k},{k % 7}" for k in range(10 * MOST_SAMPLES))
-    _, times, values = read_curve(f"time [us],current [A]\n{rows}", "a.csv")
-    assert len(times) == len(values) == MOST_SAMPLES
-    assert (times[0], times[-1]) == (0.0, pytest.approx((10 * MOST_SAMPLES - 1) * 1e-6))
+    rows = "\n".join(f"{k / 10},{k % 7}" for k in range(10 * MOST_SAMPLES))
+    found = record_of(f"time [us],current [A]\n{rows}")
+    assert len(found.times) == len(found.curves["current"]) == MOST_SAMPLES
+    assert (found.times[0], found.times[-1]) == (0.0, pytest.approx((10 * MOST_SAMPLES - 1) * 1e-7))
 
 
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
         ("", "the file is empty"),
-        ("time,current\n0,1\n1,2", "carry a unit"),
-        ("time [us],colour [m]\n0,1\n1,2", "columns 'time', 'colour'"),
+        ("time [us],colour [m]\nred,blue", "expected columns of numbers"),
         ("time [us],current [A]\n0,1\n0,2", "increasing times"),
-        ("time [us],current [A]\n0,1\n1,x", "row 3 is expected to hold 2 finite numbers"),
+        ("time [us],current [A]\n0,1\n1,x", "row 3 is expected to hold finite numbers"),
         ("time [us],current [A]\n0,1\n1,nan", "row 3"),
+        ("time [us],current [A]\n0,1\n1", "row 3 has 1 cells, expected 2"),
         ("time [us],current [s]\n0,1\n1,2", "unit 's' is a time"),
         ('time [us],current [A]\n0,"1\n1,2', "comma-separated"),
+        ("time [us],current [A],current [A]\n0,1,1\n1,2,2", "2 columns of current, expected one"),
+        ("time [s],current [A]\n0,1\n1,2", "a current of 1 s, expected at most 0.02 s"),
+        ("time [us],current [kA]\n0,1\n1,2", "a current of 2000 A, expected at most 100 A"),
+        (",".join("1" * 17), "17 columns, expected at most 16"),
     ],
 )
 def test_what_is_no_curve_is_refused_in_one_sentence(text: str, reason: str) -> None:
     with pytest.raises(InputError, match=rf"^a\.csv: .*{reason}"):
-        read_curve(text, "a.csv")
+        read_record(text, "a.csv")
 
 
-@given(st.text(max_size=300), st.sampled_from(["a.csv", "a.toml", "a"]))
-def test_random_text_is_refused(text: str, name: str) -> None:
-    with pytest.raises(InputError, match="expected"):
-        dropped(1, name, text)
+@pytest.mark.parametrize(
+    ("told", "reason"),
+    [
+        ([("time", "us")], "2 columns, expected as many answers"),
+        ([("", ""), ("current", "A")], "expected a column of time"),
+        ([("time", "us"), ("", "")], "expected a column of time"),
+        ([("time", "us"), ("current", "")], "unit"),
+        ([("time", "us"), ("current", "V")], "unit 'V' is a voltage"),
+    ],
+)
+def test_an_answer_that_is_none_is_refused(told: list[tuple[str, str]], reason: str) -> None:
+    with pytest.raises(InputError, match=rf"^a\.csv: .*{reason}"):
+        read_record("a,b\n0,1\n1,2\n", "a.csv", told)
+
+
+@pytest.mark.parametrize("columns", ["[1]", '[["x", "m"]]', '[["time"]]', "{}", str([["time", "s"]] * 99)])
+def test_columns_that_no_page_sends_end_the_connection(columns: str) -> None:
+    columns = columns.replace("'", '"')
+    with pytest.raises(ProtocolError, match="columns"):
+        read_message(f'{{"kind": "drop", "serial": 1, "name": "a", "text": "", "columns": {columns}}}')
+
+
+@given(st.text(max_size=300), st.sampled_from(["a.csv", "a.toml", "a", "a.json"]))
+def test_random_text_is_refused_or_asked_about(text: str, name: str) -> None:
+    try:
+        heading, _ = unframe(dropped(1, name, text))
+    except InputError as error:
+        sentence = str(error)
+    else:
+        sentence = f"expected {heading['what']}"
+    assert "expected" in sentence
+    assert sentence.removeprefix("expected ") not in ("state", "hammer", "curves")

@@ -1,7 +1,9 @@
 """The server: who is let in, what ends a connection, and that nothing harms another one."""
 
 import json
+import os
 import random
+import signal
 import socket
 import time
 from collections.abc import Iterator
@@ -11,9 +13,10 @@ from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
 import pytest
-from tests.studio.server import STATE, Studio, frames, say
+from tests.studio.server import STATE, Studio, frames, say, studio
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
 
 from printhammer.studio.bounds import LARGEST_MESSAGE, MOST_TABS
 
@@ -60,10 +63,21 @@ def get(running: Studio, path: str, **headers: str) -> tuple[int, Any]:
             return error.code, error.headers
 
 
-def test_the_page_needs_the_token(running: Studio) -> None:
-    assert get(running, f"/?token={running.token}")[0] == 200
-    for path in ("/", "/?token=", "/?token=wrong", f"/?token={running.token[:-1]}"):
+def test_a_token_in_the_address_is_the_right_one(running: Studio) -> None:
+    # Without one the page is only its files, which are the same for everybody.
+    for path in ("/", f"/?token={running.token}"):
+        assert get(running, path)[0] == 200
+    for path in ("/?token=", "/?token=wrong", f"/?token={running.token[:-1]}"):
         assert get(running, path)[0] == 403
+
+
+def test_nothing_is_computed_without_the_token(running: Studio) -> None:
+    origin = f"http://{running.host}"
+    with (
+        pytest.raises(InvalidStatus, match="403"),
+        connect(f"ws://{running.host}/socket", origin=Origin(origin)),
+    ):
+        pass
 
 
 def test_the_host_is_this_machine(running: Studio) -> None:
@@ -203,3 +217,54 @@ def test_a_thousand_random_messages_and_fifty_disconnects_leave_it_as_it_was(run
     assert running.process.poll() is None
     # A leak of the frames of one page, of half a megabyte each, would be several times as much.
     assert after - before < 16_000
+
+
+def test_ctrl_c_ends_it_within_a_second_whatever_it_does() -> None:
+    with studio() as running, running.connect() as connection:
+        say(connection, "state", 1, state=running.state(rate=905.0))
+        frames(connection, "motion")
+        workers = children_of(running.process.pid)
+        assert workers
+        begun = time.monotonic()
+        running.process.send_signal(signal.SIGINT)
+        running.process.wait(20)
+        # A second, and what a busy machine needs to do anything at all.
+        assert time.monotonic() - begun < 2.0
+        end = time.monotonic() + 5.0
+        while any(Path(f"/proc/{worker}").exists() for worker in workers):
+            assert time.monotonic() < end
+            time.sleep(0.02)
+
+
+def test_nothing_runs_where_no_page_is_open() -> None:
+    with studio() as running:
+        with running.connect() as connection:
+            say(connection, "state", 1, state=running.state())
+            frames(connection, "motion")
+        processes = [running.process.pid, *children_of(running.process.pid)]
+        # What is under way is given up at the next question whether to go on, or ended after a while.
+        time.sleep(3.0)
+        processes += children_of(running.process.pid)
+        before = time_of(processes)
+        time.sleep(1.0)
+        assert time_of(processes) - before < 0.1
+
+
+def children_of(process: int) -> list[int]:
+    """Return the processes that one has started."""
+    found = []
+    for path in Path(f"/proc/{process}/task").glob("*/children"):
+        found += [int(number) for number in path.read_text("utf-8").split()]
+    return found
+
+
+def time_of(processes: list[int]) -> float:
+    """Return the time of the processor that some processes have used, s; of those that ended none."""
+    ticks = 0
+    for process in set(processes):
+        try:
+            fields = Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()
+        except OSError:
+            continue
+        ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")

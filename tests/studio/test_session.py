@@ -15,10 +15,14 @@ from printhammer.studio import bounds
 from printhammer.studio import session as sessions
 from printhammer.studio.bounds import LARGEST_MESSAGE
 from printhammer.studio.frames import unframe
+from printhammer.studio.messages import read_message
 from printhammer.studio.pictures.section import AT_ONCE, LATER
-from printhammer.studio.session import Session, read_message
+from printhammer.studio.session import Session
 from printhammer.studio.states.shelf import Shelf
 from printhammer.studio.states.state import ProtocolError
+from printhammer.studio.workers import jobs
+from printhammer.studio.workers.crew import Crew
+from printhammer.studio.workers.worker import ThreadWorker
 
 TEXT = CRUDE.read_text("utf-8")
 
@@ -53,7 +57,7 @@ class Page:
 @contextmanager
 def opened(shelf: Shelf | None = None) -> Iterator[tuple[Session, Page]]:
     page = Page()
-    made = Session(page.take, shelf)
+    made = Session(page.take, shelf, Crew(ThreadWorker))
     try:
         yield made, page
     finally:
@@ -100,6 +104,18 @@ def test_a_map_that_is_shown_is_not_computed_again() -> None:
     assert [frame["serial"] for frame in found if frame["kind"] == "map"] == [1, 1, 3, 3]
 
 
+def test_views_that_do_not_belong_to_a_state_are_told_with_its_curves() -> None:
+    with opened() as (made, page):
+        made.receive(state(1, views=["motion", "map"]))
+        page.until("map", detail="full")
+        made.receive(state(2, views=["motion", "map"], rate=900.0))
+        page.until("dots", serial=2)
+        made.receive(state(3, views=["motion", "map"], pulses=3))
+        found = page.until("dots", serial=3)
+    told = [frame["outdated"] for frame in found if frame["kind"] == "motion"]
+    assert told == [{"map": "being computed"}, {}, {"map": "this still belongs to what was set before"}]
+
+
 def test_what_describes_no_hammer_is_told_and_the_next_state_is_served() -> None:
     with opened() as (made, page):
         made.receive(state(1, constants={"mass": 1.0}))
@@ -121,16 +137,16 @@ def test_questions_are_answered() -> None:
 
 
 def test_a_reason_is_no_longer_than_it_can_be_read() -> None:
-    question = {"kind": "drop", "serial": 1, "name": "a.csv", "text": "x" * 100_000}
+    question = {"kind": "hammer", "serial": 1, "name": "x" * 100_000, "text": ""}
     with opened() as (made, page):
         made.receive(json.dumps(question))
         (told,) = page.until("refusal")
     assert len(told["reason"]) == bounds.LONGEST_REASON
 
 
-def test_nothing_is_sent_after_the_end_and_both_threads_end() -> None:
+def test_nothing_is_sent_after_the_end_and_all_threads_end() -> None:
     page = Page()
-    made = Session(page.take)
+    made = Session(page.take, crew=Crew(ThreadWorker))
     made.receive(state(1, views=["motion", "map", "strobe"]))
     page.until("motion")
     made.close()
@@ -145,7 +161,7 @@ def test_a_page_that_is_gone_ends_the_work() -> None:
     def gone(_data: bytes) -> None:
         raise ConnectionError
 
-    made = Session(gone)
+    made = Session(gone, crew=Crew(ThreadWorker))
     made.receive(state(1))
     made.join(60)
     assert not any(thread.is_alive() for thread in made._threads)
@@ -164,7 +180,7 @@ def test_a_page_that_is_gone_ends_the_work() -> None:
         ('{"kind": "shell", "serial": 1}', "kind"),
         ('{"kind": ["state"], "serial": 1}', "kind"),
         ('{"kind": "state", "serial": 1, "state": {}, "more": 1}', "has the keys"),
-        ('{"kind": "drop", "serial": 1, "name": 1, "text": ""}', "texts"),
+        ('{"kind": "hammer", "serial": 1, "name": 1, "text": ""}', "texts"),
         (" " * (LARGEST_MESSAGE + 1), "characters"),
     ],
 )
@@ -176,7 +192,7 @@ def test_a_malformed_message_is_refused_with_a_reason(text: str, reason: str) ->
 def test_too_many_questions_at_once_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     hold = threading.Event()
     monkeypatch.setattr(sessions, "answer", lambda *_: hold.wait(60) and b"")
-    made = Session(lambda _data: None)
+    made = Session(lambda _data: None, crew=Crew(ThreadWorker))
     question = json.dumps({"kind": "hammer", "serial": 1, "name": "", "text": ""})
 
     def ask(times: int) -> None:
@@ -230,12 +246,28 @@ def test_what_nobody_thought_of_is_told_and_the_page_lives_on(
 
     with opened() as (made, page):
         with monkeypatch.context() as patched:
-            patched.setattr(sessions, "motion_frame", broken)
+            patched.setattr(jobs, "motion_frame", broken)
             made.receive(state(1))
             (told,) = page.until("refusal", serial=1)
         made.receive(state(2, views=["motion"]))
         page.until("dots", serial=2)
     assert told["reason"] == "this could not be computed, ZeroDivisionError: nobody thought of this"
+    assert "nobody thought of this" in caplog.text
+
+
+def test_what_fails_before_a_worker_is_asked_is_told_and_the_page_lives_on(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(*_: Any) -> Any:
+        raise ZeroDivisionError("nobody thought of this")
+
+    with opened() as (made, page):
+        with monkeypatch.context() as patched:
+            patched.setattr(sessions, "kernel_key", broken)
+            made.receive(state(1))
+            page.until("refusal", serial=1)
+        made.receive(state(2, views=["motion"]))
+        page.until("dots", serial=2)
     assert "nobody thought of this" in caplog.text
 
 

@@ -80,6 +80,19 @@ def test_a_shipped_hammer_is_named() -> None:
     assert texts["command"].startswith("printhammer run hendriks-1983 --rate '1200.0 Hz' --pulses 9")
 
 
+def test_a_shipped_hammer_that_the_studio_opened_with_is_named_too() -> None:
+    texts = texts_of(read_state({**STATE, "hammer": "hendriks-1983"}, Shelf(ph.load("hendriks-1983"))))
+    assert "ph.load('hendriks-1983')" in texts["python"]
+    assert texts["command"].startswith("printhammer run hendriks-1983 ")
+
+
+def test_a_hammer_that_was_made_in_python_is_written_out() -> None:
+    hammer = ph.load("hendriks-1983").replace("mass", "0.5 g")
+    texts = texts_of(read_state({**STATE, "hammer": "hendriks-1983"}, Shelf(hammer)))
+    assert "ph.Hammer.from_toml(" in texts["python"]
+    assert texts["command"].startswith(f"printhammer run {HAMMER_FILE} ")
+
+
 def test_the_hammer_that_the_studio_opened_with_is_named_by_its_file() -> None:
     hammer = ph.load(CRUDE)
     state = read_state({**STATE, "hammer": hammer.name}, Shelf(hammer))

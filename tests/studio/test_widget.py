@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +15,33 @@ from tests.studio.server import STATE
 
 from printhammer.hammer.hammer import load
 from printhammer.studio import widget
-from printhammer.studio.bundle import module, style
+from printhammer.studio.bundle import PLACE, module, style
+from printhammer.studio.bundle import page as saved_page
 from printhammer.studio.files import page_files
 from printhammer.studio.frames import unframe
 
 
-def test_the_module_holds_every_part_before_it_is_needed() -> None:
-    listed = json.loads(module().partition("const sources = ")[2].partition(";\nconst places")[0])
+@pytest.mark.parametrize(("whole", "last"), [(module, "mount.js"), (saved_page, "kept.js")])
+def test_a_bundle_holds_every_part_before_it_is_needed(whole: Callable[[], str], last: str) -> None:
+    listed = json.loads(whole().partition("const sources = ")[2].partition(";\nconst places")[0])
     seen: list[str] = []
     for name, text in listed:
         needed = re.findall(r'from "\./([\w./]+)"', text)
         assert set(needed) <= set(seen), name
         seen.append(name)
-    assert seen[-1] == "mount.js"
-    assert set(seen) == {name for name in page_files() if name.endswith(".js")} - {
-        "page.js",
-        "vendor/uPlot.iife.min.js",
-    }
+    assert seen[-1] == last
+    own = {name for name in page_files() if name.endswith(".js")} - {"page.js", "vendor/uPlot.iife.min.js"}
+    assert set(seen) == own - ({"kept.js"} - {last})
+
+
+def test_the_page_that_is_saved_holds_no_end_of_a_script_but_its_own() -> None:
+    assert saved_page().count("</script>") == 2
+    assert saved_page().count(PLACE) == 1 + exports_of_place()
+
+
+def exports_of_place() -> int:
+    """Return how often the module that fills the page names its place."""
+    return page_files()["exports.js"].decode().count(PLACE)
 
 
 def test_nothing_is_fetched_from_elsewhere() -> None:

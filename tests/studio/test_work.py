@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -73,3 +74,14 @@ def test_a_line_that_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(bounds, "MOST_MAP_STEPS", 10)
     heading, _ = unframe(line_frame(of(line="HAMMER"), 1, lambda: False))
     assert "would take more than 10 steps" in heading["reason"]
+
+
+def test_a_line_is_printed_with_a_measured_pulse() -> None:
+    times = [5e-6 * k for k in range(93)]
+    hammer = of().fired
+    values = hammer.value(np.array(times)).tolist()
+    pulse = {"shape": "sampled", "times": times, "values": values, "quantity": "current"}
+    heading, _ = unframe(line_frame(of(line="I", waveform=pulse), 1, lambda: False))
+    known, _ = unframe(line_frame(of(line="I"), 1, lambda: False))
+    assert heading["reason"] == ""
+    assert heading["wanted"] == known["wanted"] > 0

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from starlette.requests import Request
 
     from printhammer.studio.states.shelf import Shelf
+    from printhammer.studio.workers.crew import Crew
 
 REFUSED: Final = 1008
 BUSY: Final = 1013
@@ -31,7 +32,7 @@ BUSY: Final = 1013
 _PATIENCE: Final = 20.0
 
 
-def application(guard: Guard, shelf: Shelf) -> Starlette:
+def application(guard: Guard, shelf: Shelf, crew: Crew) -> Starlette:
     """Return the application.
 
     Parameters
@@ -40,11 +41,14 @@ def application(guard: Guard, shelf: Shelf) -> Starlette:
         Who may speak to it.
     shelf : Shelf
         The hammers that it offers.
+    crew : Crew
+        Who computes for all its pages.
     """
     tabs: set[Session] = set()
 
     def page(request: Request) -> Response:
-        if reason := guard.refuse(request.headers, request.query_params.get("token", "")):
+        # The page itself is the same for everybody; what it may ask of the socket depends on the token.
+        if reason := guard.refuse(request.headers, request.query_params.get("token")):
             return _refused(reason)
         return _file("index.html")
 
@@ -63,7 +67,8 @@ def application(guard: Guard, shelf: Shelf) -> Starlette:
         if len(tabs) >= MOST_TABS:
             await connection.close(BUSY, f"the studio is open {MOST_TABS} times already")
             return
-        session = Session(_sender(connection), shelf)
+        crew.warm("curves", "map")
+        session = Session(_sender(connection), shelf, crew)
         tabs.add(session)
         try:
             await _listen(connection, session)

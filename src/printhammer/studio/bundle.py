@@ -1,4 +1,4 @@
-"""The page as one ES module and one style sheet, for a notebook, where no module can fetch another."""
+"""The page as one ES module and one style sheet, for a notebook, and as one file that needs no server."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from printhammer.studio.files import page_files
 
 _IMPORT: Final = re.compile(r'from "\./([\w./]+)"')
 
-_LOADER: Final = """
+_SOURCES: Final = """
 const sources = %s;
 const places = {};
 for (const [name, text] of sources) {
   const whole = text.replace(/from "\\.\\/([\\w.\\/]+)"/g, (_all, part) => `from "${places[part]}"`);
   places[name] = URL.createObjectURL(new Blob([whole], { type: "text/javascript" }));
 }
+"""
+
+_WIDGET: Final = """
 const { mount } = await import(places["mount.js"]);
 export default {
   render({ model, el }) {
@@ -42,6 +45,11 @@ export default {
 @lru_cache
 def module() -> str:
     """Return the one module: the modules of the page as texts, needed ones first, and what loads them."""
+    return _sources("mount.js") + _WIDGET
+
+
+def _sources(wanted: str) -> str:
+    """Return a script that makes modules of the page: one that is wanted, and what it needs."""
     texts = {name: data.decode() for name, data in page_files().items() if name.endswith(".js")}
     ordered: list[tuple[str, str]] = []
 
@@ -52,8 +60,9 @@ def module() -> str:
             add(part)
         ordered.append((name, texts[name]))
 
-    add("mount.js")
-    return _LOADER % json.dumps(ordered)
+    add(wanted)
+    # Inside a page, no text may look like the end of a script.
+    return _SOURCES % json.dumps(ordered).replace("<", "\\u003c")
 
 
 @lru_cache
@@ -61,3 +70,35 @@ def style() -> str:
     """Return the one style sheet."""
     sheets = page_files()
     return "\n".join(sheets[name].decode() for name in ("vendor/uPlot.min.css", "studio.css"))
+
+
+PLACE: Final = "/* what is kept */"
+"""Where the page that is saved holds its state and its curves, as JSON without the sign <."""
+
+_PAGE: Final = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline' blob:; \
+style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'">
+<title>printhammer studio, as it was saved</title>
+<style>%s</style>
+</head>
+<body>
+<div id="studio"></div>
+<noscript>The curves are drawn by JavaScript.</noscript>
+<script type="application/json" id="kept">%s</script>
+<script type="module">%s
+const { show } = await import(places["kept.js"]);
+show(document.getElementById("studio"), JSON.parse(document.getElementById("kept").textContent));
+</script>
+</body>
+</html>
+"""
+
+
+@lru_cache
+def page() -> str:
+    """Return a page that shows, without a server, what is put in the place of `PLACE`."""
+    return _PAGE % (style(), PLACE, _sources("kept.js"))

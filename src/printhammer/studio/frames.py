@@ -16,7 +16,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from printhammer.studio.bounds import LONGEST_REASON
+
 _ALIGN: Final = 8
+_NOTHING: Final[dict[str, dict[str, Any]]] = {"map": {"detail": "none"}, "strobe": {"verdict": None}}
 _DTYPES: Final = {"f4": "<f4", "f8": "<f8", "u2": "<u2", "i4": "<i4", "u1": "|u1"}
 
 
@@ -51,6 +54,16 @@ def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **ent
     text = json.dumps(plain(heading), allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-(4 + len(text)) % _ALIGN)
     return b"".join((struct.pack("<I", len(text)), text, *parts))
+
+
+def nothing(view: str, serial: int, reason: object) -> bytes:
+    """Return that there is nothing to show in a view, and why."""
+    return frame(view, serial, reason=str(reason), **_NOTHING.get(view, {}))
+
+
+def refusal(serial: int, reason: str) -> bytes:
+    """Return that something is refused, and why."""
+    return frame("refusal", serial, reason=reason[:LONGEST_REASON])
 
 
 def unframe(data: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray[Any, Any]]]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import socket
-import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from printhammer.errors import InputError, missing_extra
 
@@ -12,14 +12,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.studio.states.shelf import Shelf, Told
 
-_SLICE = 5e-4
+PORT: Final = 19830
+"""Port of the studio unless told otherwise: the same every time, so that links and open pages stay good."""
 
 
 def serve(
     hammer: Hammer | None = None,
     *,
-    port: int = 0,
+    port: int | None = None,
+    state: str | Path | None = None,
     ready: Callable[[str], None] | None = None,
     token: str | None = None,
 ) -> None:
@@ -30,16 +33,18 @@ def serve(
     hammer : Hammer, optional
         The hammer that it opens with; by default the first one that comes with the program.
     port : int, optional
-        Port on 127.0.0.1; by default a free one.
+        Port on 127.0.0.1, 0 for a free one; by default `PORT`, or a free one where that is taken.
+    state : path, optional
+        A state that the studio has saved, to open with; what of it cannot be taken the page tells.
     ready : callable, optional
         Called with the address of the page once it can be opened.
     token : str, optional
-        What the address has to hold; by default a new random one.
+        What the address has to hold; by default that of the user, see `printhammer.studio.token`.
 
     Raises
     ------
     InputError
-        The extra `studio` is not installed, or the port cannot be used.
+        The extra `studio` is not installed, the port cannot be used, or the file is no state.
     """
     try:
         import uvicorn
@@ -50,11 +55,17 @@ def serve(
     from printhammer.studio.bounds import LARGEST_MESSAGE
     from printhammer.studio.guard import HOSTS, Guard
     from printhammer.studio.states.shelf import Shelf
+    from printhammer.studio.token import user_token
+    from printhammer.studio.workers.crew import Crew
 
+    shelf = Shelf(hammer)
+    if state is not None:
+        shelf.start = _read(Path(state), shelf)
     listening = _listen(HOSTS[0], port)
-    guard = Guard(listening.getsockname()[1], token)
+    guard = Guard(listening.getsockname()[1], token or user_token())
+    crew = Crew()
     config = uvicorn.Config(
-        application(guard, Shelf(hammer)),
+        application(guard, shelf, crew),
         log_level="warning",
         access_log=False,
         lifespan="off",
@@ -64,14 +75,28 @@ def serve(
         server_header=False,
         timeout_graceful_shutdown=1,
     )
-    # A thread that draws no longer waits several milliseconds for one that computes.
-    sys.setswitchinterval(_SLICE)
-    if ready is not None:
-        ready(guard.address)
-    uvicorn.Server(config).run(sockets=[listening])
+    crew.warm("curves")
+    try:
+        if ready is not None:
+            ready(guard.address)
+        uvicorn.Server(config).run(sockets=[listening])
+    finally:
+        crew.close()
 
 
-def _listen(host: str, port: int) -> socket.socket:
+def _read(path: Path, shelf: Shelf) -> Told:
+    from printhammer.studio.states.links import read_file
+    from printhammer.support.texts import read_text
+
+    return read_file(read_text(path, "the state"), str(path), shelf)
+
+
+def _listen(host: str, port: int | None) -> socket.socket:
+    if port is None:
+        try:
+            return _listen(host, PORT)
+        except InputError:
+            port = 0
     if not 0 <= port <= 65535:
         raise InputError(f"port = {port}, expected a number from 0 to 65535")
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)

@@ -1,47 +1,44 @@
-"""One page and what is computed for it: the latest state wins, what is quick goes first.
+"""One page and what is computed for it: the latest state wins, and nothing waits for what takes longer.
 
-Two threads: the first answers a state with its curves, its dots and a preview of its map, whatever else is
-under way; the second follows with the map in full detail, the strobe section and its verdict, and gives up as
-soon as there is a newer state.
+Questions are answered in this process, by a thread that does nothing else. States go to workers, which are
+processes: curves and dots first, then, side by side, the map and what else is shown in detail. A worker that
+is told that its state is no longer the latest, and does not come back, is ended; one that compiles is left to
+it, since that will be needed, and another one serves the newer state meanwhile.
 """
 
 from __future__ import annotations
 
-import json
 import logging
 import threading
+import time
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
-from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE, LONGEST_REASON
-from printhammer.studio.frames import frame
-from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, map_key, try_map
-from printhammer.studio.pictures.engine import dots_frame, motion_frame
-from printhammer.studio.pictures.printed import line_frame, line_key
-from printhammer.studio.pictures.section import (
-    AT_ONCE,
-    LATER,
-    VERDICT_WORK,
-    check_strobe,
-    strobe_frame,
-    strobe_key,
-)
+from printhammer.studio.bounds import PATIENCE
+from printhammer.studio.frames import frame, nothing, refusal
+from printhammer.studio.messages import answer, read_message
+from printhammer.studio.pictures.ahead import frames_ahead
+from printhammer.studio.pictures.keys import KEYS, kernel_key
 from printhammer.studio.states.shelf import Shelf
-from printhammer.studio.states.state import ProtocolError, State, read_state
-from printhammer.studio.work import GivenUp, Patience
+from printhammer.studio.states.state import ProtocolError, State
+from printhammer.studio.workers.crew import PATIENT, Crew
+from printhammer.studio.workers.order import Order
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.run.motion import Motion
+    from printhammer.studio.workers.worker import Worker
 
 logger = logging.getLogger(__name__)
 
-_KEYS: Final[dict[str, Callable[[State], Any]]] = {"map": map_key, "line": line_key, "strobe": strobe_key}
-_NOTHING: Final[dict[str, dict[str, Any]]] = {"map": {"detail": "none"}, "strobe": {"verdict": None}}
-
-REST: Final = 0.3
-"""Seconds without a newer state after which more strobe points and the verdict on a train follow."""
+_VIEWS: Final = {"curves": (), "map": ("map",), "detail": ("line", "strobe")}
+_FAILING: Final = {"map": "the map", "line": "the printed line", "strobe": "the strobe section"}
+_BEFORE: Final = "this still belongs to what was set before"
+_NOT_YET: Final = "being computed"
+_TICK: Final = 0.02
+_TOLD: Final = 1.0
+_LATE: Final = 0.25
+_SPARE: Final = 5.0
 
 
 class Session:
@@ -53,22 +50,32 @@ class Session:
         Takes a frame to the page and returns when it is on its way; raises where the page is gone.
     shelf : Shelf, optional
         The hammers that are offered; by default those that come with the program.
+    crew : Crew, optional
+        Who computes; by default workers of its own, which end with it.
     """
 
-    def __init__(self, send: Callable[[bytes], None], shelf: Shelf | None = None) -> None:
+    def __init__(
+        self, send: Callable[[bytes], None], shelf: Shelf | None = None, crew: Crew | None = None
+    ) -> None:
         self._send = send
         self._shelf = shelf or Shelf()
-        self._tried: State | None = None
+        self._crew = crew or Crew()
+        self._owns_crew = crew is None
         self._change = threading.Condition()
         self._latest: tuple[int, State] | None = None
-        self._answered = 0
-        self._detail: tuple[int, State, Motion | None] | None = None
+        self._accepted: tuple[int, State] | None = None
         self._questions: list[tuple[str, int, Any]] = []
         self._closed = False
-        self._sent: dict[str, Any] = {}
+        self._served: dict[str, int] = {}
+        self._told: dict[str, float] = {}
+        # What the page shows, and what it has in its last form, by view.
+        self._shown: dict[str, Any] = {}
+        self._whole: dict[str, Any] = {}
+        works: dict[str, Callable[[], None]] = {"questions": self._answers}
+        works |= {role: lambda role=role: self._serve(role) for role in _VIEWS}  # type: ignore[misc]
         self._threads = [
             threading.Thread(target=self._run, args=(work,), name=f"studio-{name}", daemon=True)
-            for name, work in (("quick", self._quick), ("detail", self._details))
+            for name, work in works.items()
         ]
         for thread in self._threads:
             thread.start()
@@ -96,9 +103,11 @@ class Session:
         with self._change:
             self._closed = True
             self._change.notify_all()
+        if self._owns_crew:
+            self._crew.close()
 
     def join(self, timeout: float | None = None) -> None:
-        """Wait for both threads."""
+        """Wait for all threads."""
         for thread in self._threads:
             thread.join(timeout)
 
@@ -114,173 +123,187 @@ class Session:
         if not self._closed:
             self._send(data)
 
-    def _quick(self) -> None:
+    def _answers(self) -> None:
         with self._change:
-            self._change.wait_for(lambda: self._closed or self._questions or self._waiting())
+            self._change.wait_for(lambda: self._closed or self._questions)
+            questions, self._questions = self._questions, []
+        for kind, serial, content in questions:
             if self._closed:
                 return
-            questions, self._questions = self._questions, []
-            taken = self._latest if self._waiting() else None
-            if taken is not None:
-                self._answered = taken[0]
-        for kind, serial, content in questions:
-            self._sure(self._answer, serial, kind, content)
-        if taken is not None:
-            self._sure(self._first, *taken)
+            try:
+                data = answer(kind, serial, content, self._shelf)
+            except Exception as error:
+                logger.exception("%s, message %d", kind, serial)
+                reason = f"this could not be answered, {type(error).__name__}: {error}"
+                data = refusal(serial, reason)
+            self._tell(data)
 
-    def _sure(self, work: Callable[..., None], serial: int, *content: Any) -> None:
-        """Do some work; where it fails in a way nobody thought of, that is told, and the page lives on."""
-        try:
-            work(serial, *content)
-        except OSError:
-            raise
-        except GivenUp:
-            return
-        except Exception as error:
-            logger.exception("%s, message %d", work.__name__, serial)
-            reason = f"this could not be computed, {type(error).__name__}: {error}"
-            self._tell(refusal(serial, reason))
-
-    def _answer(self, serial: int, kind: str, content: Any) -> None:
-        self._tell(answer(kind, serial, content, self._shelf))
-
-    def _waiting(self) -> bool:
-        return self._latest is not None and self._latest[0] != self._answered
-
-    def _first(self, serial: int, state: State) -> None:
-        try:
-            data, motion = motion_frame(state, serial)
-        except InputError as error:
-            self._tell(refusal(serial, str(error)))
-            return
-        self._tell(data)
-        if "map" in state.views and self._sent.get("preview") != map_key(state):
-            self._preview(serial, state)
-        # Where no view shows the dots, they wait for the map.
-        shown = not {"energy", "line"}.isdisjoint(state.views)
+    def _serve(self, role: str) -> None:
+        """Wait for a state that a role has not served yet, and have it served."""
         with self._change:
-            self._detail = (serial, state, None if shown else motion)
-            self._change.notify_all()
-        if shown:
-            self._tell(dots_frame(serial, motion))
-
-    def _preview(self, serial: int, state: State) -> None:
-        try:
-            self._tried = try_map(state, self._tried)
-            # Not given up for a newer state: a coarse map is to arrive while a slider moves. The browser
-            # draws meanwhile, and has another core for that.
-            self._tell(map_frame(state, serial, PREVIEW, lambda: self._closed, 1))
-        except InputError as error:
-            self._tell(nothing("map", serial, error))
-            self._sent["map"] = map_key(state)
-        self._sent["preview"] = map_key(state)
-
-    def _details(self) -> None:
-        with self._change:
-            self._change.wait_for(lambda: self._closed or self._detail)
-            taken, self._detail = self._detail, None
+            self._change.wait_for(lambda: self._closed or self._waiting(role))
+            taken = self._waiting(role)
         if self._closed or taken is None:
             return
-        self._sure(self._second, *taken)
+        serial, state = taken
+        own = [view for view in _VIEWS[role] if view in _computed(state)]
+        views = tuple(view for view in own if self._whole.get(view) != KEYS[view](state))
+        if views or role == "curves":
+            self._safely(Order(role, serial, state, views, self._outdated(state) if role == "curves" else {}))
+        with self._change:
+            self._served[role] = serial
+            self._change.notify_all()
 
-    def _second(self, serial: int, state: State, motion: Motion | None) -> None:
+    def _safely(self, order: Order) -> None:
+        """Have an order done; where that fails as nobody thought of, it is told, and the page lives on."""
+        try:
+            self._work(order)
+        except OSError:
+            raise
+        except Exception as error:
+            logger.exception("%s, message %d", order.role, order.serial)
+            self._tell(refusal(order.serial, f"this could not be computed, {type(error).__name__}: {error}"))
+
+    def _waiting(self, role: str) -> tuple[int, State] | None:
+        latest = self._latest if role == "curves" else self._accepted
+        if latest is None or latest[0] == self._served.get(role):
+            return None
+        serial, state = latest
+        # The map is looked at first, and makes machine code that the printed line needs too.
+        behind = role == "detail" and "map" in state.views and self._served.get("map") != serial
+        return None if behind else latest
+
+    def _outdated(self, state: State) -> dict[str, str]:
+        """Return why views that the page shows do not belong to a state."""
+        return {
+            view: _BEFORE if view in self._shown else _NOT_YET
+            for view in _computed(state)
+            if self._shown.get(view) != KEYS[view](state)
+        }
+
+    def _work(self, order: Order) -> None:
+        """Have a worker do an order and pass on what comes of it."""
+        role, serial = order.role, order.serial
+
         def newer() -> bool:
             return self._closed or self._latest is None or self._latest[0] != serial
 
-        self._follow("map", serial, state, lambda: self._tell(map_frame(state, serial, FULL, newer)))
-        if motion is not None:
-            self._tell(dots_frame(serial, motion))
-        if state.line.strip():
-            self._follow("line", serial, state, lambda: self._tell(line_frame(state, serial, newer)))
-        self._follow("strobe", serial, state, lambda: self._section(serial, state, newer))
+        try:
+            key = kernel_key(order.state)
+        except InputError as error:
+            # What the worker would find as well.
+            self._tell(refusal(serial, str(error)))
+            return
 
-    def _follow(self, view: str, serial: int, state: State, work: Callable[[], None]) -> None:
-        """Do the work for a view that is shown and not yet sent as it is, or tell why it cannot be done."""
-        key = _KEYS[view](state)
-        if view not in state.views or self._sent.get(view) == key:
+        def wanted() -> bool:
+            # A coarse map is to arrive also while a slider moves, and newer states come.
+            waiting = self._waiting(role)
+            return not self._closed and waiting is not None and waiting[0] == serial
+
+        worker = self._crew.lend(role, key, wanted)
+        if worker is None:
             return
         try:
-            work()
-        except InputError as error:
-            self._tell(nothing(view, serial, error))
-        self._sent[view] = key
+            done = self._follow(order, worker, newer)
+        except OSError:
+            self._crew.leave(role, worker)
+            raise
+        if done:
+            self._crew.give_back(role, worker)
+        self._end_progress(order)
 
-    def _section(self, serial: int, state: State, newer: Callable[[], bool]) -> None:
-        patience = Patience(newer, "the strobe section")
-        check_strobe(state)
-        for points in AT_ONCE:
-            patience.check()
-            self._tell(strobe_frame(state, serial, points))
+    def _follow(self, order: Order, worker: Worker, newer: Callable[[], bool]) -> bool:
+        """Pass on what a worker tells of an order; return whether it is done, and not ended or left alone."""
+        role = order.role
+        worker.begin(order)
+        superseded, ahead = False, role == "curves"
+        begun = time.monotonic()
+        while True:
+            message = worker.next(_TICK)
+            if newer() and not superseded:
+                superseded = True
+                worker.supersede()
+                worker.heard = time.monotonic()
+            if message is None:
+                if ahead and time.monotonic() > begun + _LATE:
+                    ahead = False
+                    self._tell_ahead(order)
+                if superseded and self._ends(order, worker):
+                    return False
+                if worker.silent > PATIENCE + _SPARE:
+                    self._crew.dismiss(role, worker)
+                    self._give_up(order, f"would take more than {PATIENCE:g} s for this hammer")
+                    return False
+                if worker.compiling and time.monotonic() > self._told.get(role, 0.0) + _TOLD:
+                    self._told[role] = time.monotonic()
+                    self._progress(order, worker.compiling, worker.compiled)
+            elif message[0] == "done":
+                return True
+            elif message[0] == "ended":
+                self._crew.dismiss(role, worker)
+                self._give_up(order, "could not be computed: its process has ended")
+                return False
+            elif message[0] == "frame":
+                ahead = False
+                _kind, view, whole, data = message
+                self._note(order, view, whole)
+                self._tell(data)
+            elif not message[1]:
+                self._end_progress(order)
+
+    def _tell_ahead(self, order: Order) -> None:
+        """Show what was drawn ahead, where that is a state with which a hammer opens."""
+        for data in frames_ahead(order.state, order.serial):
+            self._tell(data)
+
+    def _progress(self, order: Order, what: str, seconds: float = 0.0) -> None:
+        self._tell(frame("progress", order.serial, role=order.role, what=what, seconds=seconds))
+
+    def _end_progress(self, order: Order) -> None:
+        if self._told.pop(order.role, None) is not None:
+            self._progress(order, "")
+
+    def _note(self, order: Order, view: str, whole: bool) -> None:
+        """Note what the page comes to show."""
         with self._change:
-            if self._change.wait_for(newer, REST):
-                raise GivenUp
-        for points in LATER:
-            patience.check()
-            begun = patience.spent
-            self._tell(strobe_frame(state, serial, points, exponent=True))
-        patience.check(VERDICT_WORK * (patience.spent - begun))
-        self._tell(strobe_frame(state, serial, LATER[-1], judged=True))
+            if view in KEYS:
+                self._shown[view] = KEYS[view](order.state)
+                if whole:
+                    self._whole[view] = self._shown[view]
+            elif view == "motion":
+                self._accepted = (order.serial, order.state)
+            self._change.notify_all()
+
+    def _ends(self, order: Order, worker: Worker) -> bool:
+        """End or leave a worker that is to stop and does not; return whether it is gone."""
+        if self._closed and self._owns_crew:
+            return True
+        if worker.compiling:
+            latest = self._latest
+            if not self._closed and (latest is None or self._same_kernel(worker, latest[1])):
+                return False
+            self._crew.leave(order.role, worker)
+            return True
+        if worker.silent > PATIENT:
+            self._crew.dismiss(order.role, worker)
+            return True
+        return False
+
+    def _same_kernel(self, worker: Worker, state: State) -> bool:
+        try:
+            return bool(kernel_key(state) == worker.key)
+        except InputError:
+            return False
+
+    def _give_up(self, order: Order, why: str) -> None:
+        if order.role == "curves":
+            self._tell(refusal(order.serial, f"the curves {why}"))
+        for view in order.views:
+            if self._whole.get(view) != KEYS[view](order.state):
+                self._note(order, view, whole=True)
+                self._tell(nothing(view, order.serial, f"{_FAILING[view]} {why}"))
 
 
-def nothing(view: str, serial: int, reason: object) -> bytes:
-    """Return that there is nothing to show in a view, and why."""
-    return frame(view, serial, reason=str(reason), **_NOTHING.get(view, {}))
-
-
-def refusal(serial: int, reason: str) -> bytes:
-    """Return that something is refused, and why."""
-    return frame("refusal", serial, reason=reason[:LONGEST_REASON])
-
-
-def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
-    """Read a message: its kind, the serial number of the page, and its content.
-
-    Raises
-    ------
-    ProtocolError
-        It is none that the page would send.
-    """
-    if len(text) > LARGEST_MESSAGE:
-        raise ProtocolError(f"the message has {len(text)} characters, expected at most {LARGEST_MESSAGE}")
-    try:
-        message = json.loads(text)
-    except (ValueError, RecursionError):
-        raise ProtocolError("the message is expected to be JSON") from None
-    if not isinstance(message, dict):
-        raise ProtocolError("the message is expected to be a table")
-    kind, serial = message.get("kind"), message.get("serial")
-    if isinstance(serial, bool) or not isinstance(serial, int) or not 0 < serial < 2**53:
-        raise ProtocolError("serial is expected to be a positive whole number")
-    contents = {"state": {"state"}, "hammer": {"name", "text"}, "texts": {"state"}, "drop": {"name", "text"}}
-    if not isinstance(kind, str) or kind not in contents:
-        raise ProtocolError(f"kind is expected to be one of {', '.join(contents)}")
-    if set(message) != {"kind", "serial", *contents[kind]}:
-        raise ProtocolError(
-            f"a message of kind {kind} has the keys kind, serial, {', '.join(sorted(contents[kind]))}"
-        )
-    if "state" in contents[kind]:
-        return kind, serial, read_state(message["state"], shelf)
-    pair = (message["name"], message["text"])
-    if not all(isinstance(part, str) and len(part) <= LARGEST_FILE for part in pair):
-        raise ProtocolError(f"name and text are expected to be texts of at most {LARGEST_FILE} characters")
-    return kind, serial, pair
-
-
-def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
-    """Return the answer to a question: what a hammer is, what a dropped file holds, a state as texts."""
-    from printhammer.studio.states.controls import describe, vocabulary
-    from printhammer.studio.states.drops import dropped
-    from printhammer.studio.states.state import dropped_hammer
-    from printhammer.studio.states.texts import texts_of
-
-    try:
-        if kind == "hammer":
-            name, text = content
-            hammer = dropped_hammer(text) if text else shelf.hammer(name or shelf.names[0])
-            heading = {"offered": shelf.names, "asked": name or shelf.names[0], "text": text, **vocabulary()}
-            return frame("hammer", serial, hammer=describe(hammer), **heading)
-        if kind == "drop":
-            return dropped(serial, *content)
-        return frame("texts", serial, texts=texts_of(content))
-    except InputError as error:
-        return refusal(serial, str(error))
+def _computed(state: State) -> list[str]:
+    """Return those views of a state that are computed apart from its curves; a line without a text is not."""
+    return [view for view in KEYS if view in state.views and (view != "line" or state.line.strip())]

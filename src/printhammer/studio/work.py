@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from printhammer.errors import InputError
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-from printhammer.studio import bounds
+from printhammer.studio import bounds, compiling
 from printhammer.studio.pictures.engine import limited_run
 from printhammer.studio.states.controls import fields_of
 
@@ -47,12 +47,12 @@ class Patience:
         self._newer = newer
         self._what = what
         self._seconds = seconds
-        self._begun = time.monotonic()
+        self._begun = time.monotonic() - compiling.seconds()
 
     @property
     def spent(self) -> float:
-        """Time since the beginning, s."""
-        return time.monotonic() - self._begun
+        """Time since the beginning, s, without that of compiling, which is needed once."""
+        return time.monotonic() - compiling.seconds() - self._begun
 
     def check(self, more: float = 0.0) -> None:
         """Go on, unless there is a newer state, or no time for what is expected to take `more` seconds.

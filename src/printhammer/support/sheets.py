@@ -45,7 +45,7 @@ def read_sheet(path: Path, what: str, *, gaps: bool = False) -> Sheet:
     return sheet_of(read_text(path, what, encoding="utf-8-sig"), str(path), gaps=gaps)
 
 
-def sheet_of(text: str, where: str, *, gaps: bool = False) -> Sheet:
+def sheet_of(text: str, where: str, *, gaps: bool = False, delimiter: str = ",") -> Sheet:
     """Split the text of a CSV table as `read_sheet` does; `where` stands in messages.
 
     Raises
@@ -54,7 +54,7 @@ def sheet_of(text: str, where: str, *, gaps: bool = False) -> Sheet:
         It holds no comma-separated values.
     """
     comments: dict[str, str] = {}
-    reader = csv.reader(_uncommented(text, comments), strict=True)
+    reader = csv.reader(_uncommented(text, comments), strict=True, delimiter=delimiter)
     rows = []
     try:
         for row in reader:

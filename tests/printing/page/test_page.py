@@ -302,3 +302,13 @@ def test_a_page_without_extra_contacts_is_kept_as_well(hammer: ph.Hammer, tmp_pa
     with xr.open_dataset(tmp_path / "page.nc", engine="scipy") as kept:
         assert kept.sizes["extra"] == 0
         assert kept.attrs["pattern"] == "é"
+
+
+def test_another_waveform_prints_as_a_hammer_that_has_it(hammer: ph.Hammer) -> None:
+    assert hammer.waveform is not None
+    other = hammer.waveform.scaled(0.97)
+    found = print_page(hammer, noise(slots=6), RATE, waveform=other)
+    expected = print_page(hammer.replace("waveform", other), noise(slots=6), RATE)
+    assert found.strategy == expected.strategy
+    for name in FIELDS:
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
 
 
@@ -41,9 +42,28 @@ def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) 
     InputError
         The hammer has no waveform.
     """
-    if not patterns:
-        return []
-    return PulseTrains(pulse_of(hammer), [slot_times(slots, rate) for slots in patterns])
+    return OpenLoop()(hammer, patterns, rate)
+
+
+class OpenLoop:
+    """As `open_loop`, with another waveform than that of the hammer.
+
+    Parameters
+    ----------
+    waveform : Waveform, optional
+        What is fired.
+    """
+
+    name = "open loop"
+
+    def __init__(self, waveform: Waveform | None = None) -> None:
+        self.waveform = waveform
+
+    def __call__(self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> Sequence[Drive]:
+        """Return a drive for each pattern."""
+        if not patterns:
+            return []
+        return PulseTrains(pulse_of(hammer, self.waveform), [slot_times(slots, rate) for slots in patterns])
 
 
 def checked_drives(

@@ -24,7 +24,7 @@ from printhammer.printing.dots.judging import FAULTS
 from printhammer.printing.dots.limits import PRESETS, Limits
 from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.slots import slots_of
-from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
+from printhammer.printing.dots.strategy import OpenLoop, Strategy, name_of, open_loop
 from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.printing.page.head import Head, head_of
 from printhammer.printing.page.pattern import Pattern
@@ -34,6 +34,7 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
@@ -216,6 +217,7 @@ def print_page(
     what: Pattern | str,
     rate: float | str,
     *,
+    waveform: Waveform | None = None,
     strategy: Strategy = open_loop,
     head: Head | None = None,
     limits: Limits | None = None,
@@ -234,6 +236,8 @@ def print_page(
     rate : float or str
         Slots per second, Hz, or text with a unit: how often a wire may be fired. The carriage moves one pitch
         in a slot.
+    waveform : Waveform, optional
+        What every firing does in open loop, and the single pulse; by default the hammer's own.
     strategy, limits, threads
         As for `printhammer.safe_rate`.
     head : Head, optional
@@ -264,7 +268,9 @@ def print_page(
     if print_head.wires != pattern.wires:
         raise InputError(f"head: {print_head.wires} wires, expected {pattern.wires} as the pattern has")
     bounds = PRESETS["slots"] if limits is None else limits
-    single = nominal(hammer, tolerance=tolerance)
+    single = nominal(hammer, waveform, tolerance=tolerance)
+    if waveform is not None and strategy is open_loop:
+        strategy = OpenLoop(waveform)
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     run_line, run_wire = np.nonzero(pattern.dots.any(axis=2))
     rows = [slots_of(row) for row in pattern.dots[run_line, run_wire]]

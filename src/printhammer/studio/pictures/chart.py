@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -33,9 +32,6 @@ FULL: Final = (512, 512)
 
 GAP: Final = 65535
 """Code of a displacement that is not known."""
-
-map_key: Final = attrgetter("hammer", "text", "constants", "waveform", "slots", "overlap", "low", "high")
-"""Returns what the map of a state depends on."""
 
 _RATES_OF_PIECE: Final = 64
 _TRIED: Final = 9

@@ -16,6 +16,8 @@ from printhammer.studio import bounds
 from printhammer.studio.frames import frame
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
@@ -29,8 +31,19 @@ MOST_ENDS: Final = 20_000
 """Ends of steps among the points of a curve, at most."""
 
 
-def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
+def motion_frame(
+    state: State, serial: int, outdated: Mapping[str, str] | None = None
+) -> tuple[bytes, Motion]:
     """Return the curves of a single run, and the run, given up after `bounds.MOST_STEPS` steps.
+
+    Parameters
+    ----------
+    state : State
+        What is run.
+    serial : int
+        Its number.
+    outdated : mapping, optional
+        Why views that the page shows do not belong to this state, by their names.
 
     Raises
     ------
@@ -67,6 +80,7 @@ def motion_frame(state: State, serial: int) -> tuple[bytes, Motion]:
         "fired": drive.times.tolist(),
         "steps": motion.steps,
         "pulse": pulse_of(state.fired),
+        "outdated": outdated or {},
     }
     return frame("motion", serial, arrays, **heading), motion
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from operator import attrgetter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -18,9 +17,6 @@ if TYPE_CHECKING:
 
     from printhammer.printing.page.pattern import Pattern
     from printhammer.studio.states.state import State
-
-line_key: Final = attrgetter("hammer", "text", "constants", "waveform", "rate", "line")
-"""Returns what the line of a state depends on."""
 
 _TRIED: Final = 16
 
@@ -56,12 +52,12 @@ def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
     from printhammer.printing.page.pattern import Pattern
 
     try:
-        hammer = state.changed
-        if state.waveform is not None:
-            hammer = hammer.replace("waveform", state.fired, source="set in the studio")
         pattern = Pattern.from_text(state.line)
         check_line(state, pattern)
-        page = print_page(hammer, pattern, state.rate, progress=Patience(newer, "the line").progress)
+        patience = Patience(newer, "the line")
+        page = print_page(
+            state.changed, pattern, state.rate, waveform=state.fired, progress=patience.progress
+        )
     except InputError as error:
         return frame("line", serial, reason=str(error))
     (x, y), (wanted_x, wanted_y) = page.places, page.intended

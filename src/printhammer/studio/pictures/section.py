@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -21,9 +20,6 @@ AT_ONCE: Final = (25, 50, 100)
 
 LATER: Final = (150, 200, 300, 400)
 """Points that follow where no newer state comes, with the exponent over the later half of them."""
-
-strobe_key: Final = attrgetter("hammer", "text", "constants", "waveform", "rate", "overlap")
-"""Returns what the strobe section of a state depends on."""
 
 VERDICT_WORK: Final = 16.0
 """Work of the verdict in that of all points before it: five times the firings, and the exponent over them."""

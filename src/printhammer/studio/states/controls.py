@@ -35,6 +35,25 @@ EQUATIONS: Final = {
 }
 """Equations of the laws of the paper; the others are told in the first line of their part."""
 
+OPENINGS: Final[dict[str, dict[str, Any]]] = {
+    # A hop lasts about as long as a period.
+    "bouncing-ball": {
+        "waveform": {"shape": "half-sine", "amplitude": 0.5, "width": 3e-4, "quantity": "force"},
+        "rate": 50.0,
+        "low": 20.0,
+        "high": 100.0,
+    },
+    # Two pushes, a free period apart, of 2 pi s.
+    "linear-impact-oscillator": {
+        "waveform": {"shape": "half-sine", "amplitude": 10.0, "width": 0.02, "quantity": "force"},
+        "rate": 10.0,
+        "pattern": "1" + 62 * "0" + "1",
+        "low": 10.0,
+        "high": 20.0,
+    },
+}
+"""What the shipped hammers without a pulse open with, whose times and forces are not those of printers."""
+
 
 def describe(hammer: Hammer) -> dict[str, Any]:
     """Return everything about a hammer that the page shows: constants with range, unit, equation, source.
@@ -43,7 +62,8 @@ def describe(hammer: Hammer) -> dict[str, Any]:
     -------
     dict
         `name`, `title`, `note`, `constants` (a list), `combined` (controls that move several constants),
-        `waveform` (shape and constants, or None), `places`.
+        `waveform` (shape and constants, or None), `start` (what to fire a hammer with that has none, else
+        empty), `places`.
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -75,8 +95,19 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "constants": constants,
         "combined": combined_of(hammer),
         "waveform": None if hammer.waveform is None else fields_of(hammer.waveform),
+        "start": opening_of(hammer),
         "places": {"backstop": hammer.position, "front": hammer.front, "platen": hammer.platen},
     }
+
+
+def opening_of(hammer: Hammer) -> dict[str, Any]:
+    """Return the entries of a state that show a hammer which comes without a pulse to fire."""
+    if hammer.waveform is not None:
+        return {}
+    quantity = "current" if "magnet" in hammer.parts else "force"
+    pulse = {"shape": "half-sine", "amplitude": 1.0, "width": 3e-4, "quantity": quantity}
+    opening: dict[str, Any] = {"waveform": pulse, **OPENINGS.get(hammer.name, {})}
+    return opening
 
 
 def equation_of(section: str, law: str) -> str:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
+Told = tuple[dict[str, Any], list[str]]
+"""Entries of a state that can be taken, and sentences about those that cannot."""
+
 DEFAULT: Final = "hendriks-1983"
 """Hammer that a studio opens with unless told otherwise."""
 
 
 class Shelf:
-    """Hammers by name; a name is never taken for a path.
+    """Hammers by name, which is never taken for a path; `start` is what a page without a state opens with.
 
     Parameters
     ----------
@@ -25,6 +28,7 @@ class Shelf:
 
     def __init__(self, guest: Hammer | None = None) -> None:
         self.guest = guest
+        self.start: Told = ({}, [])
 
     @property
     def names(self) -> list[str]:
@@ -37,8 +41,14 @@ class Shelf:
         return [self.guest.name, *(name for name in others if name != self.guest.name)]
 
     def is_guest(self, name: str) -> bool:
-        """Whether this is the hammer that the studio opened with, and not one that comes with the program."""
+        """Whether this is the name of the hammer that the studio opened with."""
         return self.guest is not None and name == self.guest.name
+
+    def is_shipped(self, name: str) -> bool:
+        """Whether the hammer of this name is one that comes with the program, as it does."""
+        from printhammer.hammer.hammer import shipped
+
+        return name in shipped() and self.hammer(name).fingerprint == _shipped(name).fingerprint
 
     def hammer(self, name: str) -> Hammer:
         """Return a hammer.

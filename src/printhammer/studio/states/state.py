@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -73,15 +73,7 @@ class State(Declared):
         """
         base = self.base
         for key, value in self.constants:
-            constant = base.constants.get(key)
-            if constant is None or key.startswith("waveform."):
-                known = ", ".join(name for name in base.constants if not name.startswith("waveform."))
-                raise InputError(f"constants.{key} is not known, expected one of {known}")
-            span = range_of(base, key, bounds.SPAN)
-            if not span.low <= value <= span.high:
-                raise InputError(
-                    f"{key} = {value:.9g} {constant.si_unit}, expected {span.low:.6g} to {span.high:.6g}"
-                )
+            check_constant(base, key, value)
         return base.replace(dict(self.constants), source="set in the studio") if self.constants else base
 
     @cached_property
@@ -117,6 +109,25 @@ class State(Declared):
             return PulseTrain(self.fired, rate=self.rate, pulses=self.pulses, overlap=self.overlap)
         times = [slot / self.rate for slot, mark in enumerate(self.pattern) if mark == "1"]
         return PulseTrain(self.fired, at=times, overlap=self.overlap)
+
+
+def check_constant(base: Hammer, key: str, value: float) -> None:
+    """Refuse a constant that a hammer has not, or a value too far from its own.
+
+    Raises
+    ------
+    InputError
+        It is one of these.
+    """
+    constant = base.constants.get(key)
+    if constant is None or key.startswith("waveform."):
+        known = ", ".join(name for name in base.constants if not name.startswith("waveform."))
+        raise InputError(f"constants.{key} is not known, expected one of {known}")
+    span = range_of(base, key, bounds.SPAN)
+    if not span.low <= value <= span.high:
+        raise InputError(
+            f"{key} = {value:.9g} {constant.si_unit}, expected {span.low:.6g} to {span.high:.6g}"
+        )
 
 
 @lru_cache(maxsize=8)
@@ -159,26 +170,12 @@ def read_state(content: Any, shelf: Shelf | None = None) -> State:
     ProtocolError
         A key is missing, unknown, of the wrong kind or out of bounds: the page would never send it.
     """
-    keys = set(State.__dataclass_fields__) - {"shelf"}
-    table = _table(content, "state", keys)
-    missing = keys - set(table)
+    table = _table(content, "state", set(READERS))
+    missing = set(READERS) - set(table)
     if missing:
         raise ProtocolError(f"state.{min(missing)} is missing")
-    return State(
-        hammer=_text(table["hammer"], "hammer", 100),
-        text=_text(table["text"], "text", bounds.LARGEST_FILE),
-        constants=_constants(table["constants"]),
-        waveform=_waveform(table["waveform"]),
-        rate=_number(table["rate"], "rate", *bounds.RATES),
-        pulses=_count(table["pulses"]),
-        pattern=_pattern(table["pattern"]),
-        overlap=_choice(table["overlap"], "overlap", ("add", "replace")),
-        low=_number(table["low"], "low", *bounds.RATES),
-        high=_number(table["high"], "high", *bounds.RATES),
-        line=_text(table["line"], "line", bounds.LONGEST_TEXT),
-        views=_views(table["views"]),
-        shelf=shelf or Shelf(),
-    )
+    entries = {key: read(table[key]) for key, read in READERS.items()}
+    return State(**entries, shelf=shelf or Shelf())
 
 
 def _table(content: Any, where: str, known: set[str]) -> dict[str, Any]:
@@ -274,3 +271,20 @@ def _samples(content: Any, where: str) -> tuple[float, ...]:
         raise ProtocolError(f"{where} is expected to be a list of at most {bounds.MOST_SAMPLES} numbers")
     most = bounds.LARGEST_CURRENT if where.endswith("values") else bounds.LONGEST_TIME
     return tuple(_number(value, where, -most, most) for value in content)
+
+
+READERS: Final[dict[str, Callable[[Any], Any]]] = {
+    "hammer": lambda content: _text(content, "hammer", 100),
+    "text": lambda content: _text(content, "text", bounds.LARGEST_FILE),
+    "constants": _constants,
+    "waveform": _waveform,
+    "rate": lambda content: _number(content, "rate", *bounds.RATES),
+    "pulses": _count,
+    "pattern": _pattern,
+    "overlap": lambda content: _choice(content, "overlap", ("add", "replace")),
+    "low": lambda content: _number(content, "low", *bounds.RATES),
+    "high": lambda content: _number(content, "high", *bounds.RATES),
+    "line": lambda content: _text(content, "line", bounds.LONGEST_TEXT),
+    "views": _views,
+}
+"""What reads an entry of a state, by its key; raises `ProtocolError` where the page would never send it."""

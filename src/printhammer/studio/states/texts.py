@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from printhammer.drive.waveforms.shapes import Sampled
+from printhammer.studio.states.links import file_of
 
 if TYPE_CHECKING:
     from printhammer.studio.states.state import State
@@ -14,7 +16,10 @@ DRIVE_FILE: Final = "studio-drive.toml"
 
 
 def texts_of(state: State) -> dict[str, str]:
-    """Return a state as "hammer" and "drive", TOML, and as "python" and "command" that give the same run.
+    """Return a state as texts.
+
+    "hammer" and "drive" are TOML; "python" and "command" give the same run; "state" is a file that the studio
+    opens.
 
     Raises
     ------
@@ -26,16 +31,17 @@ def texts_of(state: State) -> dict[str, str]:
         "drive": state.drive.to_toml(),
         "python": python_of(state),
         "command": command_of(state),
+        "state": file_of(state),
     }
 
 
 def python_of(state: State) -> str:
     """Return a script that makes the same hammer, drive and motion."""
     lines = ["import printhammer as ph", ""]
-    if state.text:
-        lines.append(f"hammer = ph.Hammer.from_toml({state.text!r})")
+    if name := _name(state):
+        lines.append(f"hammer = ph.load({name!r})")
     else:
-        lines.append(f"hammer = ph.load({_name(state)!r})")
+        lines.append(f"hammer = ph.Hammer.from_toml({state.base.to_toml()!r})")
     if state.constants:
         changes = [f"        {key!r}: {value!r}," for key, value in state.constants]
         lines += ["hammer = hammer.replace(", "    {", *changes, "    }", ")"]
@@ -70,8 +76,7 @@ def python_of(state: State) -> str:
 
 def command_of(state: State) -> str:
     """Return the command for the same run; what is changed is read from the files that the studio saves."""
-    plain = not (state.text or state.constants)
-    hammer = _name(state) if plain else HAMMER_FILE
+    hammer = (not state.constants and _name(state)) or HAMMER_FILE
     if state.waveform is None and not state.pattern:
         overlap = "" if state.overlap == "add" else f" --overlap {state.overlap}"
         return f"printhammer run {hammer} --rate '{state.rate!r} Hz' --pulses {state.pulses}{overlap}"
@@ -79,4 +84,9 @@ def command_of(state: State) -> str:
 
 
 def _name(state: State) -> str:
-    return state.base.path if state.shelf.is_guest(state.hammer) else state.hammer
+    """Return the name or file under which the hammer before any change can be loaded, if there is one."""
+    if state.text:
+        return ""
+    if not state.shelf.is_guest(state.hammer) or state.shelf.is_shipped(state.hammer):
+        return state.hammer
+    return state.base.path if Path(state.base.path).is_file() else ""

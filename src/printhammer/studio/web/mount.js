@@ -1,4 +1,5 @@
 // The studio in an element: `mount(element, send)` returns what takes the server's frames.
+import { askColumns } from "./asking.js";
 import { energyView, lineView } from "./bars.js";
 import { buildControls } from "./controls.js";
 import { forcesView, motionView } from "./curves.js";
@@ -6,6 +7,7 @@ import { element as make } from "./dom.js";
 import { decode } from "./frames.js";
 import { bindKeys } from "./keys.js";
 import { mapView } from "./map.js";
+import { marksFor } from "./marks.js";
 import { layout } from "./panels.js";
 import { loopsView, phaseView, strobeView } from "./planes.js";
 import { sketchView } from "./sketch.js";
@@ -15,6 +17,10 @@ import { setSystem, setUnits } from "./units.js";
 
 const MAKERS = { motion: motionView, sketch: sketchView, map: mapView, forces: forcesView, phase: phaseView, strobe: strobeView, loops: loopsView, energy: energyView, line: lineView };
 const MOST_GHOSTS = 4;
+const LARGEST_TABLE = 50e6; // bytes of a measured table
+const SHOWN = ["motion", "dots", "map", "strobe", "line"]; // frames that views are drawn from
+const DROPPED = "dropped ";
+const LONGEST = 800000; // characters of a link
 const QUICK = ["motion", "forces", "phase"];
 
 /**
@@ -23,14 +29,14 @@ const QUICK = ["motion", "forces", "phase"];
  */
 export function mount(element, send, address = { read: () => "", write: () => {}, address: () => "" }) {
   const studio = {
-    element, store: new Store({ ...START }), frames: {}, ghosts: [], overlay: null, cursor: 0, cursorFrom: null, window: null,
+    element, store: new Store({ ...START }), frames: {}, buffers: {}, ghosts: [], overlay: null, cursor: 0, cursorFrom: null, window: null,
     described: null, offered: [], limits: {}, shapes: {}, views: {}, serial: Math.floor(Math.random() * 2 ** 40), sentAt: new Map(), busy: false, stale: false,
   };
   let follow = () => {};
   let writing = 0;
   let begun = false;
-  let patience = 0;
   const asked = new Map();
+  const dropped = new Map(); // names by the texts of hammers that were dropped
 
   const message = (kind, content) => {
     studio.serial += 1;
@@ -49,8 +55,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     const now = studio.changedAt ?? performance.now();
     studio.sentAt.set(message("state", { state: studio.store.state }), now);
     studio.changedAt = null;
-    clearTimeout(patience);
-    patience = setTimeout(() => { if (studio.busy) studio.say("computing; laws that are new to this machine are compiled once: some ten seconds before the curves, as many before the map"); }, 1200);
+    marks.sent();
     for (const serial of studio.sentAt.keys()) if (serial < studio.serial - 64) studio.sentAt.delete(serial);
   };
 
@@ -68,7 +73,10 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   };
   studio.hint = (text) => { studio.parts.hint.textContent = text; };
   studio.say = (text, bad = false) => {
+    if (studio.progress) studio.afterwards = [text, bad];
+    if (studio.progress && !bad) return;
     studio.parts.status.textContent = text;
+    studio.parts.status.title = text;
     studio.parts.status.classList.toggle("bad", bad);
   };
   studio.showText = (title, text) => {
@@ -78,6 +86,20 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     studio.parts.dialog.showModal();
     box.select();
   };
+
+  /** Tell what long work is under way, in the place of what is told else. */
+  function progress({ role, what, seconds }) {
+    if (what) {
+      const text = `${what}: ${Math.round(seconds)} s so far, mostly some 10 to 60 s`;
+      marks.progress(role, text);
+      studio.progress = { role };
+      studio.parts.status.textContent = text;
+      studio.parts.status.classList.remove("bad");
+    } else if (studio.progress?.role === role) {
+      studio.progress = null;
+      studio.say(...(studio.afterwards ?? ["ready"]));
+    }
+  }
 
   const shownViews = () => studio.store.state.views.map((name) => studio.views[name]).filter(Boolean);
   let turning = 0;
@@ -128,50 +150,92 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   studio.theme = () => { readColours(element.querySelector(".studio")); redrawAll(); follow(); };
 
   /** Describe the hammer of a state anew, then take the state: as a step of the history, or as it is there already. */
-  async function load(state, step = true) {
+  async function load(state, step = true, fresh = false) {
     const frame = await studio.ask("hammer", { name: state.text ? "" : state.hammer, text: state.text });
-    if (frame.kind === "refusal") {
-      studio.say(frame.reason, true);
-      if (!studio.described && (state.text || state.hammer)) await load({ ...START });
-      return;
-    }
-    Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes });
+    if (frame.kind === "refusal") { studio.say(frame.reason, true); return; }
+    Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes, unitTable: frame.units });
     setUnits(frame.units);
-    const waveform = state.waveform ?? (frame.hammer.waveform ? null : { shape: "half-sine", amplitude: 1, width: 3e-4, quantity: studio.quantity() });
-    studio.parts.hammers.replaceChildren(...[...frame.offered, ...(state.text ? ["dropped"] : [])].map((name) => make("option", { value: name }, name)));
-    studio.parts.hammers.value = state.text ? "dropped" : frame.asked;
+    // A hammer without a pulse opens with one that shows it; what a link sets stays.
+    const start = state.waveform ? {} : Object.fromEntries(Object.entries(frame.hammer.start).filter(([key]) => fresh || state[key] === START[key]));
+    if (state.text) dropped.set(state.text, frame.hammer.name);
+    studio.parts.hammers.replaceChildren(
+      ...frame.offered.map((name) => make("option", { value: name }, name)),
+      ...[...dropped].map(([text, name]) => make("option", { value: `${DROPPED}${[...dropped.keys()].indexOf(text)}` }, `${name} (dropped)`)),
+    );
+    studio.parts.hammers.value = state.text ? `${DROPPED}${[...dropped.keys()].indexOf(state.text)}` : frame.asked;
     studio.parts.honesty.textContent = honesty(frame.hammer);
     studio.parts.honesty.title = frame.hammer.note;
     follow = buildControls(studio.parts.controls, studio);
     studio.loaded = state.text || frame.asked;
-    const whole = { ...state, hammer: state.text ? "" : frame.asked, waveform };
+    const whole = { ...state, hammer: state.text ? "" : frame.asked, ...start };
     if (!begun) studio.store.begin(whole);
     else if (step) studio.store.set(whole);
     else studio.store.tell();
     begun = true;
   }
-  studio.choose = (name) => load({ ...studio.store.state, hammer: name, text: "", constants: {}, waveform: null });
-  studio.open = (text) => { if (text !== toText(studio.store.state)) load(fromText(text)); };
+  /** Choose a hammer by its name in the list: one that is offered, or one that was dropped. */
+  studio.choose = (name) => {
+    const text = name.startsWith(DROPPED) ? [...dropped.keys()][Number(name.slice(DROPPED.length))] : "";
+    const { state } = studio.store;
+    const before = Object.fromEntries(Object.keys(studio.described?.start ?? {}).map((key) => [key, START[key]]));
+    return load({ ...state, ...before, hammer: text ? "" : name, text, constants: {}, waveform: null }, true, true);
+  };
+  /** Take a state from outside as far as it can be taken, and tell what cannot. */
+  async function take({ state, notes }) {
+    await load({ ...START, ...state });
+    if (notes.length) studio.say(notes.join("; "), true);
+    studio.notes = notes.join("; ");
+  }
+  studio.open = async (text) => {
+    if (begun && text === toText(studio.store.state)) return;
+    if (text.length > LONGEST) { studio.say(`the link has ${text.length} characters, expected at most ${LONGEST}`, true); text = ""; }
+    const frame = await studio.ask("open", { state: fromText(text) });
+    await take(frame);
+  };
   studio.preset = (patch) => studio.store.set(patch);
 
   studio.drop = async (file) => {
-    if (file.size > studio.limits.file) {
-      studio.say(`${file.name} has ${file.size} bytes, expected at most ${studio.limits.file}`, true);
+    const most = /\.(toml|json)$/i.test(file.name) ? studio.limits.file : LARGEST_TABLE;
+    if (file.size > most) {
+      studio.say(`${file.name} has ${file.size} bytes, expected at most ${most}`, true);
       return;
     }
-    const frame = await studio.ask("drop", { name: file.name, text: await file.text() });
+    const text = thinned(await file.text(), studio.limits.file);
+    const ask = (columns) => studio.ask("drop", { name: file.name, text, columns });
+    let frame = await ask(null);
+    if (frame.what === "columns") {
+      const columns = await askColumns(studio.parts.dialog, frame);
+      if (!columns) return;
+      frame = await ask(columns);
+    }
     if (frame.kind === "refusal") studio.say(frame.reason, true);
+    else if (frame.what === "state") take(frame);
     else if (frame.what === "hammer") load({ ...studio.store.state, hammer: "", text: frame.text, constants: {}, waveform: null });
-    else if (frame.what === "displacement") {
-      studio.overlay = frame;
-      studio.say(`${frame.name} laid over the motion`);
-      redrawAll();
-    } else studio.store.set({ waveform: { shape: "sampled", times: [...frame.data.t], values: [...frame.data.values], quantity: frame.what } });
+    else if (frame.what === "curves") lay(frame);
   };
+  /** Show measured curves: a displacement over the motion, a current or force as the pulse that is fired. */
+  function lay({ name, data }) {
+    const quantity = ["current", "force"].find((kind) => kind in data);
+    const shown = [];
+    if (data.displacement) {
+      studio.overlay = { what: "displacement", name, data: { t: data.t, values: data.displacement } };
+      shown.push("its displacement is laid over the motion");
+    }
+    if (quantity) {
+      shown.push(`its ${quantity} is the pulse that is fired`);
+      const waveform = { shape: "sampled", times: [...data.t], values: [...data[quantity]], quantity };
+      // What was measured together is compared with one such pulse.
+      studio.store.set({ waveform, ...(data.displacement ? { pulses: 1, pattern: "" } : {}) });
+    }
+    studio.notes = `${name}: ${shown.join(", ")}`;
+    studio.say(studio.notes);
+    redrawAll();
+  }
 
   studio.store.listeners.add((state) => {
     const wanted = state.text || state.hammer;
     if (wanted !== studio.loaded) { load(state, false); return; }
+    if (begun) studio.notes = "";
     studio.changedAt ??= globalThis.event?.timeStamp ?? performance.now();
     studio.sendState();
     follow();
@@ -183,39 +247,59 @@ export function mount(element, send, address = { read: () => "", write: () => {}
 
   studio.parts = layout(studio, MAKERS);
   studio.layout = studio.parts.layout;
+  const marks = marksFor((name) => element.querySelector(`.view-${name}`));
   studio.hint("The equation and the source of a constant are told here, where its control is pointed at or focused.");
   studio.address = address.address;
   bindKeys(studio);
   readColours(element.querySelector(".studio"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", studio.theme);
-  load(fromText(address.read()));
+  studio.open(address.read());
 
   return {
     studio,
     open: studio.open,
-    connected: () => { if (studio.described) { studio.busy = false; studio.sendState(); } studio.say("ready"); },
+    connected: () => {
+      const { status } = studio.parts;
+      status.removeAttribute("tabindex");
+      [status.onclick, status.onkeydown] = [null, null];
+      studio.say("ready");
+      if (studio.described) { studio.busy = false; studio.sendState(); }
+    },
+    /** The connection has ended: for a reason, after which `again` is for the user to call, or by itself. */
     lost: (reason, again) => {
       studio.busy = false;
-      studio.say(`the connection ended${reason ? `: ${reason}` : ""}; press Enter here to connect again`, true);
-      studio.parts.status.tabIndex = 0;
-      studio.parts.status.onclick = again;
-      studio.parts.status.onkeydown = (event) => { if (event.key === "Enter") again(); };
+      studio.progress = null;
+      const { status } = studio.parts;
+      marks.none("not connected: the studio computes nothing", studio.serial);
+      studio.say(reason ? `the connection ended: ${reason}; press Enter here to connect again` : "the studio has ended, or is restarted: trying to connect again", true);
+      status.tabIndex = 0;
+      status.onclick = again;
+      status.onkeydown = (event) => { if (event.key === "Enter") again(); };
     },
     receive: (buffer) => {
       const frame = decode(buffer);
+      if (SHOWN.includes(frame.kind)) studio.buffers[frame.kind] = buffer;
       if (asked.has(frame.serial)) {
         asked.get(frame.serial)(frame);
         asked.delete(frame.serial);
         return;
       }
-      if (frame.kind === "motion" || frame.kind === "refusal") {
+      if ((frame.kind === "motion" && !frame.ahead) || frame.kind === "refusal") {
         studio.busy = false;
         if (studio.stale) studio.sendState();
       }
-      if (frame.kind === "refusal") { studio.say(frame.reason, true); return; }
+      if (frame.kind === "refusal") {
+        studio.say(frame.reason, true);
+        if (!studio.busy) marks.none(`not computed: ${frame.reason}`, frame.serial);
+        return;
+      }
+      if (frame.kind === "progress") { progress(frame); return; }
+      marks.arrived(frame);
       studio.frames[frame.kind] = frame;
       if (frame.kind === "motion") {
-        studio.say(frame.message || `${frame.steps} steps, ${frame.status}`, frame.status !== "ok");
+        const text = frame.message || `${frame.steps} steps, ${frame.status}`;
+        // What a link or a file held, and could not be taken, is told until something else is set.
+        if (!studio.notes && !frame.ahead) studio.say(text, frame.status !== "ok");
         const t = frame.data.t;
         studio.cursor = Math.min(studio.cursor, t[t.length - 1]);
       }
@@ -228,4 +312,12 @@ function honesty(hammer) {
   const counts = {};
   for (const { status } of hammer.constants) counts[status] = (counts[status] ?? 0) + 1;
   return Object.entries(counts).map(([status, count]) => `${count} ${status}`).join(", ");
+}
+
+/** Return a text with every so many of its lines, so that it is not too long; the first hundred stay. */
+function thinned(text, most) {
+  if (text.length <= most) return text;
+  const lines = text.split("\n");
+  const step = Math.ceil(text.length / (0.8 * most));
+  return lines.filter((_line, k) => k < 100 || k % step === 0).join("\n");
 }

@@ -1,6 +1,6 @@
 // The page: a bar, the controls, the views in a grid, and a line for hints.
 import { element as make } from "./dom.js";
-import { copy, csvOf, pngOf, save, svgOf } from "./exports.js";
+import { copy, csvOf, pngOf, save, savePage, svgOf } from "./exports.js";
 import { HELP } from "./keys.js";
 import { VIEWS } from "./state.js";
 
@@ -12,13 +12,13 @@ const PRESETS = {
 
 export function layout(studio, makers) {
   const button = (text, label, action, extra = {}) => make("button", { type: "button", title: label, "aria-label": label, onclick: action, ...extra }, text);
-  const hammers = make("select", { "aria-label": "hammer", onchange: () => { if (hammers.value !== "dropped") studio.choose(hammers.value); } });
+  const hammers = make("select", { "aria-label": "hammer", onchange: () => studio.choose(hammers.value) });
   const honesty = make("span", { class: "honesty" });
   const presets = make("select", { "aria-label": "preset", onchange: () => { if (PRESETS[presets.value]) studio.preset(PRESETS[presets.value]); presets.value = ""; } },
     make("option", { value: "" }, "preset …"), ...Object.keys(PRESETS).map((name) => make("option", { value: name }, name)));
   const units = make("select", { "aria-label": "units", onchange: () => studio.units(Number(units.value)) }, make("option", { value: 0 }, "SI"), make("option", { value: 1 }, "inch-pound"));
   const dialog = make("dialog", { "aria-label": "text" });
-  const file = make("input", { type: "file", hidden: true, accept: ".toml,.csv", onchange: () => { for (const each of file.files) studio.drop(each); file.value = ""; } });
+  const file = make("input", { type: "file", hidden: true, accept: ".toml,.csv,.txt,.tsv,.json", onchange: () => { for (const each of file.files) studio.drop(each); file.value = ""; } });
   const text = async (kind, action) => {
     const frame = await studio.ask("texts", { state: studio.store.state });
     if (frame.kind === "refusal") studio.say(frame.reason, true);
@@ -31,6 +31,8 @@ export function layout(studio, makers) {
     "copy as Python": () => text("python", (content) => copy(content, studio, "Python")),
     "copy as command": () => text("command", (content) => copy(content, studio, "command")),
     "copy address": () => copy(studio.address(), studio, "address"),
+    "page, read only": () => savePage(studio),
+    "state, file": () => text("state", (content) => save("studio-state.json", content, "application/json")),
   };
   out.append(...Object.keys(leaving).map((name) => make("option", { value: name }, name)));
   out.addEventListener("change", () => { leaving[out.value]?.(); out.value = ""; });

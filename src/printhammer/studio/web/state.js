@@ -18,10 +18,15 @@ export class Store {
     this.future = [];
     this.listeners = new Set();
     this.last = { control: null, at: 0 };
+    this.free = null;
   }
+
+  /** Let nothing be changed any more but some entries. */
+  keep(names) { this.free = names; }
 
   /** Change the state; changes of one control shortly after each other are undone together. */
   set(patch, control = null) {
+    if (this.free && !Object.keys(patch).every((name) => this.free.includes(name))) return;
     const now = performance.now();
     const same = control !== null && control === this.last.control && now - this.last.at < JOINED;
     if (!same) {
@@ -66,15 +71,23 @@ export function toText(state) {
   return found.toString();
 }
 
-/** Return the state that a text tells; what cannot be read stays as at the start. */
+/** Return what a text tells, as it stands there: the server says what of it can be taken. */
 export function fromText(text) {
-  const state = { ...START, constants: {} };
+  const told = {};
+  const constants = {};
   for (const [key, value] of new URLSearchParams(text)) {
-    if (NUMBERS.includes(key)) { if (Number.isFinite(Number(value))) state[key] = Number(value); }
-    else if (TEXTS.includes(key)) state[key] = value;
-    else if (key === "waveform") { try { state.waveform = JSON.parse(value); } catch { /* as the hammer's */ } }
-    else if (key === "views") state.views = value.split("-").filter((view) => VIEWS.includes(view));
-    else if (Number.isFinite(Number(value))) state.constants[key] = Number(value);
+    if (TEXTS.includes(key)) told[key] = value;
+    else if (key === "views") told.views = value.split("-");
+    else if (key === "waveform") told.waveform = parsed(value);
+    else if (NUMBERS.includes(key)) told[key] = number(value);
+    else constants[key] = number(value);
   }
-  return state;
+  if (Object.keys(constants).length) told.constants = constants;
+  return told;
+}
+
+function number(text) { return text.trim() !== "" && Number.isFinite(Number(text)) ? Number(text) : text; }
+
+function parsed(text) {
+  try { return JSON.parse(text); } catch { return text; }
 }

@@ -8,6 +8,8 @@ from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Job, verb
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from printhammer.hammer.hammer import Hammer
 
 
@@ -15,7 +17,10 @@ if TYPE_CHECKING:
 def studio(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    port: int | None = opt.whole("Port on 127.0.0.1 (a free one)."),
+    port: int | None = opt.whole(
+        "Port on 127.0.0.1 (19830, or a free one where that is taken; 0: a free one)."
+    ),
+    state: Path | None = opt.source("State to open with, as the studio's export saves it."),
     browser: bool = opt.switch(
         "Open the page in the browser of the desktop.", flag="--open/--no-open", default=True
     ),
@@ -30,5 +35,5 @@ def studio(
 
             webbrowser.open(address)
 
-    serve(hammer, port=port or 0, ready=ready)
+    serve(hammer, port=port, state=state, ready=ready)
     return Answer()

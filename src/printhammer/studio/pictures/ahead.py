@@ -1,0 +1,115 @@
+"""Pictures drawn ahead, of the shipped hammers as they open: shown, marked, while machine code is made.
+
+``python -m printhammer.studio.pictures.ahead`` draws them anew, where a hammer, its opening or a frame has
+changed; the tests say when.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import json
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.studio.frames import frame, unframe
+from printhammer.studio.states.controls import opening_of
+from printhammer.studio.states.shelf import Shelf
+from printhammer.studio.states.state import read_state
+
+if TYPE_CHECKING:
+    from printhammer.studio.states.state import State
+
+START: Final[dict[str, Any]] = {
+    "text": "",
+    "constants": {},
+    "waveform": None,
+    "rate": 1200.0,
+    "pulses": 9,
+    "pattern": "",
+    "overlap": "add",
+    "low": 500.0,
+    "high": 2000.0,
+    "line": "",
+    "views": [],
+}
+"""What the page opens with, as in `state.js`, but for the hammer."""
+
+SIZE: Final = (128, 192)
+"""Rates and times of a map that is drawn ahead."""
+
+_FIRED: Final = ("constants", "waveform", "rate", "pulses", "pattern", "overlap", "low", "high")
+
+
+def opening(name: str) -> State:
+    """Return the state with which a shipped hammer opens."""
+    shelf = Shelf()
+    return read_state({**START, "hammer": name, **opening_of(shelf.hammer(name))}, shelf)
+
+
+def key_of(state: State) -> str:
+    """Return what the pictures of a state depend on, in a few characters."""
+    content = [state.base.fingerprint, *(getattr(state, name) for name in _FIRED)]
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+
+
+def frames_ahead(state: State, serial: int) -> list[bytes]:
+    """Return frames of a state that were drawn ahead, none where it is no opening of a shipped hammer."""
+    if state.constants or state.text:
+        return []
+    key, parts = _kept(state.base.name)
+    if key is None or key != key_of(state):
+        return []
+    shown = {"motion", "dots", *state.views}
+    return [
+        frame(heading.pop("kind"), serial, arrays, **{**heading, "ahead": True})
+        for heading, arrays in ((dict(heading), arrays) for heading, arrays in parts)
+        if heading["kind"] in shown
+    ]
+
+
+@lru_cache(maxsize=8)
+def _kept(name: str) -> tuple[str | None, list[tuple[dict[str, Any], dict[str, Any]]]]:
+    """Return the key and the frames, headings without what belongs to a state, that are kept for a hammer."""
+    place = files("printhammer.studio").joinpath("ahead", f"{name}.gz")
+    if not place.is_file():
+        return None, []
+    data = gzip.decompress(place.read_bytes())
+    key, data = data[:16].decode(), data[16:]
+    parts = []
+    while data:
+        length = int.from_bytes(data[:8], "little")
+        heading, arrays = unframe(data[8 : 8 + length])
+        for gone in ("serial", "arrays"):
+            del heading[gone]
+        parts.append((heading, arrays))
+        data = data[8 + length :]
+    return key, parts
+
+
+def draw(name: str) -> bytes:
+    """Return the file of a hammer."""
+    from printhammer.studio.pictures.chart import map_frame
+    from printhammer.studio.pictures.engine import dots_frame, motion_frame
+
+    state = opening(name)
+    data, motion = motion_frame(state, 1)
+    frames = [data, dots_frame(1, motion), map_frame(state, 1, SIZE, lambda: False)]
+    whole = b"".join(len(each).to_bytes(8, "little") + each for each in frames)
+    return gzip.compress(key_of(state).encode() + whole, 9, mtime=0)
+
+
+def main() -> None:
+    """Draw all."""
+    from printhammer.hammer.hammer import shipped
+    from printhammer.support.outputs import write_file
+
+    folder = Path(__file__).parents[1] / "ahead"
+    for name in shipped():
+        write_file(folder / f"{name}.gz", draw(name))
+
+
+if __name__ == "__main__":
+    main()

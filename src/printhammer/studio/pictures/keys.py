@@ -1,0 +1,31 @@
+"""What the pictures of a state depend on: while that is the same, so is the picture."""
+
+from __future__ import annotations
+
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.studio.states.state import State
+
+KEYS: Final[dict[str, Callable[[State], Any]]] = {
+    "map": attrgetter("hammer", "text", "constants", "waveform", "slots", "overlap", "low", "high"),
+    "line": attrgetter("hammer", "text", "constants", "waveform", "rate", "line"),
+    "strobe": attrgetter("hammer", "text", "constants", "waveform", "rate", "overlap"),
+}
+"""Keys of the pictures that are drawn anew only where they change, by view."""
+
+
+def kernel_key(state: State) -> tuple[Any, ...]:
+    """Return what decides which machine code a state needs.
+
+    Raises
+    ------
+    InputError
+        The state describes no hammer or drive.
+    """
+    hammer, fired = state.changed, state.fired
+    laws = tuple(sorted((section, type(part).__name__) for section, part in hammer.parts.items()))
+    return laws, fired.shape, fired.quantity, state.overlap

@@ -1,0 +1,137 @@
+"""States from outside, out of a link or a file: what can be taken is, and of the rest it is told why not."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.errors import InputError
+from printhammer.studio.bounds import LARGEST_MESSAGE
+from printhammer.studio.states.state import READERS, ProtocolError, check_constant, dropped_hammer, read_state
+
+if TYPE_CHECKING:
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.studio.states.shelf import Shelf, Told
+    from printhammer.studio.states.state import State
+
+FORMAT: Final = 1
+_KIND: Final = "printhammer studio state"
+_MOST_NOTES: Final = 6
+
+
+def taken(content: Any, shelf: Shelf) -> Told:
+    """Return those entries of a state that can be taken, and a sentence for each that cannot.
+
+    Parameters
+    ----------
+    content
+        Whatever a link or a file holds; entries that are missing are no matter.
+    shelf : Shelf
+        The hammers that are offered.
+    """
+    if not isinstance(content, dict):
+        return {}, ["a state is expected to be a table"]
+    table: dict[str, Any] = {}
+    notes: list[str] = []
+    constants = content.get("constants")
+    for key, value in content.items():
+        try:
+            if key not in READERS:
+                raise ProtocolError(f"{key[:40]!r} is not known")
+            if key != "constants" or not isinstance(constants, dict):
+                READERS[key](value)
+                table[key] = value
+        except ProtocolError as error:
+            notes.append(f"{error}; it is left as it was" if key in READERS else f"{error}; it is not used")
+    base = _hammer(table, shelf, notes)
+    if isinstance(constants, dict):
+        table["constants"] = _constants(constants, base, notes)
+    if table.get("waveform") is not None:
+        _check(table, "waveform", shelf, notes)
+    _check(table, "constants", shelf, notes)
+    more = len(notes) - _MOST_NOTES
+    return table, notes if more <= 1 else [*notes[:_MOST_NOTES], f"and {more} more like these"]
+
+
+def _hammer(table: dict[str, Any], shelf: Shelf, notes: list[str]) -> Hammer:
+    """Return the hammer of a table, whose entries are put right where there is none such."""
+    try:
+        if table.get("text"):
+            return dropped_hammer(table["text"])
+        return shelf.hammer(table.get("hammer") or shelf.names[0])
+    except InputError as error:
+        notes.append(f"{error}; {shelf.names[0]} is shown instead")
+        table.update(hammer=shelf.names[0], text="")
+        return shelf.hammer(shelf.names[0])
+
+
+def _constants(content: dict[Any, Any], base: Hammer, notes: list[str]) -> dict[str, float]:
+    kept: dict[str, float] = {}
+    for key, value in content.items():
+        try:
+            ((name, number),) = READERS["constants"]({key: value})
+            check_constant(base, name, number)
+            kept[name] = number
+        except (ProtocolError, InputError) as error:
+            notes.append(f"{error}; it is left as the hammer has it")
+    return kept
+
+
+def _check(table: dict[str, Any], key: str, shelf: Shelf, notes: list[str]) -> None:
+    """Take an entry out of a table where no hammer or pulse can be made with it."""
+    rest: dict[str, Any] = {"waveform": None, "constants": {}}
+    named = {"hammer": table.get("hammer") or shelf.names[0], "text": table.get("text", "")}
+    made = {name: table[name] for name in rest if name in table}
+    state = read_state({**_PLAIN, **rest, **named, **made}, shelf)
+    try:
+        _ = state.changed if key == "constants" else state.fired
+    except InputError as error:
+        notes.append(f"{error}; {key} is left as the hammer has it")
+        table[key] = rest[key]
+
+
+_PLAIN: Final[dict[str, Any]] = {
+    "hammer": "",
+    "text": "",
+    "constants": {},
+    "waveform": None,
+    "rate": 1000.0,
+    "pulses": 1,
+    "pattern": "",
+    "overlap": "add",
+    "low": 500.0,
+    "high": 1000.0,
+    "line": "",
+    "views": [],
+}
+
+
+def read_file(text: str, where: str, shelf: Shelf) -> Told:
+    """Return what can be taken of the text of a state file, and a sentence for each entry that cannot.
+
+    Raises
+    ------
+    InputError
+        It is no state file.
+    """
+    if len(text) > LARGEST_MESSAGE:
+        raise InputError(f"{where}: {len(text)} characters, expected at most {LARGEST_MESSAGE}")
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        content = None
+    if not isinstance(content, dict) or content.get("kind") != _KIND:
+        raise InputError(f"{where}: expected a state file of the studio, as its export saves it")
+    if content.get("format") != FORMAT:
+        raise InputError(f"{where}: format = {str(content.get('format'))[:40]}, expected {FORMAT}")
+    return taken(content.get("state"), shelf)
+
+
+def file_of(state: State) -> str:
+    """Return the text of a state file; a hammer that does not come with the program is in it as a whole."""
+    table = {key: getattr(state, key) for key in READERS}
+    table["constants"] = dict(state.constants)
+    table["waveform"] = None if state.waveform is None else dict(state.waveform)
+    if not state.text and state.shelf.is_guest(state.hammer) and not state.shelf.is_shipped(state.hammer):
+        table.update(hammer="", text=state.base.to_toml())
+    return json.dumps({"kind": _KIND, "format": FORMAT, "state": table}, indent=1) + "\n"

@@ -1,0 +1,69 @@
+// Views that do not belong to what is set now: the class `outdated`, and in `data-why` the reason.
+const LATE = 250; // ms that a view may be behind before that is worth a mark
+
+const CURVES = ["motion", "sketch", "forces", "phase", "loops"];
+const OWN = ["map", "line", "strobe"];
+const ROLES = { curves: [...CURVES, "energy"], map: ["map"], detail: ["line", "strobe"] };
+const OF_FRAMES = { dots: ["energy"], map: ["map"], line: ["line"], strobe: ["strobe"] };
+
+/** Marks for views, each an element that `panel` finds by its name. */
+export function marksFor(panel) {
+  const reasons = new Map();
+  const timers = new Map();
+  const show = (view) => {
+    clearTimeout(timers.get(view));
+    timers.delete(view);
+    panel(view).classList.add("outdated");
+    panel(view).dataset.why = reasons.get(view);
+  };
+
+  function mark(views, why, atOnce = false) {
+    for (const view of views) {
+      reasons.set(view, why);
+      if (atOnce || panel(view).classList.contains("outdated")) show(view);
+      else if (!timers.has(view)) timers.set(view, setTimeout(() => show(view), LATE));
+    }
+  }
+  function clear(views) {
+    for (const view of views) {
+      clearTimeout(timers.get(view));
+      timers.delete(view);
+      reasons.delete(view);
+      panel(view).classList.remove("outdated");
+      delete panel(view).dataset.why;
+    }
+  }
+  const all = () => [...ROLES.curves, ...OWN];
+  let refused = 0;
+
+  return {
+    /** A state is on its way. */
+    sent: () => mark(all(), "being computed for what is set now"),
+    /** Nothing is computed, and why; what still comes of states up to a number is outdated too. */
+    none(why, serial = 0) {
+      refused = serial;
+      mark(all(), why, true);
+    },
+    /** Work of a role takes long: what it waits for. */
+    progress(role, why) {
+      for (const view of ROLES[role].filter((name) => reasons.has(name))) {
+        show(view);
+        panel(view).dataset.why = `${reasons.get(view)}; ${why}`;
+      }
+    },
+    /** A frame has come. */
+    arrived(frame) {
+      if (frame.ahead) {
+        mark(frame.kind === "motion" ? CURVES : OF_FRAMES[frame.kind], "drawn ahead, of this hammer as it ships; what is set is being computed", true);
+        return;
+      }
+      if (frame.serial <= refused) return;
+      if (frame.kind !== "motion") { clear(OF_FRAMES[frame.kind] ?? []); return; }
+      clear(CURVES);
+      for (const view of OWN) {
+        if (view in frame.outdated) mark([view], frame.outdated[view]);
+        else clear([view]);
+      }
+    },
+  };
+}

@@ -1,0 +1,105 @@
+"""The work for one state, in three parts that go on side by side: curves, map, and what is shown in detail.
+
+Each is done by a worker of its own, so that curves never wait for a map, nor for what a map compiles.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from printhammer.errors import InputError
+from printhammer.studio.frames import nothing, refusal
+from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, try_map
+from printhammer.studio.pictures.engine import dots_frame, motion_frame
+from printhammer.studio.pictures.printed import line_frame
+from printhammer.studio.pictures.section import AT_ONCE, LATER, VERDICT_WORK, check_strobe, strobe_frame
+from printhammer.studio.work import GivenUp, Patience
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.studio.states.state import State
+    from printhammer.studio.workers.order import Order
+
+REST: Final = 0.3
+"""Seconds without a newer state after which more strobe points and the verdict on a train follow."""
+
+
+class Desk(Protocol):
+    """Where a job is done."""
+
+    tried: State | None
+    """State whose map was found to end in time."""
+
+    def tell(self, data: bytes, view: str, *, whole: bool = True) -> None:
+        """Hand over a frame; `whole` where no better one of the view follows."""
+
+    def newer(self) -> bool:
+        """Whether there is a newer state."""
+
+    def rest(self, seconds: float) -> bool:
+        """Wait for a newer state; return whether one has come."""
+
+
+def curves(order: Order, desk: Desk) -> None:
+    """Send the curves of the single run, then its dots; or why the state is refused."""
+    try:
+        data, motion = motion_frame(order.state, order.serial, order.outdated)
+    except InputError as error:
+        desk.tell(refusal(order.serial, str(error)), "refusal")
+        return
+    desk.tell(data, "motion")
+    if not desk.newer():
+        desk.tell(dots_frame(order.serial, motion), "dots")
+
+
+def frequency_map(order: Order, desk: Desk) -> None:
+    """Send a coarse map, then one in full detail."""
+    serial, state = order.serial, order.state
+    try:
+        desk.tried = try_map(state, desk.tried)
+        # Not given up for a newer state: a coarse map is to arrive while a slider moves. The browser draws
+        # meanwhile, and has another core for that.
+        desk.tell(map_frame(state, serial, PREVIEW, lambda: False, 1), "map", whole=False)
+        desk.tell(map_frame(state, serial, FULL, desk.newer), "map")
+    except InputError as error:
+        desk.tell(nothing("map", serial, error), "map")
+
+
+def detail(order: Order, desk: Desk) -> None:
+    """Send the printed line, then the strobe section point by point."""
+    works: dict[str, Callable[[Order, Desk], None]] = {"line": _line, "strobe": _section}
+    for view in order.views:
+        try:
+            works[view](order, desk)
+        except InputError as error:
+            desk.tell(nothing(view, order.serial, error), view)
+
+
+def _line(order: Order, desk: Desk) -> None:
+    desk.tell(line_frame(order.state, order.serial, desk.newer), "line")
+
+
+def _section(order: Order, desk: Desk) -> None:
+    serial, state = order.serial, order.state
+    patience = Patience(desk.newer, "the strobe section")
+    check_strobe(state)
+    for points in AT_ONCE:
+        patience.check()
+        desk.tell(strobe_frame(state, serial, points), "strobe", whole=False)
+    if desk.rest(REST):
+        raise GivenUp
+    for points in LATER:
+        patience.check()
+        begun = patience.spent
+        desk.tell(strobe_frame(state, serial, points, exponent=True), "strobe", whole=False)
+    patience.check(VERDICT_WORK * (patience.spent - begun))
+    desk.tell(strobe_frame(state, serial, LATER[-1], judged=True), "strobe")
+
+
+ROLES: Final[dict[str, Callable[[Order, Any], None]]] = {
+    "curves": curves,
+    "map": frequency_map,
+    "detail": detail,
+}
+"""The jobs by their names."""
