@@ -11,6 +11,7 @@ from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
 from printhammer.hammer.hammer import Hammer
+from printhammer.kernel.compile import cache
 from printhammer.studio import bounds
 from printhammer.studio import session as sessions
 from printhammer.studio.bounds import LARGEST_MESSAGE
@@ -24,18 +25,23 @@ TEXT = CRUDE.read_text("utf-8")
 
 
 class Page:
-    """Takes frames, as slowly as it is told to."""
+    """Takes frames, as slowly as it is told to; those about compiling depend on the machine and are apart."""
 
     def __init__(self) -> None:
         self.frames: list[dict[str, Any]] = []
+        self.compiling: list[str] = []
         self.arrived = threading.Condition()
         self.open = threading.Event()
         self.open.set()
 
     def take(self, data: bytes) -> None:
         self.open.wait(60)
+        frame = unframe(data)[0]
         with self.arrived:
-            self.frames.append(unframe(data)[0])
+            if frame["kind"] == "compiling":
+                self.compiling.append(frame["text"])
+            else:
+                self.frames.append(frame)
             self.arrived.notify_all()
 
     def until(self, kind: str, **told: Any) -> list[dict[str, Any]]:
@@ -64,6 +70,17 @@ def opened(shelf: Shelf | None = None) -> Iterator[tuple[Session, Page]]:
 
 def state(serial: int, **changed: Any) -> str:
     return json.dumps({"kind": "state", "serial": serial, "state": {**STATE, "text": TEXT, **changed}})
+
+
+def test_what_compiles_is_told_until_the_end() -> None:
+    before = set(cache.listeners)
+    with opened() as (made, page):
+        made.receive(state(1, views=["motion"]))
+        page.until("motion")
+        (listener,) = cache.listeners - before
+        listener("compiling runs (a free mass): about 4 s")
+        assert page.compiling[-1] == "compiling runs (a free mass): about 4 s"
+    assert cache.listeners == before
 
 
 def test_curves_come_first_and_previews_before_detail() -> None:

@@ -99,14 +99,16 @@ def simulate(
     return motion
 
 
-def announce_compiling(callback: Callable[[str], None] | None) -> None:
-    """Have `callback` called with one sentence before machine code is made that is not kept on disk yet.
+def announce_compiling(callback: Callable[[str], None]) -> Callable[[], None]:
+    """Have `callback` called with a sentence before machine code is made; return what ends that.
 
-    And, once, where it cannot be kept there.
+    The sentence tells what is compiled, about how long that takes, and what may follow. Others tell, once,
+    where machine code cannot be kept, or why that on disk does not fit.
     """
-    from printhammer.kernel.compile import cache, specialise
+    from printhammer.kernel.compile import cache
 
-    specialise.announce = cache.announce = callback
+    cache.listeners.add(callback)
+    return lambda: cache.listeners.discard(callback)
 
 
 def end_of_run(drive: Drive, duration: float | str | None) -> float:

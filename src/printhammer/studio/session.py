@@ -10,9 +10,11 @@ from __future__ import annotations
 import json
 import logging
 import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.errors import InputError
+from printhammer.run.simulate import announce_compiling
 from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE, LONGEST_REASON
 from printhammer.studio.frames import frame
 from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, map_key, try_map
@@ -103,12 +105,20 @@ class Session:
             thread.join(timeout)
 
     def _run(self, work: Callable[[], None]) -> None:
+        end_of_announcing = announce_compiling(self._compiling)
         try:
             while not self._closed:
                 work()
         except OSError:
             # The page is gone.
             self.close()
+        finally:
+            end_of_announcing()
+
+    def _compiling(self, sentence: str) -> None:
+        # Whatever thread compiles: that this page is gone is not its trouble.
+        with suppress(OSError):
+            self._tell(frame("compiling", 0, text=sentence))
 
     def _tell(self, data: bytes) -> None:
         if not self._closed:

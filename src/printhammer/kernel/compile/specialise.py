@@ -42,8 +42,19 @@ TEMPLATES = (
 )
 """Template modules of the kernel in the order in which they use one another."""
 
-ENTRIES = ("run", "resample", "quadratures", "peaks", "members", "lanes", "flow")
-"""Names of the entry points."""
+ENTRIES = {
+    "run": "runs",
+    "resample": "curves",
+    "quadratures": "energies",
+    "peaks": "peaks",
+    "members": "many runs",
+    "lanes": "many runs side by side",
+    "flow": "derivatives",
+}
+"""Names of the entry points, and what each of them computes."""
+
+_ONE_RUN = ("run", "resample", "quadratures", "peaks")
+"""What is often needed together."""
 
 _PLAIN = (
     "model.modes",
@@ -71,9 +82,6 @@ _LAW_FUNCTIONS = {
     ),
 }
 
-announce: Callable[[str], None] | None = None
-"""Called with one sentence before machine code is made that is not in the cache on disk."""
-
 
 class Kernel:
     """The compiled functions of one combination of laws.
@@ -90,37 +98,27 @@ class Kernel:
         self.namespace = namespace
         self.digest = digest
         self.label = label
-        self._announced = False
         self._entries = {
             name: getattr(module, name)
             for module in modules.values()
             for name in ENTRIES
             if hasattr(module, name) and getattr(module, name).__module__ == module.__name__
         }
+        for name, function in self._entries.items():
+            # Plain Python where NUMBA_DISABLE_JIT is set.
+            if hasattr(function, "py_func"):
+                cache = function._cache
+                cache.kind, cache.label = ENTRIES[name], label
+                if name in _ONE_RUN:
+                    others = [other for other in _ONE_RUN if other in self._entries and other != name]
+                    cache.with_it = tuple(self._entries[other]._cache for other in others)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an entry point, announcing its compilation if its machine code is not on disk yet."""
+        """Return an entry point."""
         try:
-            function = self.__dict__["_entries"][name]
+            return self.__dict__["_entries"][name]
         except KeyError:
             raise AttributeError(name) from None
-        if announce is not None and not self._announced and not _is_ready(function):
-            from printhammer.kernel.compile.cache import kept
-
-            self._announced = True
-            announce(f"compiling the kernel for {self.label} ({kept(function)})")
-        return function
-
-
-def _is_ready(function: Any) -> bool:
-    """Tell whether `function` is compiled in this process or has machine code on disk."""
-    if not hasattr(function, "signatures") or function.signatures:
-        # Plain Python where NUMBA_DISABLE_JIT is set.
-        return True
-    python = function.py_func
-    folder = function.stats.cache_path
-    name = f"{Path(inspect.getfile(python)).stem}.{python.__qualname__}-*.nbc"
-    return folder is not None and any(Path(folder).glob(name))
 
 
 def _source(module: ModuleType) -> bytes:

@@ -30,6 +30,8 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   let writing = 0;
   let begun = false;
   let patience = 0;
+  let compiling = false;
+  let result = ["ready"];
   const asked = new Map();
 
   const message = (kind, content) => {
@@ -50,7 +52,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     studio.sentAt.set(message("state", { state: studio.store.state }), now);
     studio.changedAt = null;
     clearTimeout(patience);
-    patience = setTimeout(() => { if (studio.busy) studio.say("computing; laws that are new to this machine are compiled once: some ten seconds before the curves, as many before the map"); }, 1200);
+    patience = setTimeout(() => { if (studio.busy) studio.say("computing"); }, 1200);
     for (const serial of studio.sentAt.keys()) if (serial < studio.serial - 64) studio.sentAt.delete(serial);
   };
 
@@ -208,6 +210,12 @@ export function mount(element, send, address = { read: () => "", write: () => {}
         asked.delete(frame.serial);
         return;
       }
+      if (frame.kind === "compiling") {
+        compiling = true;
+        clearTimeout(patience);
+        studio.say(frame.text);
+        return;
+      }
       if (frame.kind === "motion" || frame.kind === "refusal") {
         studio.busy = false;
         if (studio.stale) studio.sendState();
@@ -215,10 +223,12 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       if (frame.kind === "refusal") { studio.say(frame.reason, true); return; }
       studio.frames[frame.kind] = frame;
       if (frame.kind === "motion") {
-        studio.say(frame.message || `${frame.steps} steps, ${frame.status}`, frame.status !== "ok");
+        result = [frame.message || `${frame.steps} steps, ${frame.status}`, frame.status !== "ok"];
         const t = frame.data.t;
         studio.cursor = Math.min(studio.cursor, t[t.length - 1]);
       }
+      if (frame.kind === "motion" || compiling) studio.say(...result);
+      compiling = false;
       arrived(frame);
     },
   };

@@ -59,9 +59,9 @@ def _made(name: str, hammer: Hammer) -> tuple[str, float]:
 def warm(job: Job, hammer: Hammer = opt.FIRED) -> Answer:
     """Compile what a hammer needs ahead of time, on two cores; another hammer with these laws needs nothing.
 
-    The machine code stays where numba keeps it, beside the program or in NUMBA_CACHE_DIR, and may be copied
-    to another machine with the same processor, the same versions and the same place of the program; where it
-    does not fit, it is made again.
+    The machine code stays beside the program, or in NUMBA_CACHE_DIR, which may be copied to another machine
+    with the same processor and the same versions, baked into a container, and be read-only there. Where it
+    does not fit, the program says why and makes it again.
     """
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
