@@ -44,7 +44,8 @@ class Route(Declared):
         "the windows before the first strange train, in this order; all of them if there is none"
     )
     first: float | None = part(
-        "value of the first strange train, SI", more="None if there is none, or it was not come to"
+        "value of the first strange train, SI",
+        more="None if there is none, or the way was not followed so far",
     )
     complete: bool = part(
         "False where `MOST_UNDECIDED` trains without a period came first that are not strange, and the way"
