@@ -213,12 +213,7 @@ class Verb:
 
 
 def verb(
-    name: str,
-    example: str,
-    passed: Mapping[str, Option] | None = None,
-    *,
-    parts: bool = False,
-    **files: Files,
+    name: str, example: str, passed: Mapping[str, Option] | None = None, **files: Files
 ) -> Callable[[Callable[..., Answer]], Verb]:
     """Make a function the verb `name`, with an example of a command line that runs.
 
@@ -226,13 +221,14 @@ def verb(
     `job`. Options that are `passed` are those that the library takes under the same name: the function gets
     those that are given as further keywords, to pass them on; the others have the defaults of the library.
     `files` name files to write, in the order of writing; a verb that writes new ones has the option --force.
-    A verb that reads a hammer or a spec, or is about `parts`, has the option --part.
+    One that reads a hammer or a spec has the option --part, as has one that names it among those passed.
     """
 
     def made(function: Callable[..., Answer]) -> Verb:
         signature = inspect.signature(function)
         own = [name for name, each in signature.parameters.items() if isinstance(each.default, Option)]
-        on = passed or {}
+        on = dict(passed or {})
+        with_parts = on.pop("part", None) is not None
         options: dict[str, Option] = {**{name: signature.parameters[name].default for name in own}, **on}
         older = {
             former: replace(each, flag=None, panel=None, hidden=True)
@@ -243,7 +239,7 @@ def verb(
             *(each for each in files.values() if not each.continued),
             *(o for o in options.values() if o.writes),
         ]
-        if parts or any(option.hammer or option.metavar in _WITH_PARTS for option in options.values()):
+        if with_parts or any(option.hammer or option.metavar in _WITH_PARTS for option in options.values()):
             options["part"] = PART
         every = {**options, **files, **older, **({_FORCE: FORCE} if new else {})}
 

@@ -206,8 +206,7 @@ def why_undecided(result: Bifurcation) -> list[str]:
     reasons = (
         (
             settling,
-            "neighbouring motions approach each other, so these trains are still settling: "
-            "more --firings show their periods",
+            "neighbouring motions approach each other: they still settle, more --firings show the period",
         ),
         (known & ~settling, "the exponent lies within three standard errors of zero"),
         (undecided & ~known, "no exponent was computed: --exponents does so, except where a touch grazes"),

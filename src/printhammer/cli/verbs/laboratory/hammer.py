@@ -79,7 +79,7 @@ def check(hammer: str = opt.NAMED) -> Answer:
 @verb(
     "hammer schema",
     "printhammer hammer schema --out hammer.schema.json",
-    parts=True,
+    {"part": opt.PART},
     out=opt.file("Write it here instead."),
 )
 def schema(job: Job) -> Answer:
