@@ -180,7 +180,7 @@ def _specialised(laws: Laws) -> Kernel:
         for name, value in bindings.items()
     }
     parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
-    return execute_all(TEMPLATES, namespace, sources, ", ".join(parts) or "a free mass")
+    return execute_all(TEMPLATES, namespace, sources, f"laws {', '.join(parts)}" if parts else "a free mass")
 
 
 def execute_all(
