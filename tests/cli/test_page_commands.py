@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from tests.test_docs_commands import PAGES, ROOT, SHELL
+from tests.test_docs_commands import CELL, PAGES, ROOT, SHELL
 
 TOML = re.compile(r"^```toml\n(.*?)^```", re.MULTILINE | re.DOTALL)
 WRITTEN = re.compile(r"(?:--out|--into|--dots|--contacts|>) ([\w./-]+)")
@@ -19,6 +19,7 @@ ELSEWHERE = {
     "printhammer paper": "test_paper.py writes the whole report",
     "printhammer bench": "test_bench.py",
     "printhammer studio": "ends with Ctrl-C only, in tests/studio",
+    "printhammer feedback": "takes minutes; the example of the help runs, in test_registry.py",
     "printhammer reconstruct": "the examples of the help run, in test_registry.py",
     "NUMBA_CACHE_DIR=": "compiles anew what test_warm.py compiles",
     "printhammer sweep spec.toml --out results.zarr --dask": "needs a cluster, in tests/sweep",
@@ -38,6 +39,8 @@ FEWER = {
     "m/s, 128'": "m/s, 8'",
     "ms, 256'": "ms, 8'",
     "us, 256'": "us, 8'",
+    "orbits mine.toml": "orbits mine.toml --longest 1 --starts 20",
+    "tune mine.toml": "tune mine.toml --history 1 --no-judge",
     "--longest 4": "--longest 1 --starts 20",
     "--longest 3 --out regimes": "--longest 1 --seeds 1 --most 20 --out regimes",
     "--doublings 1": "--doublings 1 --most 20",
@@ -52,8 +55,11 @@ QUICK = {"README.md", "docs/howto/hammer_files.md", "docs/howto/laboratory.md", 
 
 
 def commands_of(page: Path) -> list[str]:
-    blocks = "".join(SHELL.findall(page.read_text("utf-8"))).replace("\\\n", " ")
-    lines = [line.strip() for line in blocks.splitlines()]
+    text = page.read_text("utf-8")
+    blocks = "".join(SHELL.findall(text)).replace("\\\n", " ")
+    # Other tables name verbs with what stands for their arguments.
+    cells = CELL.findall(text) if page.stem == "cheat_sheet" else []
+    lines = [line.strip() for line in (*blocks.splitlines(), *cells)]
     return [line for line in lines if line and not line.startswith(tuple(ELSEWHERE))]
 
 
