@@ -14,7 +14,8 @@ from tests.studio.server import Studio
 
 import printhammer as ph
 from printhammer.studio.bundle import module
-from printhammer.studio.pictures.engine import motion_frame
+from printhammer.studio.frames import frame
+from printhammer.studio.pictures.engine import dots_frame, motion_frame
 from printhammer.studio.session import answer, read_message
 from printhammer.studio.states.shelf import Shelf
 
@@ -255,9 +256,14 @@ def test_the_widget_is_the_same_page(opened_browser: Any) -> None:
     page.run(answered(answer(kind, serial, content, Shelf())))
     kind, serial, found = read_message(json.dumps(page.wait("window.sent[1]")))
     assert (kind, found.rate) == ("state", 900.0)
-    data, _ = motion_frame(found, serial)
-    page.run(answered(data))
-    page.wait("document.querySelector('.status').textContent.includes('steps')")
+    # What compiles is told until the next result, and then what the run came to.
+    status = "document.querySelector('.status').textContent"
+    data, motion = motion_frame(found, serial)
+    for result in (data, dots_frame(serial, motion)):
+        page.run(answered(frame("compiling", 0, text="compiling runs: about 4 s")))
+        assert page.run(status) == "compiling runs: about 4 s"
+        page.run(answered(result))
+        page.wait(f"{status}.includes('steps')")
     # Keys of the studio are not for the notebook around it, where some of them cut cells.
     page.run("window.heard = 0; document.addEventListener('keydown', () => { window.heard += 1; }); 1")
     page.run("document.querySelector('.grid').focus()")

@@ -73,8 +73,11 @@ def note(folder: Path, name: str, seconds: float) -> None:
         entries.append(own)
     own["seconds"][name] = round(seconds, 2)
     draft = folder / f".{FILE}.{os.getpid()}"
-    draft.write_text(json.dumps({"makers": entries}, indent=1))
-    draft.replace(folder / FILE)
+    try:
+        draft.write_text(json.dumps({"makers": entries}, indent=1))
+        draft.replace(folder / FILE)
+    finally:
+        draft.unlink(missing_ok=True)
 
 
 def expected(folders: Iterable[Path], name: str) -> float:
