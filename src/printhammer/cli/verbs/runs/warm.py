@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import time
+from contextlib import contextmanager
+from threading import Thread
 from typing import TYPE_CHECKING, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Job, verb
 from printhammer.cli.screen import Column, table
+from printhammer.cli.terminal import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+    from multiprocessing.queues import SimpleQueue
 
     from printhammer.hammer.hammer import Hammer
 
@@ -43,8 +47,9 @@ def _exponents(hammer: Hammer) -> None:
 _KERNELS: Final[dict[str, Callable[[Hammer], None]]] = {
     "runs, their dots and peaks": _runs,
     "maps and sweeps": _lanes,
-    "strobe points": _strobes,
     "exponents, orbits, sensitivities": _exponents,
+    # Last, since it takes most of what maps take, which else would be made twice at once.
+    "strobe points": _strobes,
 }
 
 
@@ -53,6 +58,29 @@ def _made(name: str, hammer: Hammer) -> tuple[str, float]:
     start = time.perf_counter()
     _KERNELS[name](hammer)
     return name, time.perf_counter() - start
+
+
+def _announce(sentences: SimpleQueue[str | None]) -> None:
+    from printhammer.run.simulate import announce_compiling
+
+    announce_compiling(sentences.put)
+
+
+@contextmanager
+def _saying(sentences: SimpleQueue[str | None]) -> Iterator[None]:
+    """Say what other processes put into a queue."""
+
+    def work() -> None:
+        while (sentence := sentences.get()) is not None:
+            say(sentence)
+
+    thread = Thread(target=work)
+    thread.start()
+    try:
+        yield
+    finally:
+        sentences.put(None)
+        thread.join()
 
 
 @verb("warm", "printhammer warm hendriks-1983")
@@ -67,9 +95,12 @@ def warm(job: Job, hammer: Hammer = opt.FIRED) -> Answer:
     from multiprocessing import get_context
 
     rows = []
+    spawn = get_context("spawn")
+    sentences = spawn.SimpleQueue()
     with (
         job.counting("machine code", remaining=False) as tell,
-        ProcessPoolExecutor(2, get_context("spawn")) as pool,
+        _saying(sentences),
+        ProcessPoolExecutor(2, spawn, _announce, (sentences,)) as pool,
     ):
         # What takes longest begins first, beside what is wanted first.
         tasks = [pool.submit(_made, name, hammer) for name in _KERNELS]
