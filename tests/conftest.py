@@ -31,14 +31,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def compiled() -> bool:
     """Tell whether the machine code for the hammer of most tests is on disk."""
-    from printhammer.kernel.compile.specialise import specialise
+    from printhammer.kernel.compile.specialise import is_ready, specialise
     from printhammer.run.problem import laws_of
 
     hammer = ph.load(CRUDE)
     assert hammer.waveform is not None
-    run = specialise(laws_of(hammer, ph.PulseTrain(hammer.waveform))).run
-    # Plain Python where NUMBA_DISABLE_JIT is set.
-    return not hasattr(run, "py_func") or run._cache.holds(run.targetctx)
+    return is_ready(specialise(laws_of(hammer, ph.PulseTrain(hammer.waveform))).run)
 
 
 @pytest.fixture(scope="session")

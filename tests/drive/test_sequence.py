@@ -108,6 +108,13 @@ def test_the_peak_is_at_least_every_sample_and_reached_by_one(drive: PulseSequen
     assert drive.largest_pulse == max(waveform.peak for waveform in drive.waveforms)
 
 
+def test_what_a_pulse_would_have_reached_had_it_not_been_cut_off_is_not_the_peak() -> None:
+    late = Trapezoid(amplitude=1.0, rise=1e-3, width=1e-4, fall=1e-3)
+    drive = PulseSequence([late, SHORT], [0.0, 0.25e-3], "replace")
+    assert drive.peak == SHORT.peak
+    assert drive.largest_pulse == late.peak
+
+
 @settings(max_examples=25)
 @given(sequences.waveforms, st.sampled_from(["add", "replace"]))
 def test_equal_waveforms_are_the_train(waveform: Waveform, overlap: Any) -> None:

@@ -13,6 +13,7 @@ from printhammer.parts import (
     PARTS,
     ROLES,
     BackstopPart,
+    DampingPart,
     MagnetPart,
     PackPart,
     Part,
@@ -23,6 +24,7 @@ from printhammer.parts import (
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.damping.viscous import ViscousDamping
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.magnet.table import TableMagnet
 from printhammer.parts.pack.dashpot import DashpotPack
@@ -45,6 +47,7 @@ ARGUMENTS = {
     "backstop_energy": 2,
     "backstop_switch": 3,
     "backstop_rebound": 2,
+    "damping_force": 2,
 }
 EXAMPLES: list[Part] = [
     InverseRootMagnet(F0=2.47, Am=0.437, Bm=0.093),
@@ -60,8 +63,15 @@ EXAMPLES: list[Part] = [
     HertzBackstop(position=5e-5, stiffness=1.2e9, damping=4e8),
     ElastomerBackstop(position=5e-5, stiffness=8e7, relaxation_time=2e-5),
     RigidBackstop(position=5e-5, restitution=0.4),
+    ViscousDamping(coefficient=0.5),
 ]
-BASES = {"magnet": MagnetPart, "spring": SpringPart, "pack": PackPart, "backstop": BackstopPart}
+BASES = {
+    "magnet": MagnetPart,
+    "spring": SpringPart,
+    "pack": PackPart,
+    "backstop": BackstopPart,
+    "damping": DampingPart,
+}
 
 
 def ids(part: Part) -> str:

@@ -245,3 +245,39 @@ def test_where_a_law_runs_away_the_plain_kernel_tells(hammer: ph.Hammer, change:
     assert not mine.ok[1]
     np.testing.assert_array_equal(mine.status, plain.status)
     np.testing.assert_array_equal(mine.steps[1], plain.steps[1])
+
+
+BORDER = [
+    ("magnet.F0", 2.01747, 5e-7),
+    ("magnet.F0", 2.01747, 1e-7),
+    ("spring.Bs", 8.73, 5e-7),
+    ("spring.Bs", 8.73, 1e-6),
+]
+"""Hammers of which the armature nearly stays in the pack, and tolerances at which it swings there unseen."""
+
+
+@pytest.mark.parametrize(("key", "value", "tolerance"), BORDER)
+def test_near_the_border_of_rest_a_member_that_does_not_get_on_leaves(
+    key: str, value: float, tolerance: float
+) -> None:
+    """Its swings are far shorter than its steps, so that a step to the switch never ends on it."""
+    hammer = ph.load("hendriks-1983").replace({key: value})
+    assert hammer.waveform is not None
+    drives = ph.PulseTrains.at_rates(hammer.waveform, np.linspace(500.0, 1100.0, 8), 9)
+    result = Ensemble(hammer, drives, 0.026, tolerance=tolerance, max_steps=20_000).run(engine="lanes")
+    assert result.ok.all()
+    assert result.steps.max() < 2000
+
+
+@pytest.mark.parametrize("engine", ["plain", "lanes"])
+def test_a_run_is_given_up_after_its_steps_in_every_engine(hammer: ph.Hammer, engine: Any) -> None:
+    drive = ph.PulseTrain(hammer.waveform, rate=900.0, pulses=20)
+    ends = [1e-3, 20e-3]
+    full = Ensemble(hammer, drive, ends).run(engine=engine)
+    most = int(full.steps.max()) // 2
+    cut = Ensemble(hammer, drive, ends, max_steps=most).run(engine=engine, dots=True)
+    assert cut.status_names == ["ok", "step limit"]
+    assert cut.steps[1] == most + 1
+    assert cut.reached[1] < ends[1]
+    with pytest.raises(ph.InputError, match="max_steps = 0, expected a positive number"):
+        Ensemble(hammer, drive, ends, max_steps=0)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
+import numpy as np
 import pytest
 
 import printhammer as ph
@@ -34,6 +36,7 @@ def test_hammers_with_the_same_pulse_share_drives() -> None:
     assert slow is slow_too
     assert fast is fast_too
     waveform = ph.load("hendriks-1983").waveform
+    assert waveform is not None
     for drive, rate in ((slow, "600 Hz"), (fast, "1.2 kHz")):
         assert drive == ph.PulseTrain(waveform, rate=rate, pulses=3, overlap="replace", start="1 ms")
 
@@ -53,3 +56,34 @@ def test_another_pulse_is_another_drive(own: dict[str, Any]) -> None:
 def test_a_member_is_what_its_drive_file_says() -> None:
     slow = drives({"key": "pack.stiffness", "values": ["50 lbf"]}, RATE)[0]
     assert read_drive(slow.to_toml()) == slow
+
+
+@pytest.mark.parametrize(
+    ("axes", "own", "arrays"),
+    [
+        ([RATE, {"key": "pack.stiffness", "values": ["50 lbf", "60 lbf"]}], {}, True),
+        ([RATE], {"waveform": {"shape": "half-sine", "amplitude": "1 A", "width": "300 us"}}, True),
+        ([{"key": "waveform.width", "values": ["300 us", "350 us"]}, RATE], {}, False),
+        ([RATE, {"key": "drive.pulses", "values": ["2", "3"]}], {"train": {}}, False),
+        ([{"key": "drive.period", "values": ["1 ms", "2 ms"]}], {}, False),
+    ],
+)
+def test_members_together_are_those_one_by_one(axes: list[Any], own: dict[str, Any], arrays: bool) -> None:
+    spec = read_spec({**SPEC, "drive": {**SPEC["drive"], **own}, "axis": axes})
+    rows = np.array(list(itertools.product(*(axis.values for axis in spec.base.axes))))
+    which, members = Maker(spec.base).members(rows)
+    maker = Maker(spec.base)
+    assert which.tolist() == list(range(len(rows)))
+    assert isinstance(members.drives, ph.PulseTrains) == arrays
+    for i, row in enumerate(rows):
+        alone = maker.member(row)
+        assert members.hammers[i] == alone.hammer
+        assert members.drives[i] == alone.drive
+        assert (members.ends[i], *members.states[i]) == (alone.end, *alone.state)
+
+
+def test_rates_that_make_no_train_leave_the_others() -> None:
+    base = read_spec({**SPEC, "axis": [RATE]}).base
+    which, members = Maker(base).members(np.array([[600.0], [1e-320], [1200.0]]))
+    assert which.tolist() == [0, 2]
+    assert [drive.times[0] for drive in members.drives] == [1e-3, 1e-3]

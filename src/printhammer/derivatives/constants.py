@@ -200,15 +200,15 @@ def pack_push_changes(
 def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
     """Return the rate [N/s] of the push of the pack at a time of a run, s; NaN but on the loading branch."""
     row = problem.resample(record, np.array([t]))[0]
-    if int(row[8]) != M.LOADING:
+    if int(row[9]) != M.LOADING:
         return math.nan
     drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
-    a = (float(row[3:8].sum()) + drive) / problem.hammer.mass
+    a = (float(row[3:9].sum()) + drive) / problem.hammer.mass
     still = np.zeros_like(problem.constants)
     # In the time of the motion, so that the changes are of the size of the state.
     time = problem.scales[0] / problem.scales[1]
     direction = np.array([float(row[1]), a, 0.0]) * time
-    return _push_change(problem, still, np.array([row[0], row[1], row[8], 0.0]), direction) / time
+    return _push_change(problem, still, np.array([row[0], row[1], row[9], 0.0]), direction) / time
 
 
 def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change: FloatArray) -> float:
@@ -238,7 +238,7 @@ def _rates(problem: Problem, record: Record, times: FloatArray, states: FloatArr
     """Return the rates of the state at times of a run, shape (m, 3)."""
     table: Any = problem.resample(record, times)
     drive = table[:, 2] if problem.drive.quantity == "force" else 0.0
-    acceleration = (table[:, 3:8].sum(axis=1) + drive) / problem.hammer.mass
+    acceleration = (table[:, 3:9].sum(axis=1) + drive) / problem.hammer.mass
     rates = np.zeros((len(times), 3))
     moving = states[:, 2] != M.RESTING
     rates[:, 0] = np.where(moving, table[:, 1], 0.0)

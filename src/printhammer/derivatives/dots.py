@@ -166,7 +166,7 @@ def _settled(problem: Problem, record: Record, t: float, step: float) -> float:
 
 def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
     """Return the acceleration, m/s^2, of a row of `Problem.resample`, without some of its forces."""
-    forces = {k: float(row[k]) for k in range(3, 8) if k not in without}
+    forces = {k: float(row[k]) for k in range(3, 9) if k not in without}
     drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
     return (math.fsum(forces.values()) + drive) / problem.hammer.mass
 

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Self, SupportsIndex, overload
 
 import numpy as np
 
-from printhammer.drive.input import MOST_PULSES, PULSES, checked_times, read_array, read_count, read_positive
+from printhammer.drive.input import (
+    MOST_PULSES,
+    PULSES,
+    checked_times,
+    read_array,
+    read_count,
+    read_positive,
+    read_start,
+)
 from printhammer.drive.ragged import Ragged, starts_of
 from printhammer.drive.trains import Drive, Overlap, PulseTrain
 from printhammer.errors import InputError
@@ -55,8 +63,9 @@ class PulseTrains(Sequence[PulseTrain]):
         rates: npt.ArrayLike,
         pulses: SupportsIndex = PULSES,
         overlap: Overlap = "add",
+        start: float | str = 0.0,
     ) -> Self:
-        """Make trains of so many pulses at constant rates, Hz, all of them fired at 0 s first.
+        """Make trains of so many pulses at constant rates, Hz, all of them fired first at `start`, s.
 
         Raises
         ------
@@ -67,7 +76,7 @@ class PulseTrains(Sequence[PulseTrain]):
         steps = np.arange(read_count(pulses, "pulses"), dtype=np.float64)
         with np.errstate(all="ignore"):
             periods = 1.0 / grid
-            firings = Ragged.even(periods[:, np.newaxis] * steps)
+            firings = Ragged.even(read_start(start) + periods[:, np.newaxis] * steps)
         odd = grid[~(np.isfinite(grid) & (grid > 0.0) & np.isfinite(periods))]
         if odd.size:
             read_positive(float(odd[0]), "Hz", "rate")

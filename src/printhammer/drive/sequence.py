@@ -104,8 +104,13 @@ class PulseSequence(Drive):
 
     @property
     def peak(self) -> float:
-        """Largest absolute value of the total current, A, or force, N; exact where pulses do not overlap."""
-        if self.overlapping == 1:
+        """Largest absolute value of the total current, A, or force, N; exact unless pulses meet."""
+        whole = np.append(self._ends()[:-1] <= self._times[1:], True)
+        if self._overlap == "replace":
+            highest = max(largest(self._tables[k]) for k in np.unique(self._which[whole]))
+            if highest == self.largest_pulse:
+                return highest
+        elif whole.all():
             return self.largest_pulse
         edges = [np.add.outer(self._times[self._which == k], t[:, 0]) for k, t in enumerate(self._tables)]
         return largest_sum(np.unique(np.concatenate([some.ravel() for some in edges])), self.value)

@@ -1,9 +1,9 @@
 """Hammer files: TOML to parts, constants and waveform, every fault told in one sentence.
 
 A file has ``format = 1``, ``name``, optionally ``title`` and ``note``, the constants ``mass`` and ``platen``,
-and a table for each part: ``[magnet]``, ``[spring]``, ``[pack]`` and ``[backstop]`` with their ``law``,
-``[waveform]`` with its ``shape``, ``[coil]``, and ``[uncertainty]`` with standard errors of constants
-(`printhammer.hammer.uncertainty`). All but name and mass are optional. A constant is
+and a table for each part: ``[magnet]``, ``[spring]``, ``[pack]``, ``[backstop]`` and ``[damping]`` with
+their ``law``, ``[waveform]`` with its ``shape``, ``[coil]``, and ``[uncertainty]`` with standard errors of
+constants (`printhammer.hammer.uncertainty`). All but name and mass are optional. A constant is
 ``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a pure number.
 """
 

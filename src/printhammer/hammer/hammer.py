@@ -20,7 +20,7 @@ from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
-from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart
+from printhammer.parts import BackstopPart, DampingPart, MagnetPart, PackPart, Part, SpringPart
 from printhammer.support.constants import Constant, quantities
 
 if TYPE_CHECKING:
@@ -131,7 +131,8 @@ class Hammer:
         status, source : str, optional
             Of all constants.
         **parts
-            `magnet`, `spring`, `pack`, `backstop`, `waveform`, `platen`, `coil`, each as `replace` takes it.
+            `magnet`, `spring`, `pack`, `backstop`, `damping`, `waveform`, `platen`, `coil`, each as `replace`
+            takes it.
 
         Raises
         ------
@@ -200,6 +201,12 @@ class Hammer:
         """Backstop."""
         part = self._contents.parts.get("backstop")
         return part if isinstance(part, BackstopPart) else None
+
+    @property
+    def damping(self) -> DampingPart | None:
+        """Damping of the armature wherever it is."""
+        part = self._contents.parts.get("damping")
+        return part if isinstance(part, DampingPart) else None
 
     @property
     def parts(self) -> Mapping[str, Part]:

@@ -14,6 +14,7 @@ pack      ``MEMORY``, ``pack_loading(c, x, v)``, ``pack_memory(c, peak)``, ``pac
           ``pack_switch(c, x, v)``
 backstop  ``RIGID``, ``backstop_rebound(c, v_in)``, or with w = sqrt(b - x) ``backstop_elastic(c, w)``,
           ``backstop_viscous(c, w, v)``, ``backstop_energy(c, w)``, ``backstop_switch(c, w, v)``
+damping   ``damping_force(c, v)``
 ========  ===================================================================================================
 
 ============  ===============================================================================================
@@ -41,6 +42,7 @@ from printhammer.parts.base import (
     PARTS,
     ROLES,
     BackstopPart,
+    DampingPart,
     MagnetPart,
     PackPart,
     Part,
@@ -57,6 +59,7 @@ __all__ = [
     "PARTS",
     "ROLES",
     "BackstopPart",
+    "DampingPart",
     "MagnetPart",
     "PackPart",
     "Part",

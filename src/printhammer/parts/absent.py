@@ -51,6 +51,11 @@ def pack_switch(c: Any, x: float, v: float) -> float:
     return 1.0
 
 
+def damping_force(c: Any, v: float) -> float:
+    """Return the force of no damping, 0 N."""
+    return 0.0
+
+
 def backstop_elastic(c: Any, w: float) -> float:
     """Return the elastic force of no backstop, 0 N."""
     return 0.0

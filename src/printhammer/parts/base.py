@@ -19,13 +19,13 @@ from printhammer.support.constants import sentence
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-ROLES: tuple[str, ...] = ("magnet", "spring", "pack", "backstop")
+ROLES: tuple[str, ...] = ("magnet", "spring", "pack", "backstop", "damping")
 
 
 class Part(BaseModel):
     """A replaceable part of a hammer: constants in SI, and the module that holds its law.
 
-    Its `role` is "magnet", "spring", "pack" or "backstop", `law` the name of the law in hammer files.
+    Its `role` is one of `ROLES`, `law` the name of the law in hammer files.
 
     Raises
     ------
@@ -105,6 +105,12 @@ class BackstopPart(Part):
     role: ClassVar[str] = "backstop"
 
     position: float
+
+
+class DampingPart(Part):
+    """Damping of the armature wherever it is: `damping_force(c, v)`, differentiable in the velocity."""
+
+    role: ClassVar[str] = "damping"
 
 
 PARTS: dict[tuple[str, str], type[Part]] = {}

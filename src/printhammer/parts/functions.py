@@ -18,6 +18,7 @@ _FORCES: Final = {
     "spring": ("spring_force",),
     "pack": ("pack_loading",),
     "backstop": ("backstop_elastic", "backstop_rebound"),
+    "damping": ("damping_force",),
 }
 """Of each role functions of which a law has one at least."""
 

@@ -118,7 +118,8 @@ class _Run:
     def _net(self) -> float:
         """Force without contacts now, N."""
         drive = self.drive.series(self.t, 1.0)
-        return float(self.parts.held_force(self.ref + self.y, drive, self.drive.is_current)[0])
+        held = self.parts.held_force(self.ref + self.y, drive, self.drive.is_current)
+        return float(held[0]) - self.parts.damping * self.v
 
     def _expand(self, contact: Contact, h: float) -> tuple[Array, Array]:
         y, v = np.zeros(ORDER + 1), np.zeros(ORDER + 1)
@@ -126,7 +127,7 @@ class _Run:
         p = self.parts
         drive = self.drive.series(self.t, h)
         magnet = p.magnet if p.table is None else p.table.packed(self._cell())
-        law = (p.mass, p.magnet_kind, magnet, p.spring, contact.packed())
+        law = (p.mass, p.magnet_kind, magnet, p.spring, p.damping, contact.packed())
         self.series(h, self.ref, drive, self.drive.is_current, *law, y, v)
         return y, v
 

@@ -117,6 +117,7 @@ class ReferenceHammer:
         self.rigid = self.backstop is not None and self.backstop.law == "rigid"
         origin = 0.0 if self.backstop is None else self.position
         self.spring = self._spring(hammer.spring, origin)
+        self.damping = self._damping(hammer.damping)
         self.table: Table | None = None
         self.magnet_kind, self.magnet = NO_MAGNET, np.zeros(3)
         self.low, self.high = -math.inf, math.inf
@@ -132,6 +133,14 @@ class ReferenceHammer:
         if spring.law == "preload":
             return np.array([spring.preload + spring.stiffness * origin, -spring.stiffness])
         raise ValueError(f"the reference knows no spring law {spring.law!r}")
+
+    @staticmethod
+    def _damping(damping: Any) -> float:
+        if damping is None:
+            return 0.0
+        if damping.law == "viscous":
+            return float(damping.coefficient)
+        raise ValueError(f"the reference knows no damping law {damping.law!r}")
 
     def _take_magnet(self, magnet: Any) -> None:
         self.low, self.high = magnet.domain

@@ -106,6 +106,7 @@ def _motion_series(
     magnet_kind: int,
     magnet: Array,
     spring: Array,
+    damping: float,
     contact: Array,
     y: Array,
     v: Array,
@@ -113,8 +114,8 @@ def _motion_series(
     """Fill ``y`` and ``v`` with coefficients in s/h, given ``y[0]`` and ``v[0]``; x = ref + y.
 
     ``magnet``: (F0, Am, Bm), or the cell (x0, i0, 16 coefficients c[i, j] of (x-x0)**i (i-i0)**j).
-    ``spring``: (force at x = 0, slope). ``contact``: (sigma or 0, K, p, E, q, scale). ``drive``: series
-    in s/h. SI throughout.
+    ``spring``: (force at x = 0, slope). ``damping``: of a unit of velocity. ``contact``: (sigma or 0, K, p,
+    E, q, scale). ``drive``: series in s/h. SI throughout.
     """
 
     def product(a: Array, b: Array, k: int) -> float:
@@ -153,7 +154,7 @@ def _motion_series(
         x_power[0, 0] = 1.0
     for k in range(n):
         x[k] = y[k] if k > 0 else ref + y[0]
-        force = spring[1] * x[k] + (spring[0] if k == 0 else 0.0)
+        force = spring[1] * x[k] + (spring[0] if k == 0 else 0.0) - damping * v[k]
         if not is_current:
             force += drive[k]
         if magnet_kind == 1:

@@ -22,7 +22,7 @@ from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.results import Result, column, part
 from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job
 from printhammer.run.fired import Fired
-from printhammer.run.problem import TOLERANCE, check_tolerance, laws_of
+from printhammer.run.problem import MAX_STEPS, TOLERANCE, check_tolerance, laws_of
 from printhammer.run.start import check_branch, initial_state
 from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, thread_count
 
@@ -139,12 +139,15 @@ class Ensemble:
         before is under way then.
     tolerance : float, optional
         Error allowed in one step, in units of the way from backstop to pack and of a typical speed.
+    max_steps : int, optional
+        Steps after which a run is given up, with the status "step limit"; by default 5e7.
 
     Raises
     ------
     InputError
         Numbers of hammers, drives, ends, states and starts that do not fit together; an end not positive or
-        not after its start; a state not finite; a hammer without a rest state where no states are given.
+        not after its start; a state not finite; steps not positive; a hammer without a rest state where no
+        states are given.
     """
 
     def __init__(
@@ -156,9 +159,13 @@ class Ensemble:
         states: npt.ArrayLike | None = None,
         starts: float | npt.ArrayLike = 0.0,
         tolerance: float = TOLERANCE,
+        max_steps: int = MAX_STEPS,
     ) -> None:
         check_tolerance(tolerance)
         self.tolerance = tolerance
+        if not max_steps > 0:
+            raise InputError(f"max_steps = {max_steps!r}, expected a positive number")
+        self.max_steps = max_steps
         many_hammers = [hammers] if isinstance(hammers, Hammer) else list(hammers)
         many_drives: Sequence[Drive]
         if isinstance(drives, list | tuple):
@@ -203,10 +210,13 @@ class Ensemble:
                 " these with branch and memory"
             )
         full[:, 1 : 1 + rows.shape[-1]] = rows
-        for hammer, row in zip(self.hammers, full, strict=True):
-            initial_state(hammer, (float(row[1]), float(row[2])))
+        hammers, hammer_of = self._own_hammers
+        different = np.unique(np.column_stack([hammer_of, full[:, 1:]]), axis=0, return_index=True)[1]
+        for i in np.sort(different):
+            hammer, row = hammers[hammer_of[i]], full[i, 1:].tolist()
+            initial_state(hammer, row[:2])
             if rows.shape[-1] == 4:
-                check_branch(hammer, row[1:].tolist())
+                check_branch(hammer, row)
         return full
 
     def _checked_starts(self, begun: FloatArray) -> FloatArray:
@@ -239,7 +249,9 @@ class Ensemble:
         begun_inside = self.states[:, 3] >= 0.0
         alike = Ragged.sorted_by(2 * kernel_of[pair_of] + begun_inside)
         return [
-            Group(alike[row], hammers, hammer_of, fired, self.states, self.ends, self.tolerance)
+            Group(
+                alike[row], hammers, hammer_of, fired, self.states, self.ends, self.tolerance, self.max_steps
+            )
             for row in range(len(alike))
         ]
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from printhammer.drive.ragged import Ragged, starts_of
 from printhammer.kernel.lanes import layout as lane_layout
-from printhammer.kernel.model.layout import MAGNET, PLACES
+from printhammer.kernel.model.layout import MAGNET, PLACES, ROOM
 from printhammer.kernel.single import carry
-from printhammer.run.problem import MAX_STEPS, Problem, scales_of
+from printhammer.run.problem import Problem, scales_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +38,7 @@ class Group:
     All this is decided for each member, so that one kernel serves it in whatever company. `members` are their
     numbers in the ensemble; `hammers` and `hammer_of` say whose hammer is which, and `fired` is what the
     drives of all members do. For each member of the ensemble there is a row of `states` (time, displacement,
-    velocity, mode and memory at the start) and an end, s.
+    velocity, mode and memory at the start) and an end, s. No run takes more than `max_steps`.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class Group:
         states: FloatArray,
         ends: FloatArray,
         tolerance: float,
+        max_steps: int,
     ) -> None:
         self.members = members
         problems, problem_of = _problems(members, hammers, hammer_of, fired, states, tolerance)
@@ -82,6 +83,7 @@ class Group:
             replace=fired.forms[fired.form_of[members[0]]].replace,
             states=states[members],
             ends=ends[members],
+            max_steps=max_steps,
         )
 
     def fits_lanes(self) -> bool:
@@ -91,7 +93,7 @@ class Group:
         if self.lane_kinds is None or not suits(self.laws):
             return False
         hammers = self.batch.hammers
-        used = {role: hammers[:, place : place + 16] for role, place in PLACES.items()}
+        used = {role: hammers[:, PLACES[role] : PLACES[role] + room] for role, room in ROOM.items()}
         used["magnet"] = hammers[:, MAGNET:]
         return all(
             not used[role][:, count:].any() for role, (_place, count) in lane_layout.PLACES.items()
@@ -231,7 +233,6 @@ class Job:
                 which,
                 group.batch,
                 self.kept,
-                MAX_STEPS,
                 under_way,
                 live,
                 np.empty((nodes, 5)),

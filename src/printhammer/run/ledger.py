@@ -26,12 +26,13 @@ class Ledger(Declared):
     backstop_loss: float = scalar(
         "J", "minus the integral of Fe v dt, and what impacts on a rigid backstop take"
     )
+    damping_loss: float = scalar("J", "minus the integral of the damping force of the armature times v dt")
     kinetic: float = scalar("J", "change of kinetic energy from start to end")
     stored: float = scalar(
         "J", "change of stored energy likewise", more="magnet at zero current, spring, Hertz"
     )
     throughput: float = scalar(
-        "J", "sum of the integrals of the absolute power of coil, drive force, pack and backstop"
+        "J", "sum of the integrals of the absolute power of coil, drive force, pack, backstop and damping"
     )
     residual: float = scalar(
         "J",
@@ -41,7 +42,7 @@ class Ledger(Declared):
 
 
 def increments_of(problem: Problem, record: Record) -> FloatArray:
-    """Return the integrals of power [J] over every step: coil, drive force, pack loss, backstop loss."""
+    """Return the integrals of power [J] in every step: coil, drive force, pack, backstop and damping loss."""
     times = record.nodes[:, 0]
     return problem.quadratures(record, np.arange(len(times) - 1), times[:-1], times[1:])
 
@@ -67,7 +68,7 @@ def _function(part: Any, name: str) -> Any:
 
 def ledger_of(problem: Problem, record: Record, increments: FloatArray) -> Ledger:
     """Add up a run, given what `increments_of` returns for it."""
-    coil, force, pack, backstop = (float(math.fsum(column)) for column in increments.T)
+    coil, force, pack, backstop, damping = (float(math.fsum(column)) for column in increments.T)
     start, end = record.nodes[0], record.nodes[-1]
     hammer = problem.hammer
     kinetic = float(0.5 * hammer.mass * (end[2] ** 2 - start[2] ** 2))
@@ -77,8 +78,9 @@ def ledger_of(problem: Problem, record: Record, increments: FloatArray) -> Ledge
         drive_work=force,
         pack_loss=pack,
         backstop_loss=backstop,
+        damping_loss=damping,
         kinetic=kinetic,
         stored=stored,
         throughput=float(np.abs(increments).sum()),
-        residual=coil + force - pack - backstop - kinetic - stored,
+        residual=coil + force - pack - backstop - damping - kinetic - stored,
     )

@@ -30,8 +30,9 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray
 
-FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drive", "total")
-"""Names of the forces: equations (3), (4), (5), (6), (7), a drive that is a force, and their sum."""
+FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "drive", "total")
+"""Names of the forces: equations (3), (4), (5), (6), (7), damping of the armature wherever it is, where the
+hammer has any, a drive that is a force, and their sum."""
 
 _BISECTIONS: Final = 52
 
@@ -130,8 +131,11 @@ class Motion(Result, fields=False):
 
     def _forces(self, table: FloatArray) -> Mapping[str, FloatArray]:
         drive = table[:, 2] if self.drive.quantity == "force" else np.zeros(len(table))
-        columns = [table[:, 3], table[:, 4], table[:, 5], table[:, 6], table[:, 7], drive]
-        return MappingProxyType(dict(zip(FORCES, [*columns, np.sum(columns, axis=0)], strict=True)))
+        columns = [*table[:, 3:9].T, drive]
+        named = dict(zip(FORCES, [*columns, np.sum(columns, axis=0)], strict=True))
+        if self.hammer.damping is None:
+            del named["drag"]
+        return MappingProxyType(named)
 
     def _resampled(self, t: npt.ArrayLike) -> FloatArray:
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
@@ -142,7 +146,7 @@ class Motion(Result, fields=False):
                 f" {self.start:.9g} s to {self.end:.9g} s"
             )
         order = np.argsort(times, kind="stable")
-        table = np.empty((times.size, 9))
+        table = np.empty((times.size, 10))
         table[order] = self._problem.resample(self._record, np.ascontiguousarray(times[order]))
         return table
 

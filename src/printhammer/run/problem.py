@@ -107,6 +107,7 @@ def laws_of(hammer: Hammer, drive: Drive) -> Laws:
         pack=_module(hammer.pack),
         backstop=_module(hammer.backstop),
         absent="printhammer.parts.absent",
+        damping=_module(hammer.damping),
         force_drive=drive.quantity == "force",
         pack_pulls=bool(getattr(hammer.pack, "pull", True)),
         backstop_pulls=bool(getattr(hammer.backstop, "pull", True)),
@@ -126,9 +127,10 @@ def constants_of(hammer: Hammer) -> FloatArray:
     array[layout.POSITION] = hammer.origin
     array[layout.FRONT] = hammer.front if hammer.front is not None else math.inf
     for role, constants in packed.items():
-        if role != "magnet" and len(constants) > layout.SLOT:
+        room = layout.ROOM.get(role, len(constants))
+        if len(constants) > room:
             raise InputError(
-                f"{hammer.path}: {role} has {len(constants)} packed constants, expected at most {layout.SLOT}"
+                f"{hammer.path}: {role} has {len(constants)} packed constants, expected at most {room}"
             )
         array[layout.PLACES[role] : layout.PLACES[role] + len(constants)] = constants
     return array
@@ -282,8 +284,8 @@ class Problem:
                 contacts[0] = contacts[touched - 1]
 
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
-        """Return states and forces, shape (n, 9), at ascending times, s; see the kernel's `resample`."""
-        out = np.empty((times.size, 9))
+        """Return states and forces, shape (n, 10), at ascending times, s; see the kernel's `resample`."""
+        out = np.empty((times.size, 10))
         self.kernel.resample(times, record.nodes, self.drive_arrays(), self.constants, out)
         return out
 
@@ -294,8 +296,8 @@ class Problem:
         return out
 
     def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
-        """Return work of coil and drive force, pack and backstop loss [J], shape (n, 4), inside steps."""
-        out = np.empty((len(steps), 4))
+        """Return work of coil and drive force, losses in pack, backstop, damping [J], shape (n, 5)."""
+        out = np.empty((len(steps), 5))
         self.kernel.quadratures(
             np.ascontiguousarray(steps, np.int64),
             np.ascontiguousarray(starts, np.float64),

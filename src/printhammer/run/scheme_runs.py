@@ -38,7 +38,8 @@ class SchemeProblem(Problem):
 
     Arguments as for `Problem`, the tolerance of no use; `scale` is a factor on all steps of the paper's
     schedule, and `reading`, one of `READINGS`, says when its short steps
-    begin and end. InputError where the factor is not positive.
+    begin and end. InputError where the factor is not positive, or the
+    hammer has damping.
     """
 
     def __init__(
@@ -53,6 +54,8 @@ class SchemeProblem(Problem):
     ) -> None:
         if not (math.isfinite(scale) and scale > 0.0):
             raise InputError(f"step_scale = {scale!r}, expected a positive number")
+        if hammer.damping is not None:
+            raise InputError(f"{hammer.path}: the schemes of 1983 expect a hammer without [damping]")
         super().__init__(hammer, drive, state, 0.0, tolerance)
         self._scheme: schemes_1983.Scheme = scheme
         self._scale = scale
@@ -152,11 +155,11 @@ class SchemeProblem(Problem):
             self._forces(*row)
             for row in zip(x, v, value, nodes[step, 3], np.maximum(nodes[step, 4], x), strict=True)
         ]
-        table = np.column_stack([x, v, value, np.array(forces).reshape(-1, 5), nodes[step, 3]])
+        table = np.column_stack([x, v, value, np.array(forces).reshape(-1, 6), nodes[step, 3]])
         return np.ascontiguousarray(table)
 
     def _forces(self, x: float, v: float, value: float, mode: float, peak: float) -> tuple[float, ...]:
-        """Return magnet, spring, pack, elastic and viscous force, N."""
+        """Return magnet, spring, pack, elastic and viscous force, N, and no damping."""
         packed = self._packed
         position, front = self.hammer.position, self.hammer.front
         current = 0.0 if self.laws.force_drive else value
@@ -172,7 +175,7 @@ class SchemeProblem(Problem):
             elastic = self._law("backstop_elastic")(packed["backstop"], w)
             viscous = self._law("backstop_viscous")(packed["backstop"], w, v)
         magnet = self._law("magnet_force")(packed["magnet"], x, current)
-        return magnet, self._law("spring_force")(packed["spring"], x), pack, elastic, viscous
+        return magnet, self._law("spring_force")(packed["spring"], x), pack, elastic, viscous, 0.0
 
     def peaks(self, record: Record) -> FloatArray:
         """Return time, depth and force, shape (m, 3), at the largest step ends of all contacts."""
@@ -199,7 +202,7 @@ class SchemeProblem(Problem):
         starts: FloatArray,
         ends: FloatArray,
     ) -> FloatArray:
-        """Return work of coil and drive force, pack and backstop loss [J], shape (n, 4), inside steps."""
+        """Return work of coil and drive force, losses in pack, backstop, damping [J], shape (n, 5)."""
         points, weights = _GAUSS
         half = 0.5 * (np.asarray(ends) - np.asarray(starts))
         times = (np.asarray(starts) + half)[:, None] + half[:, None] * points
@@ -207,7 +210,7 @@ class SchemeProblem(Problem):
         v = table[:, 1]
         at_rest = np.array([self._law("magnet_force")(self._packed["magnet"], x, 0.0) for x in table[:, 0]])
         drive = table[:, 2] * v if self.laws.force_drive else np.zeros(len(v))
-        powers = [(table[:, 3] - at_rest) * v, drive, -table[:, 5] * v, -table[:, 7] * v]
+        powers = [(table[:, 3] - at_rest) * v, drive, -table[:, 5] * v, -table[:, 7] * v, np.zeros(len(v))]
         share = half[:, None] * weights
         return np.column_stack([(power.reshape(share.shape) * share).sum(axis=1) for power in powers])
 

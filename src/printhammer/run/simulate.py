@@ -103,12 +103,19 @@ def announce_compiling(callback: Callable[[str], None]) -> Callable[[], None]:
     """Have `callback` called with a sentence before machine code is made; return what ends that.
 
     The sentence tells what is compiled, about how long that takes, and what may follow. Others tell, once,
-    where machine code cannot be kept, or why that on disk does not fit.
+    where machine code cannot be kept, or why that on disk does not fit. A second process helps to compile.
     """
-    from printhammer.kernel.compile import cache
+    from printhammer.kernel.compile import cache, specialise
+    from printhammer.run import ahead
+
+    def end() -> None:
+        cache.listeners.discard(callback)
+        if not cache.listeners:
+            specialise.begin_ahead = None
 
     cache.listeners.add(callback)
-    return lambda: cache.listeners.discard(callback)
+    specialise.begin_ahead = ahead.begin
+    return end
 
 
 def end_of_run(drive: Drive, duration: float | str | None) -> float:

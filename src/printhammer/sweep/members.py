@@ -6,11 +6,16 @@ import tomllib
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+import numpy as np
+
+from printhammer.drive.batch import PulseTrains, firings_of
 from printhammer.drive.file import drive_of
 from printhammer.drive.text import FORMAT, document
+from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.names import RATE
 from printhammer.results import Declared, part, scalar
 from printhammer.run.simulate import CYCLE
 from printhammer.sweep.axes import COUNTS, Axis
@@ -21,9 +26,13 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray, IntArray
 
 KINDS: Final = ("train", "times", "burst", "sequence", "sine")
 """Tables of a drive file that say when it fires."""
+
+_OF_DRIVE: Final = ("waveform", "drive", "at")
+"""Targets of the axes that change the drive."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +43,15 @@ class Member:
     drive: Drive
     end: float
     state: tuple[float, float]
+
+
+class Members(NamedTuple):
+    """Several runs: as in `Member`, one entry for each; `states` are of shape (members, 2)."""
+
+    hammers: list[Hammer]
+    drives: Sequence[Drive]
+    ends: FloatArray
+    states: FloatArray
 
 
 class Base(Declared):
@@ -78,6 +96,56 @@ class Maker:
         """Return the member of a row of values, SI, one for each axis."""
         hammer = self._hammer(row)
         drive = self._drive(row, hammer)
+        end = self.base.duration
+        if end is None:
+            end = float(drive.times[-1]) + CYCLE
+        return Member(hammer, drive, end, self._state(row, hammer))
+
+    def members(self, rows: FloatArray) -> tuple[IntArray, Members]:
+        """Return which rows of values make members, and these."""
+        which: list[int] = []
+        hammers: list[Hammer] = []
+        states: list[tuple[float, float]] = []
+        single: list[Drive] = []
+        trains = self._trains(rows)
+        for i, row in enumerate(rows.tolist()):
+            try:
+                hammer = self._hammer(row)
+                drive = None if trains is not None else self._drive(row, hammer)
+                states.append(self._state(row, hammer))
+            except InputError:
+                continue
+            which.append(i)
+            hammers.append(hammer)
+            if drive is not None:
+                single.append(drive)
+        chosen = np.array(which, dtype=np.int64)
+        drives = single if trains is None else trains.take(chosen)
+        if self.base.duration is not None:
+            ends = np.full(len(chosen), self.base.duration)
+        else:
+            ends = firings_of(drives).last + CYCLE
+        return chosen, Members(hammers, drives, ends, np.array(states).reshape(-1, 2))
+
+    def _trains(self, rows: FloatArray) -> PulseTrains | None:
+        """Return the drives of all rows as arrays, if they are even trains whose rate alone differs."""
+        base, changed = self.base, [axis for axis in self.base.axes if axis.target in _OF_DRIVE]
+        if base.kind != "train" or [axis.field for axis in changed] != [RATE] or "waveform" in base.drive:
+            return None
+        fired = base.waveform if base.waveform is not None else base.hammer.waveform
+        own = base.waveform is None and any(axis.field.startswith("waveform.") for axis in base.axes)
+        if fired is None or own:
+            return None
+        rates = rows[:, base.axes.index(changed[0])]
+        try:
+            first = self._drive(rows[0], base.hammer)
+            overlap, start = first.overlap, float(first.times[0])
+            return PulseTrains.at_rates(fired, rates, len(first.times), overlap, start)
+        except InputError:
+            # One by one, those that can be made are.
+            return None
+
+    def _state(self, row: Sequence[float], hammer: Hammer) -> tuple[float, float]:
         x, v = self.base.state
         for axis, value in zip(self.base.axes, row, strict=True):
             if axis.target == "state":
@@ -86,10 +154,7 @@ class Maker:
             if id(hammer) not in self._rests:
                 self._rests[id(hammer)] = rest_state(hammer)
             x = self._rests[id(hammer)]
-        end = self.base.duration
-        if end is None:
-            end = float(drive.times[-1]) + CYCLE
-        return Member(hammer, drive, end, (x, v or 0.0))
+        return x, v or 0.0
 
     def _of(self, row: Sequence[float], *targets: str) -> dict[Axis, float]:
         pairs = zip(self.base.axes, row, strict=True)
@@ -105,7 +170,7 @@ class Maker:
         return self._hammers[key]
 
     def _drive(self, row: Sequence[float], hammer: Hammer) -> Drive:
-        changes = self._of(row, "waveform", "drive", "at")
+        changes = self._of(row, *_OF_DRIVE)
         key = (*changes.values(), self._standard(hammer)[1])
         if key in self._drives:
             return self._drives[key]

@@ -112,6 +112,7 @@ OF_MOTION: Final = (
     Output("drive_work", "", "float64", "J", "work of a driving force"),
     Output("pack_loss", "", "float64", "J", "energy that the pack kept"),
     Output("backstop_loss", "", "float64", "J", "energy that the backstop took"),
+    Output("damping_loss", "", "float64", "J", "energy that the damping of the armature took"),
     Output("energy_residual", "", "float64", "J", "what the energy ledger leaves over"),
 )
 """Scalars for which the whole motion is computed once more, which takes several times as long."""

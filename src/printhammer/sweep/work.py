@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.drive.batch import firings_of
 from printhammer.errors import InputError
 from printhammer.run.ensemble import DotTable, Ensemble
 from printhammer.support.threads import in_threads
-from printhammer.sweep.members import Base, Maker, Member
+from printhammer.sweep.members import Base, Maker
 from printhammer.sweep.outputs import (
     DISPLACEMENT,
     DOTS,
@@ -24,10 +25,11 @@ from printhammer.sweep.outputs import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection
 
     from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
+    from printhammer.sweep.members import Members
     from printhammer.sweep.outputs import Outputs
 
 Results = dict[str, Any]
@@ -60,23 +62,11 @@ def run_chunk(
     results = outputs.empty(len(rows))
     results["status"][:] = NO_HAMMER
     results["reached"][:] = np.nan
-    maker = Maker(base)
-    which: list[int] = []
-    members: list[Member] = []
-    for i, row in enumerate(rows):
-        try:
-            members.append(maker.member(row))
-        except InputError:
-            continue
-        which.append(i)
-    if not members:
+    which, members = Maker(base).members(rows)
+    if not which.size:
         return results
     ensemble = Ensemble(
-        [member.hammer for member in members],
-        [member.drive for member in members],
-        [member.end for member in members],
-        states=[member.state for member in members],
-        tolerance=base.tolerance,
+        members.hammers, members.drives, members.ends, states=members.states, tolerance=base.tolerance
     )
     with _MAKING:
         _ = ensemble.groups
@@ -87,8 +77,7 @@ def run_chunk(
         if progress is not None:
             progress(share * done / total)
 
-    rows_of = np.array(which)
-    _from_ensemble(ensemble, members, outputs, rows_of, results, threads, tell)
+    _from_ensemble(ensemble, members, outputs, which, results, threads, tell)
     if motions:
 
         def tell_motion(done: int, total: int) -> None:
@@ -99,15 +88,15 @@ def run_chunk(
             for i in range(first, last):
                 _from_motion(ensemble.motion(i), which[i], results)
 
-        in_threads([piece], [len(members)], threads, tell_motion)
+        in_threads([piece], [len(which)], threads, tell_motion)
     return results
 
 
 def _from_ensemble(
     ensemble: Ensemble,
-    members: Sequence[Member],
+    members: Members,
     outputs: Outputs,
-    which: Any,
+    which: IntArray,
     results: Results,
     threads: int,
     tell: Callable[[int, int], None],
@@ -131,10 +120,8 @@ def _from_ensemble(
                 table = getattr(runs.dots, output.name)
                 results[output.name][which, : table.shape[1]] = table
         if outputs.wants(*OF_DOTS):
-            for i, row in enumerate(which):
-                for name, value in _scalars(runs.dots, i).items():
-                    if name in results:
-                        results[name][row] = value
+            for name, values in _scalars(runs.dots, results.keys()).items():
+                results[name][which] = values
     if runs.strobes is not None:
         for i, row in enumerate(which):
             for output in STROBES:
@@ -147,37 +134,38 @@ def _from_ensemble(
                     results[output.name][row] = values[i, ends[i]]
 
 
-def _moments(
-    members: Sequence[Member], outputs: Outputs
-) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
+def _moments(members: Members, outputs: Outputs) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
     """Return the times of the strobes of each member; which are firings, and which is the end."""
     strobes, final = outputs.wants(*STROBES), outputs.wants(*FINAL)
     if not strobes and not final:
         return None, [], []
     moments, places, ends = [], [], []
-    for member in members:
-        firings = np.asarray(member.drive.times) if strobes else np.zeros(0)
-        end = int(np.searchsorted(firings, member.end))
-        moments.append(np.insert(firings, end, member.end) if final else firings)
+    fired = firings_of(members.drives)
+    for i, until in enumerate(members.ends):
+        firings = fired[i] if strobes else np.zeros(0)
+        end = int(np.searchsorted(firings, until))
+        moments.append(np.insert(firings, end, until) if final else firings)
         order = np.arange(len(firings))
         places.append(np.where(final & (order >= end), order + 1, order))
         ends.append(end)
     return moments, places, ends
 
 
-def _scalars(dots: DotTable, i: int) -> dict[str, float]:
-    """Return the scalars that follow from the dots of a member."""
-    struck = dots.struck[i]
-    scalars: dict[str, float] = {
-        "struck_dots": int(struck.sum()),
-        "lost_dots": int((dots.fired[i] & ~struck).sum()),
-    }
+def _scalars(dots: DotTable, wanted: Collection[str]) -> dict[str, Any]:
+    """Return the wanted scalars that follow from the dots of each member, shape (members,)."""
+    struck, counts = dots.struck, dots.struck.sum(axis=1)
+    scalars: dict[str, Any] = {"struck_dots": counts, "lost_dots": (dots.fired & ~struck).sum(axis=1)}
     for name in ("flight_time", "peak_force"):
-        values = getattr(dots, name)[i][struck]
-        # math.fsum rounds once, so that a mean does not depend on how many empty places follow.
-        scalars[f"{name}_mean"] = math.fsum(values) / len(values) if len(values) else math.nan
-        scalars[f"{name}_spread"] = float(values.max() - values.min()) if len(values) else math.nan
-    return scalars
+        values = getattr(dots, name)
+        if f"{name}_mean" in wanted:
+            # math.fsum rounds once, so that a mean does not depend on how many empty places follow.
+            sums = [math.fsum(row[made]) for row, made in zip(values, struck, strict=True)]
+            scalars[f"{name}_mean"] = np.where(counts > 0, sums, np.nan) / np.maximum(counts, 1)
+        if f"{name}_spread" in wanted:
+            high = np.where(struck, values, -np.inf).max(axis=1, initial=-np.inf)
+            low = np.where(struck, values, np.inf).min(axis=1, initial=np.inf)
+            scalars[f"{name}_spread"] = np.where(counts > 0, high - low, np.nan)
+    return {name: values for name, values in scalars.items() if name in wanted}
 
 
 def _from_motion(motion: Motion, row: int, results: Results) -> None:
@@ -192,6 +180,7 @@ def _from_motion(motion: Motion, row: int, results: Results) -> None:
         "drive_work": energy.drive_work,
         "pack_loss": energy.pack_loss,
         "backstop_loss": energy.backstop_loss,
+        "damping_loss": energy.damping_loss,
         "energy_residual": energy.residual,
     }
     for name, value in scalars.items():

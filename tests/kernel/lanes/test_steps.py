@@ -7,6 +7,7 @@ from printhammer.kernel.lanes import layout
 from printhammer.kernel.lanes.steps import settle
 
 TIME = 1e-3
+MOST_STEPS = 5e7
 
 
 def stuck(steps: float, length: float, ratio: float = 0.5) -> bool:
@@ -15,6 +16,7 @@ def stuck(steps: float, length: float, ratio: float = 0.5) -> bool:
     for row, value in enumerate((1e-4, 1.0, 1e-9)):
         pool[(layout.CONTROL + row) * layout.BLOCK] = value
     pool[layout.STEPS * layout.BLOCK] = steps
+    pool[layout.MOST_STEPS * layout.BLOCK] = MOST_STEPS
     good = ratio <= 1.0
     start, end = (TIME, 0.0, 0.0, 0.0), (TIME + length, 0.0, 0.0, 0.0)
     settle(pool, 0, start, length, end, ratio, good, False, False)
@@ -30,7 +32,7 @@ def stuck(steps: float, length: float, ratio: float = 0.5) -> bool:
         (0.9 * layout.MANY_STEPS, 1e-17, False),
         (1.1 * layout.MANY_STEPS, 1e-17, True),
         (1.1 * layout.MANY_STEPS, 1e-13, False),
-        (1.1 * layout.MOST_STEPS, 1e-6, True),
+        (1.1 * MOST_STEPS, 1e-6, True),
     ],
 )
 def test_a_member_leaves_after_many_short_steps_or_too_many(

@@ -198,7 +198,7 @@ class RegimeFamily:
                 forces[fired] = np.fmax(forces[fired], contact.peak_force)
         sections = np.array([problem.start + regime.period * k for k in range(self.firings)])
         states = problem.resample(record, sections)[:, :2].copy()
-        coil, drive, pack, backstop = (float(total) for total in increments.sum(axis=0))
+        coil, drive, pack, backstop = (float(total) for total in increments.sum(axis=0)[:4])
         return Course(states, forces, coil, drive, pack, backstop)
 
 

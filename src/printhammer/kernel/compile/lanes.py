@@ -37,7 +37,7 @@ _SOURCES = (
     "lanes.lanes",
     "compile.lanes",
 )
-_LAYOUT = ("INVERSE_MASS", "POSITION", "FRONT", "SPRING", "PACK", "BACKSTOP_PART", "MAGNET")
+_LAYOUT = ("INVERSE_MASS", "POSITION", "FRONT", "DAMPING", "SPRING", "PACK", "BACKSTOP_PART", "MAGNET")
 
 LaneKinds = tuple[int, bool, bool]
 """Number of exponentials in the drive, whether it has a cubic part, whether a sine."""
@@ -89,7 +89,8 @@ def _specialised(laws: Laws, kinds: LaneKinds) -> Kernel:
         vector["acceleration"] = forces.acceleration
         vector["backstop_acceleration"] = forces.backstop_acceleration
         vector["nystrom_step"] = module("methods.nystrom8", vector, "lanes").nystrom_step
-        vector["contact_step"] = module("methods.dop853", vector, "lanes").contact_step
+        dop853 = module("methods.dop853", vector, "lanes")
+        vector["contact_step"], vector["time_step"] = dop853.contact_step, dop853.time_step
     steps = module("lanes.steps", vector, "lanes")
     scalar["add_up"] = module("lanes.drive", scalar, "plain").add_up
     scalar.update(

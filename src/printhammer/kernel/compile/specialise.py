@@ -53,9 +53,6 @@ ENTRIES = {
 }
 """Names of the entry points, and what each of them computes."""
 
-_ONE_RUN = ("run", "resample", "quadratures", "peaks")
-"""What is often needed together."""
-
 _PLAIN = (
     "model.modes",
     "model.layout",
@@ -80,7 +77,17 @@ _LAW_FUNCTIONS = {
         "backstop_switch",
         "backstop_rebound",
     ),
+    "damping": ("damping_force",),
 }
+
+begin_ahead: Callable[[Laws], Callable[[], None]] | None = None
+"""Called with the laws before `run` is compiled: has the entry points `AHEAD` compiled elsewhere meanwhile.
+
+What it returns waits for these.
+"""
+
+AHEAD = ("peaks", "quadratures", "resample")
+"""Entry points that whoever runs a hammer wants next."""
 
 
 class Kernel:
@@ -91,6 +98,9 @@ class Kernel:
     `lanes` or `flow`. The `label` says what the kernel is for, the `digest` is that of all its sources, and
     the `namespace` has all that its modules define, for what builds on them.
     """
+
+    laws: Laws | None = None
+    _wait: Callable[[], None] | None = None
 
     def __init__(
         self, modules: dict[str, ModuleType], label: str, namespace: dict[str, Any], digest: str
@@ -109,16 +119,32 @@ class Kernel:
             if hasattr(function, "py_func"):
                 cache = function._cache
                 cache.kind, cache.label = ENTRIES[name], label
-                if name in _ONE_RUN:
-                    others = [other for other in _ONE_RUN if other in self._entries and other != name]
+                if name in ("run", *AHEAD):
+                    others = [other for other in ("run", *AHEAD) if other in self._entries and other != name]
                     cache.with_it = tuple(self._entries[other]._cache for other in others)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an entry point."""
+        """Return an entry point, with others compiled elsewhere where that is wanted."""
         try:
-            return self.__dict__["_entries"][name]
+            function = self.__dict__["_entries"][name]
         except KeyError:
             raise AttributeError(name) from None
+        if begin_ahead is not None and self.laws is not None and not is_ready(function):
+            if name == "run" and function._cache.cache_path is not None:
+                self._wait = begin_ahead(self.laws)
+                function._cache.with_it = ()
+            elif name in AHEAD and self._wait is not None:
+                wait, self._wait = self._wait, None
+                wait()
+        return function
+
+
+def is_ready(function: Any) -> bool:
+    """Tell whether an entry point is compiled in this process or has machine code on disk."""
+    # Plain Python where NUMBA_DISABLE_JIT is set.
+    if not hasattr(function, "py_func") or function.signatures:
+        return True
+    return bool(function._cache.holds(function.targetctx))
 
 
 def _source(module: ModuleType) -> bytes:
@@ -180,7 +206,10 @@ def _specialised(laws: Laws) -> Kernel:
         for name, value in bindings.items()
     }
     parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
-    return execute_all(TEMPLATES, namespace, sources, f"laws {', '.join(parts)}" if parts else "a free mass")
+    label = f"laws {', '.join(parts)}" if parts else "a free mass"
+    kernel = execute_all(TEMPLATES, namespace, sources, label)
+    kernel.laws = laws
+    return kernel
 
 
 def execute_all(

@@ -31,6 +31,8 @@ class Batch(NamedTuple):
         Time, displacement, velocity, mode (negative: as follows from the state), memory at the start.
     ends : float64 array, shape (M,)
         Ends of the runs [s].
+    max_steps : int
+        Largest number of steps of a member.
     """
 
     hammer_of: Any
@@ -47,6 +49,7 @@ class Batch(NamedTuple):
     replace: bool
     states: Any
     ends: Any
+    max_steps: int
 
 
 class Kept(NamedTuple):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_switch
     from printhammer.kernel.methods.landing import first_switch, land_on_level, land_on_reversal
     from printhammer.kernel.model.forces import Hammer, pack_force
-    from printhammer.kernel.model.laws import RELOAD_ALONG_UNLOADING, pack_memory
+    from printhammer.kernel.model.laws import HAS_DAMPING, RELOAD_ALONG_UNLOADING, pack_memory
     from printhammer.kernel.model.pulses import Drive, edges_at
     from printhammer.kernel.single.resample import state_in_step
     from printhammer.kernel.single.run import contact_unit
@@ -79,8 +79,10 @@ def sixth_term(pool: Any, i: int, which: int) -> float:
     a0, a1 = pool[R.OLD_A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
     middle = quintic(0.5, h, x0, v0, a0, x1, v1, a1)
     t = pool[R.OLD_T * R.BLOCK + i] + 0.5 * h
-    memory = pool[R.MEMORY * R.BLOCK + i]
-    a = lane_acceleration(pool, i, t, middle, 0.0, MODE_OF[which], memory)
+    memory, v = pool[R.MEMORY * R.BLOCK + i], 0.0
+    if HAS_DAMPING:
+        v = 1.875 * (x1 - x0) / h - 0.4375 * (v0 + v1) + 0.03125 * h * (a1 - a0)
+    a = lane_acceleration(pool, i, t, middle, v, MODE_OF[which], memory)
     # The second derivative of the quintic in the middle, in the same unit.
     bend = 1.5 * h * (v1 - v0) - 0.25 * h * h * (a0 + a1)
     return float((a * h * h - bend) / 0.375)

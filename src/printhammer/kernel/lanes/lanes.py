@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import compiled, entry, inlined
 from printhammer.kernel.lanes import layout as R
 from printhammer.kernel.lanes.batch import control_of, train_of
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, SPRING, Train
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    DAMPING,
+    FRONT,
+    MAGNET,
+    PACK,
+    POSITION,
+    SPRING,
+    Train,
+)
 from printhammer.kernel.model.modes import BACKSTOP, EDGE, FREE, NEAR_TOUCH, NO_SWITCH, OK, UNRESOLVED
 
 if TYPE_CHECKING:
@@ -53,7 +62,9 @@ FINE = 1e-6
 
 
 @compiled
-def place_constants(pool: Any, i: int, hammer: Hammer, control: Any, bounds: Any, rates: Any) -> None:
+def place_constants(
+    pool: Any, i: int, hammer: Hammer, control: Any, bounds: Any, rates: Any, most_steps: float
+) -> None:
     """Write what belongs to a member's hammer and waveform into a lane."""
     for row in range(R.RATES_WIDTH):
         pool[(R.RATES + row) * R.BLOCK + i] = rates[row]
@@ -62,6 +73,8 @@ def place_constants(pool: Any, i: int, hammer: Hammer, control: Any, bounds: Any
         pool[at + row * R.BLOCK] = 0.0
     for row in range(3):
         pool[at + row * R.BLOCK] = hammer[row]
+    for row in range(R.SPRING - R.DAMPING):
+        pool[at + (R.DAMPING + row) * R.BLOCK] = hammer[DAMPING + row]
     for row in range(R.PACK - R.SPRING):
         pool[at + (R.SPRING + row) * R.BLOCK] = hammer[SPRING + row]
     for row in range(R.BACKSTOP_PART - R.PACK):
@@ -72,6 +85,7 @@ def place_constants(pool: Any, i: int, hammer: Hammer, control: Any, bounds: Any
         pool[at + (R.MAGNET + row) * R.BLOCK] = hammer[MAGNET + row]
     for row in range(4):
         pool[(R.CONTROL + row) * R.BLOCK + i] = control[row]
+    pool[R.MOST_STEPS * R.BLOCK + i] = most_steps
     pool[R.LOWEST * R.BLOCK + i] = max(bounds[0], bounds[2] - bounds[3])
     pool[R.HIGHEST * R.BLOCK + i] = min(bounds[1], bounds[2] + bounds[3])
 
@@ -98,6 +112,8 @@ def begin_member(
     slot[R.DOT] = -1.0
     slot[R.END] = end
     slot[R.CAREFUL] = 0.0
+    slot[R.EVENT_TIME] = t
+    slot[R.EVENTS] = 0.0
     _first, _last, edge = edges_at(t, train)
     a = acceleration(t, x, v, FREE, 0.0, hammer, train.live)
     mode = first_mode(x, v, a, hammer)
@@ -160,7 +176,9 @@ def look_after(
     event = int(pool[R.EVENT * R.BLOCK + i])
     switch = NO_SWITCH
     t, x, v = pool[i], 0.0, 0.0
-    if event & int(R.STUCK):
+    slot[R.EVENTS] = slot[R.EVENTS] + 1.0 if t == slot[R.EVENT_TIME] else 0.0
+    slot[R.EVENT_TIME] = t
+    if event & int(R.STUCK) or slot[R.EVENTS] > R.STALLED:
         return LEAVES
     if event & int(R.SWITCH):
         if slot[R.CAREFUL] != 0.0:
@@ -258,6 +276,7 @@ def lanes(
     stage = pools[R.POOLS]
     spares = R.LANES
     carried = R.OWN
+    most_steps = float(batch.max_steps)
     if uniform:
         carried = R.ANY_DRIVE if CUBIC or SINE else R.EXPONENTIAL_DRIVE
     for p in range(R.POOLS):
@@ -269,7 +288,9 @@ def lanes(
         hammer, bounds = batch.hammers[row], batch.bounds[row]
         for p in range(R.POOLS):
             for lane in range(R.LANES):
-                place_constants(pools[p], place(lane), hammer, control_of(batch, row), bounds, rates)
+                place_constants(
+                    pools[p], place(lane), hammer, control_of(batch, row), bounds, rates, most_steps
+                )
     while True:
         while spares > 0 and waiting < which.size:
             m = which[waiting]
@@ -294,7 +315,7 @@ def lanes(
                 left += 1
                 continue
             if not uniform:
-                place_constants(stage, 0, hammer, control, batch.bounds[row], rates)
+                place_constants(stage, 0, hammer, control, batch.bounds[row], rates, most_steps)
             spares -= 1
             copy_lane(stage, 0, pools[target], place(counts[target]), carried)
             members_in[target, counts[target]] = number

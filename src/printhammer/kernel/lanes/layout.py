@@ -10,14 +10,17 @@ LANES = 256
 BLOCK = 16
 """Lanes in one pass of the compiled loops."""
 
-MOST_STEPS = 5e7
-"""Steps after which a member leaves the lanes."""
-
 MANY_STEPS, SHORT = 2e4, 1e-12
 """Steps after which a member leaves the lanes whose steps have become short, in parts of the time since 0.
 
 Where a law runs away, steps become shorter and shorter without ever becoming too short; the plain kernel
 knows what becomes of it.
+"""
+
+STALLED = 200.0
+"""Events in a row that do not move time after which a member leaves the lanes.
+
+A switch that has to be located takes four attempts and at most some forty halvings of the step.
 """
 
 STILL = 1e-8
@@ -27,12 +30,19 @@ STILL = 1e-8
 INVERSE_MASS = 0
 POSITION = 1
 FRONT = 2
-SPRING = 3
-PACK = 7
-BACKSTOP_PART = 13
-MAGNET = 19
-CONSTANTS = 25
-PLACES = {"spring": (SPRING, 4), "pack": (PACK, 6), "backstop": (BACKSTOP_PART, 6), "magnet": (MAGNET, 6)}
+DAMPING = 3
+SPRING = 5
+PACK = 9
+BACKSTOP_PART = 15
+MAGNET = 21
+CONSTANTS = 27
+PLACES = {
+    "damping": (DAMPING, 2),
+    "spring": (SPRING, 4),
+    "pack": (PACK, 6),
+    "backstop": (BACKSTOP_PART, 6),
+    "magnet": (MAGNET, 6),
+}
 """First place and number of places of the constants of each part."""
 
 # The drive between two of its edges, in the order: time of reference, constant, amplitudes of two
@@ -77,7 +87,9 @@ RATES = ANY_DRIVE
 CONTROL = RATES + RATES_WIDTH
 LOWEST = CONTROL + 4
 HIGHEST = CONTROL + 5
-HAMMER = CONTROL + 6
+MOST_STEPS = CONTROL + 6
+"""Steps after which the member leaves the lanes."""
+HAMMER = CONTROL + 7
 OWN = HAMMER + CONSTANTS
 """Rows that belong to the member's waveform and hammer come before this one."""
 
@@ -117,7 +129,11 @@ ATTEMPTS = 10
 SAVED_STEP = 11
 NEXT_TIME = 12
 """Time of the next strobe, infinity if there is none."""
-SLOT_WIDTH = 13
+EVENT_TIME = 13
+"""Time at which the latest event was looked after."""
+EVENTS = 14
+"""How many events in a row did not move time."""
+SLOT_WIDTH = 15
 
 # Events, to be added up.
 SWITCH = 1.0

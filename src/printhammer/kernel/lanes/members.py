@@ -24,7 +24,6 @@ def members(
     which: Any,
     batch: Batch,
     kept: Kept,
-    max_steps: int,
     under_way: Any,
     live: Any,
     nodes: Any,
@@ -39,8 +38,6 @@ def members(
         Numbers of the members.
     batch, kept : Batch, Kept
         The members, and what to keep of them.
-    max_steps : int
-        Largest number of steps of a member.
     under_way, live : array, shape (2, any)
         Working space as in :func:`printhammer.kernel.single.run.run`, for the run and for its record.
     nodes, contacts, carry
@@ -89,7 +86,7 @@ def members(
                 batch.ends[m],
                 control,
                 limits,
-                max_steps,
+                batch.max_steps,
                 nodes,
                 contacts,
                 carry,

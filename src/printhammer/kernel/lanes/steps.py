@@ -17,10 +17,10 @@ from printhammer.kernel.model.layout import ForceLaw
 from printhammer.kernel.model.modes import FREE, LOADING, UNLOADING
 
 if TYPE_CHECKING:
-    from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.methods.dop853 import contact_step, time_step
     from printhammer.kernel.methods.nystrom8 import nystrom_step
     from printhammer.kernel.model.forces import acceleration, backstop_acceleration
-    from printhammer.kernel.model.laws import backstop_elastic
+    from printhammer.kernel.model.laws import HAS_DAMPING, backstop_elastic
 
     State = tuple[float, float, float, float]
 
@@ -49,7 +49,8 @@ def drive_at(pool: Any, i: int) -> Any:
 def hammer_at(pool: Any, i: int) -> Any:
     """Return the constants of a lane's hammer."""
     at = R.HAMMER * BLOCK + i
-    return twelve_at(pool, at) + twelve_at(pool, at + 12 * BLOCK) + (pool[at + 24 * BLOCK],)
+    last = pool[at + 24 * BLOCK], pool[at + 25 * BLOCK], pool[at + 26 * BLOCK]
+    return twelve_at(pool, at) + twelve_at(pool, at + 12 * BLOCK) + last
 
 
 @inlined
@@ -94,20 +95,23 @@ def settle(
     event = R.SWITCH if (small and not sure) else 0.0
     event += R.SAMPLED if (valid and t1 >= pool[R.SAMPLE * BLOCK + i]) else 0.0
     event += R.AT_EDGE if (valid and edge) else 0.0
-    most = R.MANY_STEPS if following < R.SHORT * abs(t1) else R.MOST_STEPS
+    most = pool[R.MOST_STEPS * BLOCK + i]
+    # In the backstop lengths are in s, which says nothing about time.
+    most = min(most, R.MANY_STEPS) if abs(t1 - t) < R.SHORT * abs(t1) else most
     stuck = not (small or following > 1e-14 * scale) or steps > most
     event = R.STUCK if (stuck or (small and outside)) else event
     pool[R.EVENT * BLOCK + i] = event
 
 
 @inlined
-def nystrom_ratio(pool: Any, i: int, error_x: float, error_v: float) -> float:
-    """Return the error estimate of a Nystrom step over what is allowed; not finite stays so."""
+def step_ratio(pool: Any, i: int, error_x: float, error_v: float) -> float:
+    """Return the error estimate of a step off the backstop over what is allowed; not finite stays so."""
     ratio_x = abs(error_x) / pool[R.CONTROL * BLOCK + i]
     ratio_v = abs(error_v) / pool[(R.CONTROL + 1) * BLOCK + i]
     # A sum instead of the larger one keeps a NaN of either.
     worst = max(ratio_x, ratio_v) + 0.0 * (ratio_x + ratio_v)
-    return float(worst / pool[(R.CONTROL + 2) * BLOCK + i])
+    allowance = R.CONTROL + 3 if HAS_DAMPING else R.CONTROL + 2
+    return float(worst / pool[allowance * BLOCK + i])
 
 
 @inlined
@@ -139,9 +143,12 @@ def timed_step(pool: Any, i: int, start: State, h: float, law: ForceLaw) -> tupl
     left = pool[R.NEXT * BLOCK + i] - t
     edge = h >= left
     h = left if edge else h
-    x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, law)
+    if HAS_DAMPING:
+        x1, v1, a1, error_x, error_v = time_step(t, x, v, a, h, law)
+    else:
+        x1, v1, a1, error_x, error_v = nystrom_step(t, x, v, a, h, law)
     t1 = pool[R.NEXT * BLOCK + i] if edge else t + h
-    return h, (t1, x1, v1, a1), nystrom_ratio(pool, i, error_x, error_v), edge
+    return h, (t1, x1, v1, a1), step_ratio(pool, i, error_x, error_v), edge
 
 
 @compiled
@@ -196,8 +203,10 @@ def unloading_block(pool: Any, begin: int) -> None:
         h, end, ratio, edge = timed_step(pool, i, start, pool[R.H * BLOCK + i], law)
         _t1, x1, v1, a1 = end
         sure = max(v + h * a / 3.0, v1 - h * a1 / 3.0, v1) < 0.0 and x1 > law.hammer[R.FRONT]
-        # On the steep branch the estimate of order 6 is too small by about this factor.
-        settle(pool, i, start, h, end, 5.0 * ratio, sure, edge, False)
+        if not HAS_DAMPING:
+            # On the steep branch the estimate of order 6 is too small by about this factor.
+            ratio *= 5.0
+        settle(pool, i, start, h, end, ratio, sure, edge, False)
 
 
 @inlined

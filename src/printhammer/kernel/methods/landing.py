@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import (
         BACKSTOP_PULLS,
         HAS_BACKSTOP,
+        HAS_DAMPING,
         HAS_PACK,
         MEMORY,
         PACK_PULLS,
@@ -38,11 +39,17 @@ FAILED = -1
 
 
 @inlined
+def takes_velocity(mode: int) -> bool:
+    """Tell whether the force off the backstop depends on the velocity."""
+    return HAS_DAMPING or (HAS_PACK and not MEMORY and mode == M.LOADING)
+
+
+@inlined
 def plain_step(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
     """Take one step of `h` [s] with the method that suits the mode."""
-    if HAS_PACK and not MEMORY and law.mode == M.LOADING:
+    if takes_velocity(law.mode):
         return time_step(t, x, v, a, h, law)
     return nystrom_step(t, x, v, a, h, law)
 
@@ -59,7 +66,7 @@ def error_ratio(error_x: float, error_v: float, mode: int, control: Control) -> 
     worst = ratio_x if ratio_x > ratio_v else ratio_v
     if math.isnan(ratio_x):
         worst = ratio_x
-    if HAS_PACK and not MEMORY and mode == M.LOADING:
+    if takes_velocity(mode):
         return worst / control[3]
     if mode in (M.UNLOADING, M.RELOADING):
         # On the steep branch r^11 the estimate of order 6 is too small by about this factor.
@@ -151,7 +158,13 @@ def longest_still_step(start: State, law: ForceLaw, control: Control) -> float:
         return math.inf
     rise = acceleration(t, x + small, v, mode, memory, hammer, drive)
     slope = abs(rise - acceleration(t, x - small, v, mode, memory, hammer, drive)) / (2.0 * small)
-    return 2.0 / math.sqrt(slope) if slope > 0.0 else math.inf
+    longest = 2.0 / math.sqrt(slope) if slope > 0.0 else math.inf
+    if HAS_DAMPING:
+        slow = 1e-5 * control[1]
+        fall = acceleration(t, x, v - slow, mode, memory, hammer, drive)
+        rate = abs(fall - acceleration(t, x, v + slow, mode, memory, hammer, drive)) / (2.0 * slow)
+        longest = min(longest, 2.0 / rate if rate > 0.0 else math.inf)
+    return longest
 
 
 @compiled

@@ -11,13 +11,28 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, INVERSE_MASS, MAGNET, POSITION, Train
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    DAMPING,
+    FRONT,
+    INVERSE_MASS,
+    MAGNET,
+    POSITION,
+    SPRING,
+    Train,
+)
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate
     from printhammer.kernel.methods.dop853 import contact_step
     from printhammer.kernel.model.forces import Hammer, pack_force
-    from printhammer.kernel.model.laws import FORCE_DRIVE, backstop_energy, backstop_viscous, magnet_force
+    from printhammer.kernel.model.laws import (
+        FORCE_DRIVE,
+        backstop_energy,
+        backstop_viscous,
+        damping_force,
+        magnet_force,
+    )
     from printhammer.kernel.model.pulses import Drive, drive_value, edges_at, pass_edges
     from printhammer.kernel.single.resample import memory_of, s_at, state_in_step
 
@@ -38,8 +53,8 @@ WEIGHTS = (
 @compiled
 def powers(
     t: float, x: float, v: float, w: float, mode: int, memory: float, hammer: Hammer, drive: Drive
-) -> tuple[float, float, float, float]:
-    """Return the powers [W] of coil and drive force, and those that pack and backstop take away for good."""
+) -> tuple[float, float, float, float, float]:
+    """Return the powers [W] of coil and drive force, and those that pack, backstop and damping take away."""
     value = drive_value(t, drive)
     coil = 0.0
     force = 0.0
@@ -52,7 +67,8 @@ def powers(
     backstop = 0.0
     if mode == M.BACKSTOP:
         backstop = -backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) * v
-    return coil, force, pack, backstop
+    damping = -damping_force(hammer[DAMPING:SPRING], v) * v
+    return coil, force, pack, backstop, damping
 
 
 @compiled
@@ -71,7 +87,7 @@ def quadratures(
     hammer: Hammer,
     out: Any,
 ) -> None:
-    """Fill `out`, shape (n, 4), with work of coil and drive force, pack loss and backstop loss [J].
+    """Fill `out`, shape (n, 5): work of coil and drive force, losses in pack, backstop and damping [J].
 
     Parameters
     ----------
@@ -90,7 +106,7 @@ def quadratures(
             first, last, _edge = edges_at(nodes[i, 0], train)
         t0, x0, v0, mode, kept = nodes[i, 0], nodes[i, 1], nodes[i, 2], int(nodes[i, 3]), nodes[i, 4]
         first, last, _edge = pass_edges(t0, train, first, last)
-        for j in range(4):
+        for j in range(5):
             out[row, j] = 0.0
         if i + 1 < nodes.shape[0] and nodes[i + 1, 0] == t0 and nodes[i + 1, 1] == x0:
             # An impact on a rigid backstop.
@@ -120,11 +136,12 @@ def quadratures(
             else:
                 t = place
                 x, v, w = state_in_step(t, t0, x0, v0, mode, kept, hammer, train.live)
-            coil, force, pack, backstop = powers(t, x, v, w, mode, memory, hammer, train.live)
+            coil, force, pack, backstop, damping = powers(t, x, v, w, mode, memory, hammer, train.live)
             out[row, 0] += share * coil
             out[row, 1] += share * force
             out[row, 2] += share * pack
             out[row, 3] += share * backstop
+            out[row, 4] += share * damping
         if mode == M.BACKSTOP_RELEASED:
             # The backstop has let go: what it still stores is lost as it creeps back.
             first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, train.live)

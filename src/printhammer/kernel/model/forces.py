@@ -8,15 +8,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import inlined
-from printhammer.kernel.model.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET, PACK, POSITION, SPRING
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    DAMPING,
+    INVERSE_MASS,
+    MAGNET,
+    PACK,
+    POSITION,
+    SPRING,
+)
 from printhammer.kernel.model.modes import LOADING, RELOADING, UNLOADING
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
+        HAS_DAMPING,
         HAS_PACK,
         backstop_elastic,
         backstop_viscous,
+        damping_force,
         magnet_force,
         pack_loading,
         pack_unloading,
@@ -28,12 +38,20 @@ if TYPE_CHECKING:
 
 
 @inlined
-def field_force(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the sum of magnet, spring and drive force [N]: equations (3) and (4)."""
+def undamped_force(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
+    """Return the sum of magnet, spring and drive force [N]."""
     value = drive_value(t, drive)
     if FORCE_DRIVE:
         return magnet_force(hammer[MAGNET:], x, 0.0) + spring_force(hammer[SPRING:PACK], x) + value
     return magnet_force(hammer[MAGNET:], x, value) + spring_force(hammer[SPRING:PACK], x)
+
+
+@inlined
+def field_force(t: float, x: float, v: float, hammer: Hammer, drive: Drive) -> float:
+    """Return the sum of magnet, spring, damping and drive force [N]: equations (3) and (4)."""
+    if HAS_DAMPING:
+        return undamped_force(t, x, hammer, drive) + damping_force(hammer[DAMPING:SPRING], v)
+    return undamped_force(t, x, hammer, drive)
 
 
 @inlined
@@ -51,7 +69,7 @@ def acceleration(
     t: float, x: float, v: float, mode: int, memory: float, hammer: Hammer, drive: Drive
 ) -> float:
     """Return the acceleration [m/s^2] off the backstop: equation (1)."""
-    force = field_force(t, x, hammer, drive)
+    force = field_force(t, x, v, hammer, drive)
     if HAS_PACK:
         force += pack_force(x, v, mode, memory, hammer)
     return float(force * hammer[INVERSE_MASS])
@@ -60,7 +78,7 @@ def acceleration(
 @inlined
 def backstop_acceleration(t: float, w: float, v: float, hammer: Hammer, drive: Drive) -> float:
     """Return the acceleration [m/s^2] at compression ``w**2`` [m] of the backstop: (1), (6) and (7)."""
-    force = field_force(t, hammer[POSITION] - w * w, hammer, drive)
+    force = field_force(t, hammer[POSITION] - w * w, v, hammer, drive)
     force += backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) + backstop_viscous(
         hammer[BACKSTOP_PART:MAGNET], w, v
     )

@@ -29,7 +29,7 @@ class Laws:
 
     Attributes
     ----------
-    magnet, spring, pack, backstop : str
+    magnet, spring, pack, backstop, damping : str
         Dotted names of modules with the law functions declared in this file; the empty string for an absent
         part.
     absent : str
@@ -48,6 +48,7 @@ class Laws:
     pack: str
     backstop: str
     absent: str
+    damping: str = ""
     force_drive: bool = False
     pack_pulls: bool = True
     backstop_pulls: bool = True
@@ -56,6 +57,7 @@ class Laws:
 
 HAS_PACK: bool
 HAS_BACKSTOP: bool
+HAS_DAMPING: bool
 MEMORY: bool
 RIGID: bool
 FORCE_DRIVE: bool
@@ -79,6 +81,8 @@ spring_force: Law1
 """Force of the spring [N] at a displacement [m]."""
 spring_energy: Law1
 """Energy [J] at a displacement [m], of which minus the slope is the spring force."""
+damping_force: Law1
+"""Force of the damping of the armature [N] at a velocity [m/s]; differentiable."""
 pack_loading: Law2
 """Force of the pack [N] on the loading branch, negative where it pushes; of displacement and velocity."""
 pack_memory: Law1

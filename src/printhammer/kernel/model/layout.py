@@ -1,8 +1,8 @@
 """Where the constants of a hammer lie in the one array that the kernel works with.
 
-Inverse mass, position of the backstop and front of the pack come first, then the packed constants of spring,
-pack, backstop and magnet, each from a fixed place on: sixteen places each, the magnet's last and of any
-length.
+Inverse mass, position of the backstop and front of the pack come first, then the packed constants of damping,
+spring, pack, backstop and magnet, each from a fixed place on: sixteen places each, thirteen for the damping,
+the magnet's last and of any length.
 """
 
 from typing import Any, NamedTuple
@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 INVERSE_MASS = 0
 POSITION = 1
 FRONT = 2
+DAMPING = 3
 SPRING = 16
 PACK = 32
 BACKSTOP_PART = 48
 MAGNET = 64
-PLACES = {"spring": SPRING, "pack": PACK, "backstop": BACKSTOP_PART, "magnet": MAGNET}
-SLOT = 16
-"""Number of constants that a spring, pack or backstop may have."""
+PLACES = {"damping": DAMPING, "spring": SPRING, "pack": PACK, "backstop": BACKSTOP_PART, "magnet": MAGNET}
+ROOM = {"damping": SPRING - DAMPING, "spring": 16, "pack": 16, "backstop": 16}
+"""Number of constants that a part may have; a magnet any."""
 
 CUBIC_PIECE, EXPONENTIAL_PIECE, SINE_PIECE, END = 0.0, 1.0, 2.0, 3.0
 """Kinds of the rows of a table of pieces, see `printhammer.kernel.model.pulses`; the last ends a waveform."""

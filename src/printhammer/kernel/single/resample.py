@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import BACKSTOP_PART, MAGNET, PACK, POSITION, SPRING, ForceLaw, Train
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    DAMPING,
+    MAGNET,
+    PACK,
+    POSITION,
+    SPRING,
+    ForceLaw,
+    Train,
+)
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate
@@ -24,6 +33,7 @@ if TYPE_CHECKING:
         MEMORY,
         backstop_elastic,
         backstop_viscous,
+        damping_force,
         magnet_force,
         pack_memory,
         spring_force,
@@ -144,9 +154,9 @@ def resample(
         Ascending, inside the run [s].
     nodes, train, hammer
         As recorded and given in :func:`printhammer.kernel.single.run.run`.
-    out : float64 array, shape (n, 9)
+    out : float64 array, shape (n, 10)
         Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
-        the backstop, mode. At the time of an impact or a switch: the state after it.
+        the backstop, damping force, mode. At the time of an impact or a switch: the state after it.
     """
     train = Train(*train)
     first, last, _edge = edges_at(nodes[0, 0], train)
@@ -172,7 +182,8 @@ def resample(
         compressed = mode in (M.BACKSTOP, M.HELD)
         out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if compressed else 0.0
         out[row, 7] = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if compressed else 0.0
-        out[row, 8] = mode
+        out[row, 8] = damping_force(hammer[DAMPING:SPRING], v)
+        out[row, 9] = mode
 
 
 @compiled

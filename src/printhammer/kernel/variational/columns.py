@@ -33,7 +33,13 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import drive_value
     from printhammer.kernel.variational.forcing import add_forcing
     from printhammer.kernel.variational.layout import Setting
-    from printhammer.kernel.variational.slopes import contact_slopes, field_slope, memory_slope, pack_slopes
+    from printhammer.kernel.variational.slopes import (
+        contact_slopes,
+        damping_slope,
+        field_slope,
+        memory_slope,
+        pack_slopes,
+    )
 
 LONGEST_PHASE = 0.75
 """Largest phase in one step of the oscillation that a change of the state makes."""
@@ -75,7 +81,7 @@ def column_rates(
     rates: Any, y: Any, columns: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
 ) -> None:
     """Fill `rates` with those of displacement or w, velocity, time and columns at `y`."""
-    hammer, drive = setting.hammer, setting.drive
+    hammer, drive, scales = setting.hammer, setting.drive, setting.scales
     v = y[1]
     if HAS_BACKSTOP and mode == BACKSTOP:
         pace = 2.0 * y[0]
@@ -88,7 +94,7 @@ def column_rates(
     rates[V.TIME] = pace
     slopes = force_slopes(y, mode, memory, peak, peaks, setting)
     by_x = (pace * slopes[0] + slopes[1]) * hammer[INVERSE_MASS]
-    by_v = pace * slopes[2] * hammer[INVERSE_MASS]
+    by_v = pace * (slopes[2] + damping_slope(v, scales, hammer)) * hammer[INVERSE_MASS]
     by_peak = slopes[3] * hammer[INVERSE_MASS]
     for k in range(columns.shape[1]):
         j = V.FIRST_COLUMN + CHANGING * k
@@ -107,7 +113,8 @@ def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Sett
     slopes = force_slopes(work[V.START], mode, memory, peak, work[V.MEMORIES], setting)
     pace = 2.0 * work[V.START, 0] if mode == BACKSTOP else 1.0
     by_x = (pace * slopes[0] + slopes[1]) * setting.hammer[INVERSE_MASS]
-    by_v = pace * slopes[2] * setting.hammer[INVERSE_MASS]
+    by_v = slopes[2] + damping_slope(work[V.START, 1], setting.scales, setting.hammer)
+    by_v *= pace * setting.hammer[INVERSE_MASS]
     rate = max(math.sqrt(abs(pace * by_x)), abs(by_v))
     return LONGEST_PHASE / rate if rate > 0.0 else math.inf
 

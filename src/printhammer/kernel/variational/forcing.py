@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
+    DAMPING,
     END,
     FRONT,
     INVERSE_MASS,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
         CHANGING,
         FORCE_DRIVE,
         HAS_BACKSTOP,
+        HAS_DAMPING,
         HAS_PACK,
         PACK_PULLS,
         backstop_elastic,
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
         backstop_rebound,
         backstop_switch,
         backstop_viscous,
+        damping_force,
         magnet_force,
         pack_memory,
         pack_switch,
@@ -123,6 +126,17 @@ def field_changes(
                 coil += WEIGHTS[CENTRAL, i] * (magnet - magnet_force(other[MAGNET:], x, 0.0))
     total, coil = total / V.SPACING + pulse, coil / V.SPACING
     return (total, coil, pulse) if FORCE_DRIVE else (total, coil + pulse, 0.0)
+
+
+@inlined
+def damping_change(v: float, k: int, forcing: Forcing) -> float:
+    """Return the change [N] of the damping force at a fixed velocity."""
+    total = 0.0
+    if HAS_DAMPING and forcing.of_hammer[k] & V.DAMPING_MOVES:
+        for i in range(POINTS[CENTRAL]):
+            c = forcing.varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])][DAMPING:SPRING]
+            total += WEIGHTS[CENTRAL, i] * damping_force(c, v)
+    return float(total / V.SPACING)
 
 
 @compiled
@@ -235,6 +249,8 @@ def add_forcing(
         j = V.FIRST_COLUMN + CHANGING * k
         dx, dv = y[j], y[j + 1]
         change, coil_change, drive_part = field_changes(t, x, value, with_value, k, drive, forcing)
+        if HAS_DAMPING:
+            change += damping_change(v, k, forcing)
         surface, push, lost = 0.0, 0.0, 0.0
         if compressed:
             surface = moves[k, POSITION]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled, inlined
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, SPRING
+from printhammer.kernel.model.layout import BACKSTOP_PART, DAMPING, FRONT, MAGNET, PACK, SPRING
 from printhammer.kernel.model.modes import LOADING
 
 if TYPE_CHECKING:
@@ -22,11 +22,13 @@ if TYPE_CHECKING:
         BACKSTOP_PULLS,
         FORCE_DRIVE,
         FORCED,
+        HAS_DAMPING,
         MEMORY,
         PACK_PULLS,
         backstop_elastic,
         backstop_switch,
         backstop_viscous,
+        damping_force,
         magnet_force,
         pack_memory,
         pack_switch,
@@ -81,6 +83,19 @@ def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer
     total = 0.0
     for k in range(POINTS[side]):
         total += WEIGHTS[side, k] * field_at(x + OFFSETS[side, k] * spacing, value, hammer)
+    return float(total / spacing)
+
+
+@compiled
+def damping_slope(v: float, scales: Any, hammer: Hammer) -> float:
+    """Return the slope of the damping force with velocity [N s/m]."""
+    if not HAS_DAMPING:
+        return 0.0
+    spacing = SPEED_SPACING * scales[1]
+    total = 0.0
+    for k in range(POINTS[CENTRAL]):
+        at = v + OFFSETS[CENTRAL, k] * spacing
+        total += WEIGHTS[CENTRAL, k] * damping_force(hammer[DAMPING:SPRING], at)
     return float(total / spacing)
 
 

@@ -27,7 +27,13 @@ if TYPE_CHECKING:
         stored_change,
     )
     from printhammer.kernel.variational.layout import Forcing, Setting
-    from printhammer.kernel.variational.slopes import contact_slopes, field_slope, note_memories, pack_slopes
+    from printhammer.kernel.variational.slopes import (
+        contact_slopes,
+        damping_slope,
+        field_slope,
+        note_memories,
+        pack_slopes,
+    )
 
 GRADING = 1.0 / 64.0
 """Shortest share of a step after a touch of the pack, whose slope is not smooth there."""
@@ -94,7 +100,7 @@ def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
     x, w = node[1], node[4]
     slopes = contact_slopes(w, 0.0, scales, hammer)
     by_x = (field_slope(x, 0.0, scales, bounds, hammer) - slopes[0] / (2.0 * w)) * hammer[INVERSE_MASS]
-    by_v = slopes[1] * hammer[INVERSE_MASS]
+    by_v = (slopes[1] + damping_slope(0.0, scales, hammer)) * hammer[INVERSE_MASS]
     half = 0.5 * by_v
     under_root = half * half + by_x
     if under_root < 0.0:

@@ -13,6 +13,7 @@ from printhammer.errors import InputError
 from printhammer.maps.frequency import TAIL
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.run.start import initial_state
+from printhammer.studio import bounds
 from printhammer.studio.frames import frame
 from printhammer.studio.work import Patience, alike, try_out
 from printhammer.support.threads import in_threads, thread_count
@@ -95,7 +96,8 @@ def map_frame(
         patience.check()
         fired = rates[first:last].tolist()
         trains = _trains(state.fired, tuple(fired), state.slots, state.overlap)
-        runs = Ensemble(hammer, trains, end, states=rest, tolerance=DISPLAY_TOLERANCE)
+        most = bounds.MOST_MAP_STEPS
+        runs = Ensemble(hammer, trains, end, states=rest, tolerance=DISPLAY_TOLERANCE, max_steps=most)
         ok[first:last] = runs.run(times=times, x=x[first:last], threads=1).ok
 
     # While one piece is integrated, another is made ready.

@@ -153,22 +153,24 @@ def summary(motion: Motion, units: Units) -> list[tuple[str, str | None]]:
         rows.append((surface, f"{len(touches)} {'touch' if len(touches) == 1 else 'touches'}{up_to}"))
     energy = motion.energy
     force = motion.drive.quantity == "force"
-    work, pack, backstop, armature = (
+    work, pack, backstop, damping, armature = (
         with_unit(value, "energy", units)
         for value in (
             energy.drive_work if force else energy.coil_work,
             energy.pack_loss,
             energy.backstop_loss,
+            energy.damping_loss,
             energy.kinetic + energy.stored,
         )
     )
     source = "drive" if force else "coil"
+    damped = "" if motion.hammer.damping is None else f" + damping {damping}"
     share = energy.residual / energy.throughput if energy.throughput else 0.0
     return [
         *rows,
         (
             "energy",
-            f"{source} {work} = pack {pack} + backstop {backstop} + armature {armature}",
+            f"{source} {work} = pack {pack} + backstop {backstop}{damped} + armature {armature}",
         ),
         ("residual", f"{share:+.1e} of the energy that passed through"),
     ]

@@ -1,0 +1,1 @@
+"""Laws of the damping of the armature."""

@@ -1,0 +1,36 @@
+"""Viscous damping of the armature wherever it is: in flight, in the pack and in the backstop.
+
+    Fv = -c v
+
+Source: the textbook oscillator; S. W. Shaw and P. J. Holmes, J. Sound Vib. 90 (1983) 129, have it in the
+impact oscillator. Hendriks (1983) has no damping in flight.
+Validity: slow motion in a fluid, bearings with an oil film, eddy currents in a uniform field. Weakness: air
+at high speed resists with the square of the speed, dry bearings with a constant force.
+
+Packed constants: c = [coefficient].
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from printhammer.parts.base import DampingPart, register
+from printhammer.support.constants import quantity
+
+
+def damping_force(c: Any, v: float) -> float:
+    """Return the force of the damping, N."""
+    return float(-c[0] * v)
+
+
+@register
+class ViscousDamping(DampingPart):
+    """Coefficient of the viscous damping."""
+
+    law: ClassVar[str] = "viscous"
+
+    coefficient: float = quantity("N s/m", "c", "viscous damping of the armature", ge=0)
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return (coefficient,)."""
+        return (self.coefficient,)

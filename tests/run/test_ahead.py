@@ -1,0 +1,98 @@
+"""Machine code made ahead by a second process."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import printhammer as ph
+from printhammer.kernel.compile import cache, specialise
+from printhammer.kernel.compile.specialise import AHEAD, Kernel
+from printhammer.kernel.model.laws import Laws
+from printhammer.run import ahead
+from printhammer.run.problem import laws_of
+from printhammer.run.simulate import announce_compiling
+
+
+def entry(name: str) -> Any:
+    """A compiled entry point whose machine code is nowhere yet."""
+
+    def function() -> None: ...
+
+    function.__module__ = "module"
+    return SimpleNamespace(
+        py_func=function,
+        signatures=[],
+        targetctx=None,
+        _cache=SimpleNamespace(cache_path="nowhere", holds=lambda _target: False),
+        name=name,
+        __module__="module",
+    )
+
+
+@pytest.fixture
+def kernel() -> Kernel:
+    names = ("run", "members", *AHEAD)
+    module: Any = SimpleNamespace(__name__="module", **{name: entry(name) for name in names})
+    made = Kernel({"module": module}, "some laws", {}, "digest")
+    made.laws = Laws("", "", "", "", "absent")
+    return made
+
+
+def test_the_second_process_begins_with_the_run_and_is_waited_for_once(
+    kernel: Kernel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    happened: list[Any] = []
+
+    def begin(laws: Laws) -> Any:
+        happened.append(laws)
+        return lambda: happened.append("waited")
+
+    monkeypatch.setattr(specialise, "begin_ahead", begin)
+    for name in ("members", "run", "members", "peaks", "quadratures"):
+        assert getattr(kernel, name).name == name
+        happened.append(name)
+    laws = kernel.laws
+    assert happened == ["members", laws, "run", "members", "waited", "peaks", "quadratures"]
+
+
+def test_no_process_begins_unasked(kernel: Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(_laws: Laws) -> Any:
+        raise AssertionError
+
+    monkeypatch.setattr(cache, "listeners", set())
+    monkeypatch.setattr(ahead, "begin", never)
+    end = announce_compiling(lambda _sentence: None)
+    assert specialise.begin_ahead is never
+    end()
+    assert kernel.run.name == "run"
+
+
+def test_laws_that_the_second_process_cannot_import_are_no_trouble() -> None:
+    ahead.begin(Laws("a.part.file", "", "", "", "printhammer.parts.absent"))()
+
+
+@pytest.mark.slow
+def test_what_is_made_ahead_is_what_a_motion_loads(hammer: ph.Hammer, tmp_path: Path) -> None:
+    laws = laws_of(hammer, ph.PulseTrain(hammer.waveform))
+    where = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    told = json.dumps(asdict(laws))
+    subprocess.run([sys.executable, "-m", ahead.__name__, told], env=where, check=True)
+    made = {path.name for path in tmp_path.rglob("*.nbc")}
+    assert len(made) == len(AHEAD)
+    hammer.save(tmp_path / "hammer.toml")
+    code = f"""
+import printhammer as ph
+hammer = ph.load({str(tmp_path / "hammer.toml")!r})
+motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
+_ = motion.dots, motion.energy
+"""
+    subprocess.run([sys.executable, "-c", code], env=where, check=True)
+    fresh = {path.name for path in tmp_path.rglob("*.nbc")} - made
+    assert [name.partition(".")[2].partition("_")[0] for name in fresh] == ["run"]
