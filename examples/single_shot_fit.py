@@ -59,7 +59,7 @@ below.plot(1e6 * found.abscissa, 1e6 * found.residuals, ".", markersize=2)
 below.set(xlabel="time (µs)", ylabel="residual (µm)")
 
 # %%
-# A motion shows forces only over the mass. Free them all, and there is no answer:
+# A motion shows forces divided by the mass only. Free them all, and there is no answer:
 
 everything = ["mass", "magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs"]
 everything += ["pack.stiffness", "backstop.stiffness", "backstop.damping"]

@@ -31,8 +31,8 @@ found = ph.sweep(spec, folder / "results.zarr")
 print(found)
 
 # %%
-# The result is a Dataset over the axes of the grid. A member whose run did not get
-# to its end would be a row with another status than 0.
+# The result is a Dataset over the axes of the grid. A member whose run
+# ended early would be a row with another status than 0.
 
 lost = found.lost_dots.where(found.status == 0)
 spread = (1e6 * found.flight_time_spread).where(found.status == 0)

@@ -31,16 +31,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def compiled() -> bool:
     """Tell whether the machine code for the hammer of most tests is on disk."""
-    from printhammer.kernel.compile import specialise
+    from printhammer.kernel.compile.specialise import is_ready, specialise
     from printhammer.run.problem import laws_of
 
     hammer = ph.load(CRUDE)
     assert hammer.waveform is not None
-    needed: list[str] = []
-    specialise.announce = needed.append
-    _ = specialise.specialise(laws_of(hammer, ph.PulseTrain(hammer.waveform))).run
-    specialise.announce = None
-    return not needed
+    return is_ready(specialise(laws_of(hammer, ph.PulseTrain(hammer.waveform))).run)
 
 
 @pytest.fixture(scope="session")

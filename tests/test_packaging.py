@@ -150,7 +150,7 @@ def test_the_wheel_runs_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
 def test_the_readme_works_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
     (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
     dots = output_of(elsewhere / "python", "-c", example, cwd=tmp_path).strip().splitlines()
-    assert len(dots) == 9  # one for each pulse of the example
+    assert len(dots) == 1 + 9  # the heading, and one for each pulse of the example
 
 
 @pytest.mark.slow

@@ -1,8 +1,11 @@
 """How far a verb is: told where somebody looks, and nowhere else."""
 
+import re
+
 import pytest
 
 from printhammer.cli.progress import counting, pace_of, telling
+from printhammer.cli.terminal import say
 
 
 @pytest.fixture
@@ -16,9 +19,9 @@ def test_nothing_is_written_where_nobody_looks(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("FORCE_COLOR", raising=False)
-    with counting("orbits") as count, telling("judging") as say:
+    with counting("orbits") as count, telling("judging") as tell:
         count(1, 2)
-        say("more")
+        tell("more")
     assert capsys.readouterr() == ("", "")
 
 
@@ -34,11 +37,22 @@ def test_a_terminal_sees_what_is_counted(capsys: pytest.CaptureFixture[str]) -> 
 
 @pytest.mark.usefixtures("terminal")
 def test_a_terminal_sees_what_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    with telling("sampling") as say:
-        say("12 candidates")
+    with telling("sampling") as tell:
+        tell("12 candidates")
     out, err = capsys.readouterr()
     assert out == ""
     assert "12 candidates" in err
+
+
+@pytest.mark.usefixtures("terminal")
+def test_what_is_said_meanwhile_stands_above_the_bar(capsys: pytest.CaptureFixture[str]) -> None:
+    with counting("trains") as count, telling("judging"):
+        count(1, 2)
+        say("compiling runs")
+    say("done")
+    lines = re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", capsys.readouterr().err).replace("\r", "\n").splitlines()
+    assert "compiling runs" in [line.strip() for line in lines]
+    assert lines[-1] == "done"
 
 
 def test_an_error_goes_through() -> None:

@@ -138,11 +138,9 @@ def test_a_long_pulse_outlives_later_ones() -> None:
     assert drive.waveform is LONG
     assert drive.waveforms == (LONG, SHORT, SHORT)
     assert (drive.period, drive.uniform) == (None, False)
-    assert (
-        repr(drive) == "<PulseSequence: 2 waveforms of current, 3 firings from 0 s to 0.0009 s, overlap add>"
-    )
+    assert repr(drive) == "<PulseSequence: 2 waveforms of current, 3 firings from 0 to 0.9 ms, overlap add>"
     assert repr(PulseSequence([SHORT], [0.0], "replace")) == (
-        "<PulseSequence: 1 waveform of current, 1 firing at 0 s, overlap replace>"
+        "<PulseSequence: 1 waveform of current, 1 firing at 0 ms, overlap replace>"
     )
 
 

@@ -176,8 +176,8 @@ def test_drives_that_do_the_same_are_equal() -> None:
 
 def test_a_drive_is_told_in_one_line_and_pickled() -> None:
     drive = PulseTrain(PULSE, rate="1.2 kHz", pulses=9)
-    assert repr(drive) == ("<PulseTrain: rectangle current, 9 firings from 0 s to 0.00666667 s, overlap add>")
-    assert repr(SineForce(1.0, 2.0)) == "<SineForce: sine force, 1 firing at 0 s, overlap add>"
+    assert repr(drive) == ("<PulseTrain: rectangle current, 9 firings from 0 to 6.66667 ms, overlap add>")
+    assert repr(SineForce(1.0, 2.0)) == "<SineForce: sine force, 1 firing at 0 ms, overlap add>"
     assert pickle.loads(pickle.dumps(drive)) == drive
 
 

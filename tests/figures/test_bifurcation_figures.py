@@ -109,3 +109,17 @@ def test_the_quench_map_shows_lost_and_printed_dots(hammer: "ph.Hammer") -> None
     np.testing.assert_array_equal(~np.ma.getmaskarray(lost), found.lost.T)
     marks = next(line for line in ax.lines if line.get_gid() == "Fig. 6")
     np.testing.assert_allclose(marks.get_xdata(), [0.66, 0.70])
+    legend = ax.get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "width of the first pulse",
+        "the two cases of Fig. 6",
+    ]
+    # White signs, on the map and in the legend.
+    assert {marks.get_color(), *(line.get_color() for line in legend.get_lines())} == {"white"}
+    assert to_rgb(legend.get_frame().get_facecolor()) != to_rgb("white")
+
+
+def test_a_quench_map_without_the_cases_of_fig_6_does_not_explain_them(hammer: "ph.Hammer") -> None:
+    found = ph.quench_map(hammer, gaps=(720e-6, 760e-6, 3), widths=(200e-6, 500e-6, 3))
+    (ax, *_bars) = found.plot().axes
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["width of the first pulse"]

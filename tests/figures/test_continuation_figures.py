@@ -1,8 +1,10 @@
+import dataclasses
 import math
 from collections import Counter
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 import printhammer as ph
@@ -56,6 +58,21 @@ def test_stable_parts_are_solid_and_end_at_the_branch_points(branch: Branch) -> 
         (mark,) = lines(figure, event.kind)
         assert mark.get_xdata()[0] == event.value
         np.testing.assert_allclose(mark.get_ydata()[0], event.state[1], rtol=1e-2)
+
+
+def test_a_grazing_stands_out_from_the_branch(branch: Branch) -> None:
+    """It is drawn over the lines, higher than they are wide, and in another colour; on request not at all."""
+    event = dataclasses.replace(branch.events[0], kind="grazing")
+    grazed = dataclasses.replace(branch, events=(event,))
+    figure = grazed.plot()
+    (mark,) = lines(figure, "grazing")
+    assert mark.get_xdata()[0] == event.value
+    for line in [*lines(figure, "stable"), *lines(figure, "unstable")]:
+        assert mark.get_zorder() > line.get_zorder()
+        assert mark.get_markersize() > 5.0 * line.get_linewidth()
+        assert to_rgb(mark.get_markeredgecolor()) != to_rgb(line.get_color())
+    assert "grazing" in [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert not lines(grazed.plot(grazings=False), "grazing")
 
 
 def test_the_legend_tells_every_kind(branch: Branch) -> None:

@@ -72,6 +72,29 @@ def test_of_many_slots_those_with_the_worst_are_shown(report: Quality) -> None:
     assert high - low < 70
 
 
+def test_slots_of_a_cycle_are_counted_from_its_beginning(report: Quality) -> None:
+    led_in, count = 64, 256
+    arrival = np.zeros(count)
+    arrival[-3] = 1e-3
+    made = dataclasses.replace(
+        report,
+        judged_from=led_in,
+        wanted=np.ones(led_in + count, bool),
+        slot=led_in + np.arange(count),
+        force=np.full(count, report.nominal.force),
+        arrival_deviation=arrival,
+        lost=np.zeros(count, bool),
+        extra_contacts=np.zeros(count, int),
+        fault=np.where(arrival > 0.0, FAULTS.index("arrival"), -1),
+    )
+    _plane, force, axes = made.plot().axes
+    for ax in (force, axes):
+        shown = ax.collections[-1].get_offsets()[:, 0]
+        assert (shown.min(), shown.max()) == (count - 64, count - 1)
+        assert ax.get_xlim()[1] == count
+    assert axes.get_xlabel() == "Slot of the cycle; the 64 with the worst dot"
+
+
 def test_a_report_of_a_run_that_stopped_says_so(report: Quality) -> None:
     assert "range left" in words(dataclasses.replace(report, status="range left").plot())
 

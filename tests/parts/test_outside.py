@@ -1,5 +1,6 @@
 """Parts from elsewhere: a file named on the command line, an installed package, and laws that are none."""
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint
@@ -64,6 +65,22 @@ def test_a_file_brings_a_law_to_the_command_line(tmp_path: Path, capsys: pytest.
     assert "ok" in capsys.readouterr().out
     # Twice does no harm.
     assert run("hammer", "show", hammer, "--part", part, "--part", part) == 0
+    capsys.readouterr()
+    assert run("hammer", "schema", "--part", part) == 0
+    laws = [
+        table["properties"]["law"]["const"]
+        for table in json.loads(capsys.readouterr().out)["properties"]["spring"]["oneOf"]
+    ]
+    assert {"linear", "own_first"} <= set(laws)
+
+
+def test_a_law_for_the_schema_that_is_none_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missing = tmp_path / "nothing.py"
+    assert run("hammer", "schema", "--part", missing, "--out", tmp_path / "schema.json") == 2
+    assert str(missing) in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_package_brings_a_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,11 +12,12 @@ from typing import Any
 import pytest
 
 import printhammer as ph
-from printhammer.kernel.compile import specialise
+from printhammer.kernel.compile import cache, specialise
 from printhammer.kernel.compile.specialise import AHEAD, Kernel
 from printhammer.kernel.model.laws import Laws
 from printhammer.run import ahead
 from printhammer.run.problem import laws_of
+from printhammer.run.simulate import announce_compiling
 
 
 def entry(name: str) -> Any:
@@ -28,7 +29,8 @@ def entry(name: str) -> Any:
     return SimpleNamespace(
         py_func=function,
         signatures=[],
-        stats=SimpleNamespace(cache_path="nowhere"),
+        targetctx=None,
+        _cache=SimpleNamespace(cache_path="nowhere", holds=lambda _target: False),
         name=name,
         __module__="module",
     )
@@ -52,20 +54,23 @@ def test_the_second_process_begins_with_the_run_and_is_waited_for_once(
         happened.append(laws)
         return lambda: happened.append("waited")
 
-    monkeypatch.setattr(specialise, "announce", lambda _sentence: happened.append("announced"))
     monkeypatch.setattr(specialise, "begin_ahead", begin)
     for name in ("members", "run", "members", "peaks", "quadratures"):
         assert getattr(kernel, name).name == name
         happened.append(name)
     laws = kernel.laws
-    assert happened == ["announced", "members", laws, "run", "members", "waited", "peaks", "quadratures"]
+    assert happened == ["members", laws, "run", "members", "waited", "peaks", "quadratures"]
 
 
 def test_no_process_begins_unasked(kernel: Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
     def never(_laws: Laws) -> Any:
         raise AssertionError
 
-    monkeypatch.setattr(specialise, "begin_ahead", never)
+    monkeypatch.setattr(cache, "listeners", set())
+    monkeypatch.setattr(ahead, "begin", never)
+    end = announce_compiling(lambda _sentence: None)
+    assert specialise.begin_ahead is never
+    end()
     assert kernel.run.name == "run"
 
 

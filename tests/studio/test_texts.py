@@ -51,7 +51,7 @@ def test_the_python_makes_the_same_motion(
     assert names["drive"].fingerprint == state.drive.fingerprint
     expected = ph.simulate(state.changed, state.drive)
     np.testing.assert_array_equal(names["motion"].x, expected.x)
-    assert capsys.readouterr().out.count("Dot(") == len(state.drive.times)
+    assert len(capsys.readouterr().out.splitlines()) == 1 + len(state.drive.times)
 
 
 @pytest.mark.parametrize("changed", CHANGES)

@@ -34,7 +34,7 @@ class Line(Declared):
     error: float = scalar(
         "m",
         "largest deviation from the reference over the first 3 ms",
-        more="NaN where the solver did not get there",
+        more="NaN where the solver ended before",
     )
     speed: float = part("hammer-seconds per second of processor time")
     first: float = part("time of the first call, s, in which things are compiled")

@@ -102,7 +102,7 @@ def poincare(context: Context, claim: Claim) -> Measured:
     shown = []
     for verdicts in zip(*by_variant.values(), strict=True):
         kinds = list(dict.fromkeys(verdict.name for verdict in verdicts))
-        # A verdict that does not stay is none: it never equals what is printed.
+        # A verdict that differs between the variants counts as none: it never equals what is printed.
         shown.append(" or ".join(kinds))
     right = [name for name, kind, band in zip(names, shown, printed, strict=True) if kind == band]
     wrong = [

@@ -69,15 +69,15 @@ def telling(first: str = "…") -> Iterator[Callable[[str], None]]:
         yield lambda text: line.update(task, description=text)
 
 
-def _shown(*columns: ProgressColumn) -> Progress:
+@contextmanager
+def _shown(*columns: ProgressColumn) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import Progress
 
-    console = Console(stderr=True)
+    from printhammer.cli.terminal import above
+
+    console = Console(stderr=True, highlight=False, emoji=False)
     # Where it is no terminal, the library would end with an empty line.
-    return Progress(
-        *columns,
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    with above(console), bar:
+        yield bar

@@ -221,12 +221,14 @@ def verb(
     `job`. Options that are `passed` are those that the library takes under the same name: the function gets
     those that are given as further keywords, to pass them on; the others have the defaults of the library.
     `files` name files to write, in the order of writing; a verb that writes new ones has the option --force.
+    One that reads a hammer or a spec has the option --part, as has one that names it among those passed.
     """
 
     def made(function: Callable[..., Answer]) -> Verb:
         signature = inspect.signature(function)
         own = [name for name, each in signature.parameters.items() if isinstance(each.default, Option)]
-        on = passed or {}
+        on = dict(passed or {})
+        with_parts = on.pop("part", None) is not None
         options: dict[str, Option] = {**{name: signature.parameters[name].default for name in own}, **on}
         older = {
             former: replace(each, flag=None, panel=None, hidden=True)
@@ -237,7 +239,7 @@ def verb(
             *(each for each in files.values() if not each.continued),
             *(o for o in options.values() if o.writes),
         ]
-        if any(option.hammer or option.metavar in _WITH_PARTS for option in options.values()):
+        if with_parts or any(option.hammer or option.metavar in _WITH_PARTS for option in options.values()):
             options["part"] = PART
         every = {**options, **files, **older, **({_FORCE: FORCE} if new else {})}
 

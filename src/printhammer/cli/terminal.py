@@ -6,10 +6,14 @@ import codecs
 import io
 import sys
 import unicodedata
-from typing import Final
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 from rich.markup import escape
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 _WIDTH: Final = 120
 _PLAIN: Final = {"µ": "u", "–": "-", "…": "...", "·": " ", "×": "x", "°": "deg", "→": "->"}
@@ -38,21 +42,35 @@ def console() -> Console:
     return Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else _WIDTH)
 
 
-def _errors() -> Console:
-    return Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)
+_bars: Final[list[Console]] = []
+
+
+@contextmanager
+def above(bar: Console) -> Iterator[None]:
+    """Print what is said meanwhile above a bar that a console shows on the standard error, not into it."""
+    _bars.append(bar)
+    try:
+        yield
+    finally:
+        _bars.remove(bar)
+
+
+def _print(text: str) -> None:
+    console = _bars[-1] if _bars else Console(stderr=True, highlight=False, emoji=False)
+    console.print(text, soft_wrap=True)
 
 
 def complain(sentence: str) -> None:
     """Print one line on the standard error."""
     text = " ".join(sentence.split())
-    _errors().print(f"[red]printhammer:[/red] {escape(text)}")
+    _print(f"[red]printhammer:[/red] {escape(text)}")
 
 
 def say(sentence: str) -> None:
     """Print a remark on the standard error, so that it does not get into what is piped on."""
-    _errors().print(f"[dim]{escape(sentence)}[/dim]")
+    _print(f"[dim]{escape(sentence)}[/dim]")
 
 
 def warn(sentence: str) -> None:
     """Print a warning on the standard error."""
-    _errors().print(f"[yellow]warning:[/yellow] {escape(sentence)}")
+    _print(f"[yellow]warning:[/yellow] {escape(sentence)}")

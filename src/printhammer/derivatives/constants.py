@@ -39,7 +39,7 @@ class ConstantMap(Declared):
 
     matrix: FloatArray = part(
         "derivative d(state at the end) / d(constant), SI, the state at the start held, shape (2 or 3, n)",
-        more="NaN if the run did not get to the end",
+        more="NaN if the run ended early",
     )
     constants: tuple[str, ...] = part("names of the constants, in the order of the columns")
     values: FloatArray = part("their values, SI, shape (n,)")

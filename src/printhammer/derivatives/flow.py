@@ -62,7 +62,7 @@ def carry_columns(
     nodes: Sequence[int] = (),
     renormalise: bool = False,
 ) -> Flow:
-    """Carry columns along a run, from the first mark to the last; NaN where the run did not get.
+    """Carry columns along a run, from the first mark to the last; NaN where the run ended before.
 
     Parameters
     ----------

@@ -47,14 +47,14 @@ class TangentMap(Declared):
 
     matrix: FloatArray = part(
         "derivative d(state at the end) / d(state at the start), shape (2 or 3, 2 or 3)",
-        more="NaN if the run did not get to the end",
+        more="NaN if the run ended early",
     )
     start: float = scalar("s", "time at the start")
     end: float = scalar("s", "time at the end")
     state_at_start: tuple[float, float, float] = part("the state there")
     state_at_end: tuple[float, float, float] = part("the state there")
     branch_at_start: int = part("code of the mode, see `printhammer.kernel.model.modes`")
-    branch_at_end: int = part("the same at the end", more="-1 where the run did not get")
+    branch_at_end: int = part("the same at the end", more="-1 where the run ended before")
     smooth: bool = part(
         "False where the motion in between passes a touch without velocity, where the state has no derivative"
     )
@@ -87,7 +87,7 @@ class Exponent(Declared):
 
     value: float = part(
         "the largest exponent, per firing",
-        more="minus infinity where the motion forgets its past, NaN if the run did not get through",
+        more="minus infinity where the motion forgets its past, NaN if the run ended early",
     )
     standard_error: float = part(
         "of the value, from the scatter of overlapping batch means; infinite for fewer than eight firings"
@@ -106,7 +106,7 @@ class Exponent(Declared):
     states: FloatArray = part(
         "displacement, m, velocity, m/s, mode, and latest local maximum, m, at the firings, shape"
         " (number of factors + 1, 4)",
-        more="NaN where the run did not get",
+        more="NaN where the run ended before",
         repr=False,
         default_factory=lambda: np.zeros((0, 4)),
     )

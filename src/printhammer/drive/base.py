@@ -198,9 +198,9 @@ class Drive:
 
     def __repr__(self) -> str:
         count, first, last = len(self._times), self._times[0], self._times[-1]
-        fired = f"1 firing at {first:.6g} s"
+        fired = f"1 firing at {1e3 * first:.6g} ms"
         if count > 1:
-            fired = f"{count} firings from {first:.6g} s to {last:.6g} s"
+            fired = f"{count} firings from {1e3 * first:.6g} to {1e3 * last:.6g} ms"
         return f"<{type(self).__name__}: {self._shapes()}, {fired}, overlap {self._overlap}>"
 
     def _shapes(self) -> str:

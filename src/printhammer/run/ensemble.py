@@ -65,13 +65,13 @@ class DotTable(Result):
 
 
 class Strobes(Result):
-    """States at given times, up to the most times of any member; nan where a run did not get."""
+    """States at given times, up to the most times of any member; nan where a run ended before."""
 
     t: FloatArray = column("s", "time", _TIMES)
     x: FloatArray = column("m", "displacement", _TIMES)
     v: FloatArray = column("m/s", "velocity", _TIMES)
     branch: IntArray = column(
-        "1", "mode of motion", _TIMES, more="-1 where a run did not get", codes=MODE_NAMES
+        "1", "mode of motion", _TIMES, more="-1 where a run ended before", codes=MODE_NAMES
     )
     memory: FloatArray = column(
         "m", "latest local maximum inside the pack", _TIMES, more="0 but on the unloading branch"
@@ -90,7 +90,7 @@ class EnsembleResult(Result):
         "m",
         "displacement at the common times",
         "member time",
-        more="nan where a run did not get",
+        more="nan where a run ended before",
         default=None,
     )
 

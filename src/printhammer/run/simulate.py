@@ -99,16 +99,25 @@ def simulate(
     return motion
 
 
-def announce_compiling(callback: Callable[[str], None] | None) -> None:
-    """Have `callback` called with one sentence before machine code is made that is not kept on disk yet.
+def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) -> Callable[[], None]:
+    """Have `callback` called with a sentence before machine code is made; return what ends that.
 
-    And, once, where it cannot be kept there. A second process then helps to compile.
+    The sentence tells what is compiled, about how long that takes, and what may follow. Others tell, once,
+    where machine code cannot be kept, or why that on disk does not fit. Where `helped`, a second process
+    compiles as well.
     """
     from printhammer.kernel.compile import cache, specialise
     from printhammer.run import ahead
 
-    specialise.announce = cache.announce = callback
-    specialise.begin_ahead = None if callback is None else ahead.begin
+    def end() -> None:
+        cache.listeners.discard(callback)
+        if not cache.listeners:
+            specialise.begin_ahead = None
+
+    cache.listeners.add(callback)
+    if helped:
+        specialise.begin_ahead = ahead.begin
+    return end
 
 
 def end_of_run(drive: Drive, duration: float | str | None) -> float:

@@ -37,7 +37,8 @@ def listen(tell: Callable[[str], None]) -> None:
     first = _gauge.what == ""
     _gauge.tell = tell
     _gauge.what = "compiling machine code (once; kept on disk)"
-    announce_compiling(_announced)
+    # Workers compile side by side already.
+    announce_compiling(_announced, helped=False)
     if first:
 
         class Listener(event.Listener):

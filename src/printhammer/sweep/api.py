@@ -44,7 +44,7 @@ def sweep(
     spec : path or mapping
         A spec file, or what one says; see the guide on sweeps.
     out : path
-        Folder of the store (Zarr v3), made, gone on with, or found complete.
+        Folder of the store (Zarr v3), made, continued, or found complete.
     threads : int, optional
         Threads on this machine; by default as many as there are cores.
     dask : str or distributed.Client, optional

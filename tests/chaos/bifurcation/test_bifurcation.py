@@ -311,6 +311,12 @@ def test_trains_that_settle_slowly_do_not_hide_a_series(monkeypatch: pytest.Monk
     assert "not followed further" in rising.sentence
 
 
+def test_a_route_that_begins_with_a_strange_train_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Bifurcation, "_is_strange", lambda *_arguments: False)
+    rising, _ = diagram({"from rest": [-1, 1]}, [1, 2]).routes()
+    assert rising.sentence == "With rising values the very first train, at 1, is strange."
+
+
 def test_without_a_strange_train_the_route_says_so() -> None:
     found = diagram({"from rest": [1, 2, 1]}, [1, 2, 3])
     rising, falling = found.routes()

@@ -55,7 +55,9 @@ def test_most_trains_are_decided_and_the_others_say_why(cli: Callable) -> None:
     assert shares["strange"] > 25.0
     assert "[ms] [ms]" in out
     assert re.search(r"With rising values the first strange train comes at 0\.92\d\d? ms after", out)
-    assert "undecided trains: neighbouring motions close up, so they still settle: more --firings" in out
+    assert (
+        "undecided trains: neighbouring motions approach each other: they still settle, more --firings" in out
+    )
 
 
 def test_without_exponents_it_is_said_how_to_tell(cli: Callable) -> None:
@@ -64,7 +66,7 @@ def test_without_exponents_it_is_said_how_to_tell(cli: Callable) -> None:
     )
     assert done.status == 0
     assert "2 values, 2 trains of 60 firings" in done.out
-    assert "undecided trains: no exponent is known: --exponents computes it" in done.out
+    assert "undecided trains: no exponent was computed: --exponents does so" in done.out
 
 
 def test_a_transient_leaves_points_to_judge(cli: Callable) -> None:

@@ -53,13 +53,13 @@ _PACK_RELEASED: Final = MODE_NAMES.index("pack released")
 class Columns(Declared):
     """States of many trains at successive sections."""
 
-    x: FloatArray = column("m", "displacement", "train point", more="NaN where a run did not get")
+    x: FloatArray = column("m", "displacement", "train point", more="NaN where a run ended before")
     v: FloatArray = column("m/s", "velocity", "train point", more="likewise")
     branch: npt.NDArray[np.int8] = column(
         "1",
         "code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`",
         "train point",
-        more="-1 where a run did not get",
+        more="-1 where a run ended before",
     )
     memory: FloatArray = column(
         "m", "latest local maximum on the unloading branch inside the pack", "train point", more="else 0"

@@ -39,13 +39,15 @@ class Bifurcation(Result, rows="direction column"):
     firing: IntArray = coordinate(
         "1", "number of the firing", "firing", more="the first of a train is number 1", dtype=np.int32
     )
-    x: FloatArray = column("m", "displacement", "direction column firing", more="nan where a run did not get")
+    x: FloatArray = column(
+        "m", "displacement", "direction column firing", more="nan where a run ended before"
+    )
     v: FloatArray = column("m/s", "velocity", "direction column firing", more="nan likewise")
     branch: npt.NDArray[np.int8] = column(
         "1",
         "mode of motion",
         "direction column firing",
-        more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where a run did not get",
+        more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where a run ended before",
         codes=MODE_NAMES,
     )
     cycles: IntArray = column(

@@ -44,7 +44,8 @@ class Route(Declared):
         "the windows before the first strange train, in this order; all of them if there is none"
     )
     first: float | None = part(
-        "value of the first strange train, SI", more="None if there is none, or it was not come to"
+        "value of the first strange train, SI",
+        more="None if there is none, or the way was not followed so far",
     )
     complete: bool = part(
         "False where `MOST_UNDECIDED` trains without a period came first that are not strange, and the way"
@@ -68,19 +69,19 @@ class Route(Declared):
 
     def worded(self, shown: Callable[[float], str]) -> str:
         """Return the finding in a sentence, with the value as `shown` writes it."""
-        way = ", ".join(window.verdict for window in self.before) or "nothing"
+        values = f"With {self.way} values"
+        way = ", ".join(window.verdict for window in self.before)
         if not self.complete:
             return (
-                f"With {self.way} values {MOST_UNDECIDED} trains come that neither repeat nor are strange,"
-                f" and the way was not followed further: {way}."
+                f"{values} {MOST_UNDECIDED} trains come that neither repeat nor are strange, and the way was"
+                f" not followed further: {way}."
             )
         if self.first is None:
-            return f"With {self.way} values no strange train comes: {way}."
+            return f"{values} no strange train comes: {way}."
+        if not way:
+            return f"{values} the very first train, at {shown(self.first)}, is strange."
         series = "a series of doublings" if self.cascade else "no series of doublings"
-        return (
-            f"With {self.way} values the first strange train comes at {shown(self.first)} after {series}:"
-            f" {way}."
-        )
+        return f"{values} the first strange train comes at {shown(self.first)} after {series}: {way}."
 
 
 def cells(values: FloatArray) -> FloatArray:

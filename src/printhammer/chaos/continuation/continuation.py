@@ -99,7 +99,7 @@ def continuation(
         if any(value is not None for value in (*fired, state, firings)):
             raise InputError("an orbit is given, expected no period, rate, waveform, drive, firings or state")
         if not start.ok:
-            raise InputError(f"the orbit to start from is none: {start.status}")
+            raise InputError(f"the orbit to start from is not periodic: {start.status}")
         regime, point, count = start.regime, np.array(start.section), start.firings
         phase = firing.get("phase")
         if phase is not None and phase != start.phase:

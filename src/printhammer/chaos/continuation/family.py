@@ -129,7 +129,7 @@ class RegimeFamily:
             image, jacobian = reached.state, reached.jacobian
         slope = self._slope(state, parameter, image)
         if slope is None or jacobian is None or not np.isfinite(jacobian).all():
-            return MapValue.none(2, "the runs beside it did not come through")
+            return MapValue.none(2, "the runs with a slightly different constant or state ended early")
         return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
 
     def margin(self, state: FloatArray, parameter: float) -> float:

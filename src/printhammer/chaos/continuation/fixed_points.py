@@ -32,7 +32,7 @@ class MapValue(Declared):
     jacobian: FloatArray = part("derivative dG/du, shape (n, n)")
     slope: FloatArray = part("derivative dG/dp, shape (n,)")
     label: Hashable = part(
-        "what kind of motion led there, such as its sequence of contacts",
+        "the kind of motion between the two states, such as its sequence of contacts",
         more="where it changes along a curve, that is an event",
         default=(),
     )

@@ -63,7 +63,7 @@ class Lyapunov(Result, rows="firing exponent"):
     exponents: FloatArray = scalar(
         PER_FIRING,
         "Lyapunov exponents, the largest one first",
-        more="minus infinity where the motion forgets its past, nan where the run did not get through",
+        more="minus infinity where the motion forgets its past, nan where the run ended early",
     )
     standard_errors: FloatArray = scalar(
         PER_FIRING, "standard errors of the exponents", more="infinite for fewer than eight firings"

@@ -46,7 +46,7 @@ class Records(Declared):
     """States of many motions at the sections, from one on."""
 
     states: FloatArray = part(
-        "displacement, m, and velocity, m/s, shape (M, n, 2)", more="NaN where a run did not get"
+        "displacement, m, and velocity, m/s, shape (M, n, 2)", more="NaN where a run ended before"
     )
     usable: BoolArray = part("whether that is the whole state, shape (M, n)")
 

@@ -216,7 +216,7 @@ def strobe_slope(
     Returns
     -------
     array
-        NaN where one of the four runs did not come through.
+        NaN where one of the four runs ended early.
 
     Raises
     ------

@@ -51,13 +51,13 @@ class Strobe(Result):
         "1", "number of the firing", "firing", more="the very first one is number 1", dtype=np.int32
     )
     t: FloatArray = column("s", "time", "firing")
-    x: FloatArray = column("m", "displacement", "firing", more="nan where the run did not get")
-    v: FloatArray = column("m/s", "velocity", "firing", more="nan where the run did not get")
+    x: FloatArray = column("m", "displacement", "firing", more="nan where the run ended before")
+    v: FloatArray = column("m/s", "velocity", "firing", more="nan where the run ended before")
     branch: IntArray = column(
         "1",
         "mode of motion",
         "firing",
-        more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where the run did not get",
+        more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where the run ended before",
         dtype=np.int32,
         codes=MODE_NAMES,
     )

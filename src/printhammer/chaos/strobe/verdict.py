@@ -154,7 +154,7 @@ def verdict(
     """Judge a train by the distances from `repeats` between the first and the last of some firings.
 
     `exponent` is the largest one over these firings, None where it was not computed; `stopped` says how the
-    run ended if it did not get to the last of them.
+    run ended if that was before the last of them.
     """
     period = None if stopped else period_of(distances)
     closest = period

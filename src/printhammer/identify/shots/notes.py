@@ -88,9 +88,9 @@ def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
 
 
 def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str) -> list[str]:
-    """Say which constants that were held the records would tell too, and which they ask to be others."""
+    """Say which of the constants held the records could determine too, and which they contradict."""
     sentences = [
-        "a motion shows forces only over the mass: the mass is as good as the forces that were taken as known"
+        "a motion shows forces divided by the mass only: the mass is as sure as the forces taken as known"
     ]
     shooting = fit.shooting
     parameters = shooting.parameters
@@ -129,7 +129,7 @@ def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str)
     candidates = would_be_found(solution.design, columns, others, left)
     sharp = [f"{name} to {100.0 * error:.2g} %" for name, error, _change in candidates if error < _TOLD]
     if sharp:
-        sentences.append(f"were one more constant free, the records would tell {', '.join(sharp)}")
+        sentences.append(f"with one more constant free, the records would determine {', '.join(sharp)}")
     if rejected and candidates:
         name, error, change = max(candidates, key=lambda entry: abs(entry[2]) / entry[1])
         if abs(change) > _OFF * error:

@@ -95,8 +95,8 @@ def assemble(
         if key in constants and constants[key].interval[0] <= 0.0:
             low, high = constants[key].interval
             raise InputError(
-                f"{data.files[0]}: {key} is not told from zero (95 % interval {low:.3g} to {high:.3g}"
-                f" {constants[key].unit}), expected {remedy}"
+                f"{data.files[0]}: {key} cannot be distinguished from zero (95 % interval {low:.3g} to"
+                f" {high:.3g} {constants[key].unit}), expected {remedy}"
             )
     weak = [
         f"{key} is weakly determined: its profile puts it between {shape.interval[0]:.4g} and"

@@ -110,7 +110,7 @@ def _specialised(laws: Laws, kinds: LaneKinds) -> Kernel:
             }
         )
     lanes = module("lanes.lanes", scalar, "lanes")
-    return Kernel({"lanes": lanes}, f"{plain.label}, in lanes", scalar, digest)
+    return Kernel({"lanes": lanes}, plain.label, scalar, digest)
 
 
 def _with_lane_layout(module: ModuleType) -> ModuleType:

@@ -42,8 +42,16 @@ TEMPLATES = (
 )
 """Template modules of the kernel in the order in which they use one another."""
 
-ENTRIES = ("run", "resample", "quadratures", "peaks", "members", "lanes", "flow")
-"""Names of the entry points."""
+ENTRIES = {
+    "run": "runs",
+    "resample": "curves",
+    "quadratures": "energies",
+    "peaks": "peaks",
+    "members": "many runs",
+    "lanes": "many runs side by side",
+    "flow": "derivatives",
+}
+"""Names of the entry points, and what each of them computes."""
 
 _PLAIN = (
     "model.modes",
@@ -71,9 +79,6 @@ _LAW_FUNCTIONS = {
     ),
     "damping": ("damping_force",),
 }
-
-announce: Callable[[str], None] | None = None
-"""Called with one sentence before machine code is made that is not in the cache on disk."""
 
 begin_ahead: Callable[[Laws], Callable[[], None]] | None = None
 """Called with the laws before `run` is compiled: has the entry points `AHEAD` compiled elsewhere meanwhile.
@@ -103,44 +108,43 @@ class Kernel:
         self.namespace = namespace
         self.digest = digest
         self.label = label
-        self._announced = False
         self._entries = {
             name: getattr(module, name)
             for module in modules.values()
             for name in ENTRIES
             if hasattr(module, name) and getattr(module, name).__module__ == module.__name__
         }
+        for name, function in self._entries.items():
+            # Plain Python where NUMBA_DISABLE_JIT is set.
+            if hasattr(function, "py_func"):
+                cache = function._cache
+                cache.kind, cache.label = ENTRIES[name], label
+                if name in ("run", *AHEAD):
+                    others = [other for other in ("run", *AHEAD) if other in self._entries and other != name]
+                    cache.with_it = tuple(self._entries[other]._cache for other in others)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an entry point, announcing its compilation if its machine code is not on disk yet."""
+        """Return an entry point, with others compiled elsewhere where that is wanted."""
         try:
             function = self.__dict__["_entries"][name]
         except KeyError:
             raise AttributeError(name) from None
-        if announce is not None and not _is_ready(function):
-            if not self._announced:
-                from printhammer.kernel.compile.cache import kept
-
-                self._announced = True
-                announce(f"compiling the kernel for {self.label} ({kept(function)})")
-            kept_on_disk = function.stats.cache_path is not None
-            if name == "run" and kept_on_disk and begin_ahead is not None and self.laws is not None:
+        if begin_ahead is not None and self.laws is not None and not is_ready(function):
+            if name == "run" and function._cache.cache_path is not None:
                 self._wait = begin_ahead(self.laws)
+                function._cache.with_it = ()
             elif name in AHEAD and self._wait is not None:
                 wait, self._wait = self._wait, None
                 wait()
         return function
 
 
-def _is_ready(function: Any) -> bool:
-    """Tell whether `function` is compiled in this process or has machine code on disk."""
-    if not hasattr(function, "signatures") or function.signatures:
-        # Plain Python where NUMBA_DISABLE_JIT is set.
+def is_ready(function: Any) -> bool:
+    """Tell whether an entry point is compiled in this process or has machine code on disk."""
+    # Plain Python where NUMBA_DISABLE_JIT is set.
+    if not hasattr(function, "py_func") or function.signatures:
         return True
-    python = function.py_func
-    folder = function.stats.cache_path
-    name = f"{Path(inspect.getfile(python)).stem}.{python.__qualname__}-*.nbc"
-    return folder is not None and any(Path(folder).glob(name))
+    return bool(function._cache.holds(function.targetctx))
 
 
 def _source(module: ModuleType) -> bytes:
@@ -202,7 +206,8 @@ def _specialised(laws: Laws) -> Kernel:
         for name, value in bindings.items()
     }
     parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
-    kernel = execute_all(TEMPLATES, namespace, sources, ", ".join(parts) or "a free mass")
+    label = f"laws {', '.join(parts)}" if parts else "a free mass"
+    kernel = execute_all(TEMPLATES, namespace, sources, label)
     kernel.laws = laws
     return kernel
 

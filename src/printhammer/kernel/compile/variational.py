@@ -29,5 +29,5 @@ def _built(plain: Kernel, forced: bool) -> Kernel:
     sources = hashlib.sha256(repr((plain.digest, forced)).encode())
     sources.update(source_file("variational.layout").read_bytes())
     namespace = {**plain.namespace, "FORCED": forced, "CHANGING": changing(forced)}
-    label = f"{'sensitivities' if forced else 'the tangent flow'} of {plain.label}"
+    label = f"{plain.label}, by {'constants' if forced else 'states'}"
     return execute_all([f"variational.{name}" for name in TEMPLATES], namespace, sources, label)

@@ -53,7 +53,7 @@ class Batch(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """What to keep of M members, and the arrays that it goes to; NaN where a run did not get.
+    """What to keep of M members, and the arrays that it goes to; NaN where a run ended before.
 
     Attributes
     ----------

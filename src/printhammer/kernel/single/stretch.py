@@ -144,7 +144,7 @@ def note_states(
 
 @compiled
 def blank_states(strobes: Any, strobe: int, strobe_end: int, x: Any, sample: int, sample_end: int) -> None:
-    """Put NaN where a run did not get."""
+    """Put NaN where a run ended before."""
     for i in range(strobe, strobe_end):
         for j in range(STROBE_WIDTH):
             strobes[i, j] = np.nan

@@ -51,7 +51,7 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 class Log:
-    """A log on disk, begun or gone on with: JSON lines, the first of which says what decides on the search.
+    """A log on disk, begun or continued: JSON lines, the first of which says what decides on the search.
 
     A last line that breaks off is cut: the search was stopped while it wrote.
 

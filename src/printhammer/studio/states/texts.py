@@ -70,7 +70,7 @@ def python_of(state: State) -> str:
         lines.append(
             f"drive = ph.PulseTrain({waveform}, rate={state.rate!r}, pulses={state.pulses}{overlap})"
         )
-    lines += ["motion = ph.simulate(hammer, drive)", "print(*motion.dots, sep='\\n')", ""]
+    lines += ["motion = ph.simulate(hammer, drive)", "print(motion.dots)", ""]
     return "\n".join(lines)
 
 

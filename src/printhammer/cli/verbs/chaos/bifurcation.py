@@ -204,9 +204,12 @@ def why_undecided(result: Bifurcation) -> list[str]:
     known = undecided & np.isfinite(exponents)
     settling = known & (exponents < -SIGNIFICANT * errors)
     reasons = (
-        (settling, "neighbouring motions close up, so they still settle: more --firings tell their periods"),
-        (known & ~settling, "the exponent is not told from zero by three standard errors"),
-        (undecided & ~known, "no exponent is known: --exponents computes it, unless touches graze"),
+        (
+            settling,
+            "neighbouring motions approach each other: they still settle, more --firings show the period",
+        ),
+        (known & ~settling, "the exponent lies within three standard errors of zero"),
+        (undecided & ~known, "no exponent was computed: --exponents does so, except where a touch grazes"),
     )
     every = int(undecided.sum())
     return [f"{int(some.sum())} of {every} undecided trains: {why}." for some, why in reasons if some.any()]

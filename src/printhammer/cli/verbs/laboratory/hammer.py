@@ -79,10 +79,11 @@ def check(hammer: str = opt.NAMED) -> Answer:
 @verb(
     "hammer schema",
     "printhammer hammer schema --out hammer.schema.json",
+    {"part": opt.PART},
     out=opt.file("Write it here instead."),
 )
 def schema(job: Job) -> Answer:
-    """Print the JSON schema of hammer files."""
+    """Print the JSON schema of hammer files, with the laws of --part among those that a file may name."""
     import json
 
     from printhammer.hammer.hammer import Hammer

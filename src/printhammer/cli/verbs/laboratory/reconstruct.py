@@ -191,7 +191,7 @@ def base_rates(
     out=_written("JSON file to write."),
 )
 def predictions(log: Path = _LOG, judged: Path = _JUDGED) -> Answer:
-    """Tell what hammers found on the stated claims alone say about the claims that did not lead."""
+    """Count for how many hammers, found by the stated claims alone, each of the other claims holds."""
     from printhammer.reconstruction.judging.log import read_judged
     from printhammer.reconstruction.judging.predictions import predictions as count
     from printhammer.reconstruction.search.log import read_search

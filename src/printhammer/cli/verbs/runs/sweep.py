@@ -1,4 +1,4 @@
-"""The verb `sweep`: many hammers under many drives, into a store that can be gone on with."""
+"""The verb `sweep`: many hammers under many drives, into a store that can be continued."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 def sweep(
     job: Job,
     spec: Path | None = opt.argument("SPEC", "A spec file, TOML.", type=Path),
-    out: Path | None = opt.folder("Store of the results (Zarr), new or gone on with.", writes=False),
+    out: Path | None = opt.folder(
+        "Store of the results (Zarr): a new one, or one to be continued.", writes=False
+    ),
     threads: int | None = opt.THREADS,
     dask: str | None = opt.text("ADDRESS", "Work on a dask cluster: address of its scheduler."),
     check: bool = opt.switch("Say what would be done and how much room it takes; do nothing."),

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import time
+from contextlib import contextmanager
+from threading import Thread
 from typing import TYPE_CHECKING, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Job, verb
 from printhammer.cli.screen import Column, table
+from printhammer.cli.terminal import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+    from multiprocessing.queues import SimpleQueue
 
     from printhammer.hammer.hammer import Hammer
 
@@ -43,8 +47,9 @@ def _exponents(hammer: Hammer) -> None:
 _KERNELS: Final[dict[str, Callable[[Hammer], None]]] = {
     "runs, their dots and peaks": _runs,
     "maps and sweeps": _lanes,
-    "strobe points": _strobes,
     "exponents, orbits, sensitivities": _exponents,
+    # Last, since it takes most of what maps take, which else would be made twice at once.
+    "strobe points": _strobes,
 }
 
 
@@ -55,21 +60,47 @@ def _made(name: str, hammer: Hammer) -> tuple[str, float]:
     return name, time.perf_counter() - start
 
 
+def _announce(sentences: SimpleQueue[str | None]) -> None:
+    from printhammer.run.simulate import announce_compiling
+
+    announce_compiling(sentences.put)
+
+
+@contextmanager
+def _saying(sentences: SimpleQueue[str | None]) -> Iterator[None]:
+    """Say what other processes put into a queue."""
+
+    def work() -> None:
+        while (sentence := sentences.get()) is not None:
+            say(sentence)
+
+    thread = Thread(target=work)
+    thread.start()
+    try:
+        yield
+    finally:
+        sentences.put(None)
+        thread.join()
+
+
 @verb("warm", "printhammer warm hendriks-1983")
 def warm(job: Job, hammer: Hammer = opt.FIRED) -> Answer:
     """Compile what a hammer needs ahead of time, on two cores; another hammer with these laws needs nothing.
 
-    The machine code stays where numba keeps it, beside the program or in NUMBA_CACHE_DIR, and may be copied
-    to another machine with the same processor, the same versions and the same place of the program; where it
-    does not fit, it is made again.
+    The machine code stays beside the program, or in NUMBA_CACHE_DIR, which may be copied to another machine
+    with the same processor and the same versions, baked into a container, and be read-only there. Where it
+    does not fit, the program says why and makes it again.
     """
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
 
     rows = []
+    spawn = get_context("spawn")
+    sentences = spawn.SimpleQueue()
     with (
         job.counting("machine code", remaining=False) as tell,
-        ProcessPoolExecutor(2, get_context("spawn")) as pool,
+        _saying(sentences),
+        ProcessPoolExecutor(2, spawn, _announce, (sentences,)) as pool,
     ):
         # What takes longest begins first, beside what is wanted first.
         tasks = [pool.submit(_made, name, hammer) for name in _KERNELS]

@@ -1,0 +1,127 @@
+"""The commands on the pages run as printed, in a folder that has what a reader has by then."""
+
+import re
+import shlex
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from tests.test_docs_commands import CELL, PAGES, ROOT, SHELL
+
+TOML = re.compile(r"^```toml\n(.*?)^```", re.MULTILINE | re.DOTALL)
+WRITTEN = re.compile(r"(?:--out|--into|--dots|--contacts|>) ([\w./-]+)")
+# Commands that other tests run, or that do not end, by how they begin.
+ELSEWHERE = {
+    "printhammer paper": "test_paper.py writes the whole report",
+    "printhammer bench": "test_bench.py",
+    "printhammer studio": "ends with Ctrl-C only, in tests/studio",
+    "printhammer feedback": "takes minutes; the example of the help runs, in test_registry.py",
+    "printhammer reconstruct": "the examples of the help run, in test_registry.py",
+    "NUMBA_CACHE_DIR=": "compiles anew what test_warm.py compiles",
+    "printhammer sweep spec.toml --out results.zarr --dask": "needs a cluster, in tests/sweep",
+    "dask ": "the same",
+    "pip ": "installs",
+    "make ": "installs, and runs this test",
+    "mkdir ": "the tests have a folder of their own",
+}
+# What takes minutes as printed runs with fewer values.
+FEWER = {
+    "--values 2000": "--values 20",
+    "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5'": "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5' --values 10",
+    "--from '1.39 ms' --to '1.41 ms'": "--from '1.39 ms' --to '1.41 ms' --values 20",
+    "--steps 111": "--steps 4 --firings 200",
+    "--starts 2000 --guesses 100": "--starts 50 --guesses 10",
+    "um, 128'": "um, 8'",
+    "m/s, 128'": "m/s, 8'",
+    "ms, 256'": "ms, 8'",
+    "us, 256'": "us, 8'",
+    "orbits mine.toml": "orbits mine.toml --longest 1 --starts 20",
+    "tune mine.toml": "tune mine.toml --history 1 --no-judge",
+    "--longest 4": "--longest 1 --starts 20",
+    "--longest 3 --out regimes": "--longest 1 --seeds 1 --most 20 --out regimes",
+    "--doublings 1": "--doublings 1 --most 20",
+    "--second backstop": "--grid 3 --most 5 --second backstop",
+    "--yield 64": "--yield 2",
+    "--yield 32": "--yield 2 --first 700Hz --step 100Hz",
+    "--damping --step 50Hz": "--damping --first 700Hz --step 200Hz",
+    "--safe-rate\n": "--safe-rate --first 700Hz --step 50Hz\n",
+}
+# Pages all of whose commands together take a few seconds with compiled kernels.
+QUICK = {"README.md", "docs/howto/hammer_files.md", "docs/howto/laboratory.md", "docs/howto/command_line.md"}
+
+
+def commands_of(page: Path) -> list[str]:
+    text = page.read_text("utf-8")
+    blocks = "".join(SHELL.findall(text)).replace("\\\n", " ")
+    # Other tables name verbs with what stands for their arguments.
+    cells = CELL.findall(text) if page.stem == "cheat_sheet" else []
+    lines = [line.strip() for line in (*blocks.splitlines(), *cells)]
+    return [line for line in lines if line and not line.startswith(tuple(ELSEWHERE))]
+
+
+def pages() -> Iterator[Any]:
+    for page in (ROOT / "README.md", *PAGES):
+        name = page.relative_to(ROOT).as_posix()
+        # Those of the tutorials run as scripts.
+        if "tutorials" not in page.parts and commands_of(page):
+            yield pytest.param(page, id=name, marks=[] if name in QUICK else [pytest.mark.slow])
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what the pages call by name, apart from what their own commands write."""
+    import printhammer as ph
+
+    folder = tmp_path_factory.mktemp("desk")
+    hammer = ph.load("hendriks-1983")
+    for name in ("my-hammer", "base", "known"):
+        hammer.save(folder / f"{name}.toml")
+    for kind, names in {
+        "magnet": ("magnet",),
+        "spring": ("spring",),
+        "pack": ("pack",),
+        "backstop": ("backstop", "rebounds"),
+        "motion": ("motion", "shot1", "shot2"),
+    }.items():
+        for seed, name in enumerate(names):
+            ph.measure(kind, hammer, seed=seed).write(folder / f"{name}.csv")
+    motions = [(rate, ph.simulate(hammer, ph.PulseTrain(hammer.waveform, rate=rate))) for rate in (500, 900)]
+    rows = [f"{rate},{t},{x}" for rate, motion in motions for t, x in zip(motion.t, motion.x, strict=True)]
+    (folder / "measured.csv").write_text("\n".join(["rate [Hz],time [s],displacement [m]", *rows[::9]]))
+    for page, name in (("drives", "burst"), ("sweeps", "spec")):
+        text = (ROOT / "docs" / "howto" / f"{page}.md").read_text("utf-8")
+        (folder / f"{name}.toml").write_text(TOML.findall(text)[0])
+    Image.fromarray(255 - 255 * (np.arange(9 * 40).reshape(9, 40) % 7 == 0).astype(np.uint8)).save(
+        folder / "drawing.png"
+    )
+    ph.tune(hammer, rates=["1.3 kHz"], history=1).save(folder / "table.csv")
+    return folder
+
+
+@pytest.mark.parametrize("page", list(pages()))
+def test_the_commands_on_a_page_run(
+    cli: Callable[..., Any], page: Path, desk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    commands = commands_of(page)
+    written = set(WRITTEN.findall("\n".join(commands)))
+    for file in desk.iterdir():
+        if file.name in page.read_text("utf-8") and file.name not in written:
+            shutil.copy(file, tmp_path)
+    for command in commands:
+        printed = f"{command}\n"
+        for long, short in FEWER.items():
+            printed = printed.replace(long, short)
+        program, *words = shlex.split(printed, comments=True)
+        assert program == "printhammer", command
+        to = words[words.index(">") + 1] if ">" in words else None
+        done = cli(*words[: words.index(">")] if to else words)
+        assert done.status == 0, f"{command}\n{done.out}\n{done.err}"
+        assert done.err == ""
+        if to:
+            Path(to).write_text(done.out)
+    assert [name for name in written if not Path(name).exists()] == []
