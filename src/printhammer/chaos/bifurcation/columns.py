@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.chaos.orbits.settled import Settled, settled, shown
 from printhammer.chaos.strobe.train import HELD_BRANCHES, pack_branches
 from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
 from printhammer.errors import InputError
@@ -14,7 +15,7 @@ from printhammer.results import Declared, column, part
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.run.start import check_branch, initial_state
 from printhammer.run.window import window_of
-from printhammer.support.threads import Progress, shifted
+from printhammer.support.threads import Progress, mapped, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -264,6 +265,35 @@ def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple
         distances[near[agree]] = apart[agree]
         left = left[cycles[left] == 0]
     return cycles, distances
+
+
+def confirm(
+    columns: Columns,
+    cycles: IntArray,
+    distances: FloatArray,
+    regimes: Sequence[Regime],
+    scales: FloatArray,
+    threads: int | None,
+) -> None:
+    """Put right the periods from `cycles_of`, and the distances, where the states alone do not show them.
+
+    See `printhammer.chaos.orbits.settled`; a period that is not confirmed becomes 0.
+    """
+    doubtful: list[int] = []
+    for q in np.unique(cycles[cycles > 0]).tolist():
+        rows = np.flatnonzero(cycles == q)
+        points = np.stack([columns.x[rows], columns.v[rows]], axis=2) / scales[rows, np.newaxis, :2]
+        doubtful += rows[~shown(points, q)].tolist()
+
+    def settled_of(row: int) -> Settled:
+        points = np.column_stack([columns.x[row], columns.v[row]])
+        return settled(regimes[row], points, int(cycles[row]), scales[row, :2])
+
+    for row, ends_at in zip(doubtful, mapped(settled_of, doubtful, threads), strict=True):
+        q = cycles[row] = ends_at.period or 0
+        x, v, memory = (part[row] for part in (columns.x, columns.v, columns.memory))
+        points = np.column_stack([x, v, memory]) / scales[row]
+        distances[row] = np.abs(points[q:] - points[:-q]).max() if q else math.nan
 
 
 def orbit_distance(one: FloatArray, other: FloatArray) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from printhammer.chaos.orbits.settled import Settled, settled
 from printhammer.chaos.strobe.verdict import Verdict, period_of, repeats, verdict
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
@@ -82,13 +83,29 @@ class States:
 
     def distances(self, train: Train) -> FloatArray:
         """Return how far the states are from repeating, see `printhammer.chaos.strobe.verdict.repeats`."""
-        width, speed = window_of(train.hammer, train.drive).half_widths
         front = math.inf if train.hammer.front is None else train.hammer.front
-        return repeats(
-            np.column_stack([self.x, self.v, self.memory]),
-            pack_branches(self.x, self.branch, front),
-            np.array([width, speed, width]),
-        )
+        return repeats(self.points, pack_branches(self.x, self.branch, front), _scales(train))
+
+    @property
+    def points(self) -> FloatArray:
+        """Displacement, velocity and memory, a row for each firing."""
+        return np.column_stack([self.x, self.v, self.memory])
+
+    def scaled(self, train: Train) -> FloatArray:
+        """Return the points in half-widths of the window."""
+        return np.asarray(self.points / _scales(train))
+
+    def settled(self, train: Train, distances: FloatArray) -> Settled | None:
+        """Return to what the train has settled, from successive states; None if they do not repeat."""
+        period = period_of(distances)
+        if period is None:
+            return None
+        return settled(train.regime.at_firings, self.points, period, _scales(train))
+
+
+def _scales(train: Train) -> FloatArray:
+    width, speed = window_of(train.hammer, train.drive).half_widths
+    return np.array([width, speed, width])
 
 
 def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray) -> IntArray:
@@ -147,7 +164,11 @@ def run_trains(
     if judged is None:
         return states, [None] * total
     stopped = [names[i] if result.reached[i] < theirs[i][-1] else "" for i in range(total)]
-    distances = [at(i, theirs[i]).distances(train) for i, train in enumerate(trains)]
+    watched = [at(i, times) for i, times in enumerate(theirs)]
+    distances = [of_train.distances(train) for of_train, train in zip(watched, trains, strict=True)]
+    ends_at = mapped(
+        lambda i: None if stopped[i] else watched[i].settled(trains[i], distances[i]), range(total), threads
+    )
     open_cases = [
         i for i in range(total) if not stopped[i] and (every_exponent or period_of(distances[i]) is None)
     ]
@@ -156,7 +177,9 @@ def run_trains(
         [trains[i] for i in open_cases], judged, tolerance, threads=threads, progress=tell
     )
     growth = dict(zip(open_cases, exponents, strict=True))
-    return states, [verdict(distances[i], judged, tolerance, growth.get(i), stopped[i]) for i in range(total)]
+    return states, [
+        verdict(distances[i], judged, tolerance, growth.get(i), stopped[i], ends_at[i]) for i in range(total)
+    ]
 
 
 def exponents_onward(
