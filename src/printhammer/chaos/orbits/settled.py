@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 AGREES: Final = 1e-8
 """Distance of states, in half-widths of the window, up to which no more is asked for."""
 
+LIES_ON: Final = 1e-6
+"""Distance from a stable orbit, in half-widths, up to which states lie on it but for the noise of runs."""
+
 NEAR: Final = 0.1
 """Distance, in half-widths, within which states of an orbit of fewer firings are looked for."""
 
@@ -75,11 +78,13 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
     had, because a section falls into the pack or on a touch without velocity, the states alone decide.
     """
     scaled = (points / scales)[np.newaxis]
-    if shown(scaled, period)[0]:
-        return Settled(period, points[-period:, :2].copy())
     plane, states = scales[:2], points[:, :2]
+    divisors = [d for d in range(1, period + 1) if period % d == 0]
+    for count in divisors:
+        if shown(scaled, count)[0]:
+            return Settled(count, states[-count:].copy())
     maps = ExactMaps(regime, MAP_TOLERANCE, 1)
-    for count in (d for d in range(1, period + 1) if period % d == 0):
+    for count in divisors:
         if count < period and _apart(scaled, count, period)[1][0] > NEAR:
             continue
         # About an orbit that is approached by turns the mean lies closer than any of the states.
@@ -109,7 +114,7 @@ def approaches(points: FloatArray, orbit: FloatArray, within: float = NEAR) -> b
     late, early = float(gap[-part:].mean()), float(gap[:part].mean())
     begin, end = (float(row[0]) for row in _apart(points[np.newaxis], count, count))
     slower = min(1.0, math.sqrt(end / begin)) if begin > 0.0 else 0.0
-    return late <= AGREES or (late <= within and late < slower * early)
+    return late <= LIES_ON or (late <= within and late < slower * early)
 
 
 def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
