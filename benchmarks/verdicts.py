@@ -4,9 +4,9 @@
 
 Every constant of `hendriks-1983` is log-uniform within 20 %, the period uniform from 0.7 to 1.6 ms. A train
 is judged as `printhammer.bifurcation` judges it, at its first 300 firings: the hastiest of the verdicts. A
-period q is right if Newton's method closes a stable orbit of q firings and no fewer beside the last state, and
-if after so many further firings the states still repeat after q firings and no fewer. Where the section falls
-into the pack the state has a memory, and Newton's method is left out.
+period q is right if Newton's method closes a stable orbit of q firings and no fewer beside the last state,
+and if after so many further firings the states still repeat after q firings and no fewer. Where the section
+falls into the pack the state has a memory, and Newton's method is left out.
 """
 
 from __future__ import annotations

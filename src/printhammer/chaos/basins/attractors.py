@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from printhammer.chaos.bifurcation.columns import OK, Columns, cycles_of, run_columns
-from printhammer.chaos.orbits.settled import approaches, settled, shown
+from printhammer.chaos.orbits.settled import LIES_ON, approaches, noise_about, settled, shown
 from printhammer.chaos.strobe.train import exponents_onward
 from printhammer.chaos.strobe.verdict import is_positive
 from printhammer.results import Declared, part
@@ -66,6 +66,7 @@ class Attractors:
         self.found: list[Attractor] = []
         self._trees: dict[int, tuple[cKDTree, float]] = {}
         self._attempts = 0
+        self._noise: dict[int, float] = {}
 
     def judge(self, columns: Columns) -> IntArray:
         """Return to which attractor trains have come: its place in `found`, -1 where that is not known."""
@@ -99,7 +100,8 @@ class Attractors:
             for place, attractor in enumerate(self.found):
                 if attractor.period is not None and q % attractor.period == 0:
                     orbit = attractor.states / self.scales[:2]
-                    near = [row for row in left if approaches(points[row], orbit, MATCH)]
+                    noise = self._noise.get(place, LIES_ON)
+                    near = [row for row in left if approaches(points[row], orbit, MATCH, noise)]
                     places[near] = place
             left = [row for row in left if places[row] < 0]
             if not left:
@@ -108,6 +110,8 @@ class Attractors:
             ends_at = settled(self.regime, points[row] * self.scales[:2], q, self.scales[:2])
             if ends_at.period is not None:
                 places[row] = self._periodic((ends_at.states / self.scales[:2])[np.newaxis])[0]
+                if not math.isnan(ends_at.multiplier):
+                    self._noise[int(places[row])] = noise_about(ends_at.multiplier)
         return places
 
     def _periodic(self, orbits: FloatArray) -> IntArray:

@@ -6,7 +6,8 @@ before those one firing apart do. Near an unstable orbit, and where a stable one
 move so slowly that they seem to stand. So a period q counts as shown where
 
 - states q firings apart have come to agree as closely as the noise of the runs allows, and
-- the distance of states q / p firings apart does not shrink any more, for no prime p that divides q.
+- states q / p firings apart are well apart, for all primes p that divide q, and their distance does not
+  shrink any more: the steps of an integrator, which follow the state, make cycles of their own, far smaller.
 
 Where one of the two is not so, the period is the smallest divisor d of q for which Newton's method finds a
 stable orbit of d firings close to the states, which these approach.
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 
 AGREES: Final = 1e-8
 """Distance of states, in half-widths of the window, up to which no more is asked for."""
+
+DISTINCT: Final = 1e-3
+"""Distance, in half-widths, from which on states are different whatever the noise of the runs."""
 
 LIES_ON: Final = 1e-6
 """Distance from a stable orbit, in half-widths, up to which states lie on it but for the noise of runs."""
@@ -66,7 +70,7 @@ def shown(points: FloatArray, period: int) -> BoolArray:
     _early, late = _apart(points, period, period)
     clear = np.asarray(late <= AGREES)
     for divisor in _largest_divisors(period):
-        clear &= ~_shrinking(points, divisor, period)
+        clear &= ~_shrinking(points, divisor, period) & (_apart(points, divisor, period)[1] >= DISTINCT)
     return clear
 
 
@@ -96,12 +100,14 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
         if not np.isfinite(closing.jacobians).all() or not closing.smooth:
             return _by_states(points, scaled, period)
         largest = float(abs(multipliers_of(closing.jacobians)[0]))
-        if closing.closed and largest < 1.0 and approaches(states / plane, closing.states / plane):
+        if not closing.closed or largest >= 1.0:
+            continue
+        if approaches(states / plane, closing.states / plane, lies_on=noise_about(largest)):
             return Settled(count, closing.states, largest)
     return Settled(None, np.zeros((0, 2)), math.nan, NO_ORBIT.format(_firings(period)))
 
 
-def approaches(points: FloatArray, orbit: FloatArray, within: float = NEAR) -> bool:
+def approaches(points: FloatArray, orbit: FloatArray, within: float = NEAR, lies_on: float = LIES_ON) -> bool:
     """Tell whether states, shape (m, 2), approach the states of an orbit in its order, or lie on it.
 
     Not so where they come to rest beside it: then they slow down, and their distance from it does not.
@@ -114,7 +120,15 @@ def approaches(points: FloatArray, orbit: FloatArray, within: float = NEAR) -> b
     late, early = float(gap[-part:].mean()), float(gap[:part].mean())
     begin, end = (float(row[0]) for row in _apart(points[np.newaxis], count, count))
     slower = min(1.0, math.sqrt(end / begin)) if begin > 0.0 else 0.0
-    return late <= LIES_ON or (late <= within and late < slower * early)
+    return late <= lies_on or (late <= within and late < slower * early)
+
+
+def noise_about(multiplier: float) -> float:
+    """Return how far from an orbit, in half-widths, states may lie for the noise of their runs alone.
+
+    What bounds its basin lies further away the smaller the largest multiplier is.
+    """
+    return max(LIES_ON, DISTINCT * (1.0 - multiplier))
 
 
 def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:

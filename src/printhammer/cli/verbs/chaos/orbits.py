@@ -45,6 +45,7 @@ _COLUMNS: Final[tuple[Column[Orbit], ...]] = (
         "longest": _search("Most firings after which a motion repeats.", default=8),
         "starts": _search("States from which motions are followed.", default=1024),
         "guesses": _search("Guesses that are tried for each number of firings.", default=48),
+        "follow": _search("Most firings of orbits through which branches are followed.", default=2),
         "tolerance": opt.TOLERANCE,
     },
     out=opt.results("Orbits"),
