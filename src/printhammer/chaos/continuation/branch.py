@@ -164,6 +164,8 @@ class Branch(Result):
             ("value", self.unit, self.parameter, np.nan, lambda event: event.value),
             ("after", "1", "number of the orbit that it follows", -1, lambda event: event.after),
             ("located", "1", "whether it was located", -1, lambda event: event.sharp),
+            ("x", "m", "displacement at the section there", np.nan, lambda event: event.state[0]),
+            ("v", "m/s", "velocity at the section there", np.nan, lambda event: event.state[1]),
             ("text", "", "what happens, in a few words", "", lambda event: event.message),
             ("contacts_before", "", "sequence of contacts before it", "", lambda event: event.contacts[0]),
             ("contacts_after", "", "sequence of contacts after it", "", lambda event: event.contacts[1]),
@@ -171,6 +173,11 @@ class Branch(Result):
             codes, dtype = KINDS if name == "kind" else (), np.int32 if missing == -1 else None
             note = Column(unit, meaning, ("event",), name=f"event_{name}", dtype=dtype, codes=codes)
             own[note.name] = note, np.array([missing if row is None else value(row) for row in rows])
+        there = np.array([np.full(2, np.nan) if row is None else row.multipliers for row in rows])
+        for name in ("real", "imag"):
+            meaning = f"{name} part of the multipliers there"
+            note = Column("1", meaning, ("event", "multiplier"), name=f"event_multiplier_{name}")
+            own[note.name] = note, getattr(there.astype(np.complex128), name)
         return own
 
     def to_dataframe(self) -> pd.DataFrame:
