@@ -39,7 +39,7 @@ class Branch(Result):
     Every array has one row for each orbit, in order along the curve; their values need not ascend. Reasons
     to stop are "bound"; "closed"; "period doubling": the orbit is born there; "grazing" of a rigid backstop;
     "merged" with an orbit of fewer firings; "no value": a run does not come through; "lost": Newton's method
-    does not converge; "length": the steps are used up.
+    does not converge; "jump": what it converges to is no continuation; "length": the steps are used up.
     """
 
     regime: Regime = part("hammer and periodic drive at the start, and phase of the section")

@@ -268,7 +268,7 @@ def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArr
     That is the number q, 1 for the mean alone, whose q means are worth their number by the criterion of G.
     Schwarz (Ann. Statist. 6 (1978) 461): n ln(variance left) + q ln(n) is least. Left is the series without
     the means of every q-th number. Changes up to the resolution count as none. Where what would be left does
-    not follow from itself, it is noise on a cycle: by itself that wanders like chaos, so it stays on the cycle.
+    not follow from itself, it is noise on a cycle: by itself that wanders like chaos, so it stays on it.
     """
     worth = []
     for q in range(1, min(LONGEST_CYCLE, numbers.size // _PASSES) + 1):
