@@ -170,3 +170,15 @@ def test_just_before_a_doubling_the_ball_still_bounces_once_a_period() -> None:
     for attractor in found.attractors:
         closed = orbit(regime, attractor.states[0], firings=attractor.period)
         assert (closed.firings, closed.kind) == (attractor.period, "stable")
+
+
+@pytest.mark.parametrize(("amplitude", "period"), [(0.0115e-2, 14), (0.0113e-2, 3)])
+def test_a_ball_that_comes_to_lie_on_the_table_repeats_itself(amplitude: float, period: int) -> None:
+    # The rounding of the phase of the table, which grew with time, showed as a period of 28 or none at all.
+    ball = ph.load("bouncing-ball").replace("backstop.restitution", 0.5)
+    omega = 2.0 * math.pi * 60.0
+    found = ph.strobe(ball, drive=ph.SineForce(1e-3 * amplitude * omega**2, 60.0))
+    assert found.verdict.name == f"period-{period}"
+    assert found.verdict.distance < 1e-8
+    # Once a cycle at least it lies on the table for a while, and forgets all that was before.
+    assert found.verdict.exponent == -math.inf

@@ -26,7 +26,7 @@ from printhammer.chaos.strobe.train import exponents_onward
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.chaos.bifurcation.columns import State
+    from printhammer.chaos.strobe.handing import State
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
