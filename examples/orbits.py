@@ -13,14 +13,14 @@ import numpy as np
 import printhammer as ph
 
 hammer = ph.load("hendriks-1983")
-found = ph.orbits(hammer, period="1.05 ms", longest=2, starts=200)
+found = ph.orbits(hammer, period="1.05 ms", longest=2, starts=100)
 print(found.message)
 for orbit in found:
     print(orbit.name, orbit.multipliers)
 
 # %%
 # Two orbits are stable: which of them a train ends on is decided by how it begins. The
-# edge between what leads to one and to the other runs through the saddle.
+# edge between what leads to one and to the other runs through a saddle.
 
 found.plot()
 
@@ -42,7 +42,7 @@ for orbit in found:
 # for a while, leaves it, and comes near another. Their states lie on the attractor
 # or beside it.
 
-strange = ph.orbits(hammer, period="1.10 ms", longest=6, starts=200, guesses=24)
+strange = ph.orbits(hammer, period="1.10 ms", longest=6, starts=100)
 print(strange.message)
 strange.plot(points=2000)
 

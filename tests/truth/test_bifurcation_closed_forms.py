@@ -17,7 +17,9 @@ import numpy as np
 import pytest
 
 import printhammer as ph
+from printhammer.chaos import orbit
 from printhammer.chaos.bifurcation.diagram import hysteresis
+from printhammer.run.regime import Regime
 
 GRAVITY, RESTITUTION, FREQUENCY, MASS = 9.80665, 0.8, 50.0, 1e-3
 OMEGA, PERIOD = 2.0 * math.pi * FREQUENCY, 1.0 / FREQUENCY
@@ -143,3 +145,40 @@ def test_basins_hold_the_attractors_of_the_closed_forms(ball: "ph.Hammer") -> No
     # Every cell is accounted for, and what is not decided is counted as such.
     assert sum(counts.values()) == found.labels.size
     assert counts[0] == (found.labels == 0).sum()
+
+
+def test_just_before_a_doubling_the_ball_still_bounces_once_a_period() -> None:
+    # At 60 Hz and a restitution of 0.5 the orbit doubles at an amplitude of 0.01053531 cm.
+    ball = ph.load("bouncing-ball").replace("backstop.restitution", 0.5)
+    loss, omega = math.pi * 0.5 / 1.5, 2.0 * math.pi * 60.0
+    gamma = 0.0105e-2 * omega**2 / GRAVITY
+    assert math.hypot(loss, 2.0 * 1.25 / 1.5**2) * GRAVITY / omega**2 == pytest.approx(
+        0.01053531e-2, rel=1e-6
+    )
+    table = ph.SineForce(1e-3 * GRAVITY * gamma, 60.0)
+    found = ph.basins(ball, drive=table, x=(1e-6, 0.6e-3, 20), v=(-0.1, 0.1, 20))
+    phase = math.acos(loss / gamma)
+    since = (2.0 * math.pi - phase) / omega
+    up = 0.5 * GRAVITY / 60.0
+    x = gamma * GRAVITY / omega**2 * math.sin(phase) + up * since - 0.5 * GRAVITY * since**2
+    # Beside the ball that bounces: one that lies on the table once a period, and one that never quite does.
+    names = [attractor.name for attractor in found.attractors]
+    assert names == ["period-1", "period-1", "period-2"]
+    assert found.attractors[1].states[0, 0] == pytest.approx(x, abs=1e-9)
+    assert found.counts[0] == 0
+    regime = Regime.of(ball, drive=table)
+    for attractor in found.attractors:
+        closed = orbit(regime, attractor.states[0], firings=attractor.period)
+        assert (closed.firings, closed.kind) == (attractor.period, "stable")
+
+
+@pytest.mark.parametrize(("amplitude", "period"), [(0.0115e-2, 14), (0.0113e-2, 3)])
+def test_a_ball_that_comes_to_lie_on_the_table_repeats_itself(amplitude: float, period: int) -> None:
+    # The rounding of the phase of the table, which grew with time, showed as a period of 28 or none at all.
+    ball = ph.load("bouncing-ball").replace("backstop.restitution", 0.5)
+    omega = 2.0 * math.pi * 60.0
+    found = ph.strobe(ball, drive=ph.SineForce(1e-3 * amplitude * omega**2, 60.0))
+    assert found.verdict.name == f"period-{period}"
+    assert found.verdict.distance < 1e-8
+    # Once a cycle at least it lies on the table for a while, and forgets all that was before.
+    assert found.verdict.exponent == -math.inf

@@ -16,8 +16,9 @@ from printhammer.chaos.exponents.recurrence import Recurrence, recurrence
 from printhammer.chaos.exponents.zero_one import ZeroOne, zero_one
 from printhammer.chaos.impacts.sections import Section, section, sections
 from printhammer.chaos.impacts.train import ImpactTrain, impact_train
+from printhammer.chaos.orbits.collection import Orbits
 from printhammer.chaos.orbits.orbit import Orbit
-from printhammer.chaos.orbits.search import Orbits, orbit, orbits
+from printhammer.chaos.orbits.search import orbit, orbits
 from printhammer.chaos.strobe.points import Strobe, strobe, strobes
 from printhammer.chaos.strobe.verdict import Verdict
 

@@ -277,6 +277,10 @@ PERIOD: Final = text("TIME", "Time between firings, such as '1.05 ms'.", panel=_
 RATE: Final = text("RATE", "Firings per second, such as '952 Hz'.", panel=_TRAIN)
 OVERLAP: Final = overlapping()
 TRAIN: Final = {"period": PERIOD, "rate": RATE, "overlap": OVERLAP}
+DRIVE: Final = source(
+    "A drive file instead: a force without end, or pulses at a constant rate.", panel=_TRAIN
+)
+FIRED_TRAIN: Final = {**TRAIN, "drive": DRIVE}
 LOWEST: Final = text("VALUE", "Least value, with its unit.", flag="--from")
 HIGHEST: Final = text("VALUE", "Largest value, with its unit.", flag="--to")
 TOLERANCE: Final = number("Error allowed in one step.")

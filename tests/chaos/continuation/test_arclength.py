@@ -104,3 +104,26 @@ def test_no_fixed_point_near_the_start_is_told() -> None:
 
     with pytest.raises(InputError, match="no fixed point near"):
         follow(moved, [0.0], 0.0, scales=ONE, bounds=(-1.0, 1.0))
+
+
+def leaping(u: Any, p: float) -> MapValue:
+    """The fixed point 0, whose multiplier leaps from 0.5 to -300 where p is 0.4."""
+    multiplier = 0.5 if p < 0.4 else -300.0
+    return MapValue(multiplier * u, np.array([[multiplier]]), np.array([0.0]))
+
+
+def test_a_curve_does_not_leap_to_another() -> None:
+    curve = follow(leaping, [0.0], 0.0, scales=ONE, bounds=(0.0, 1.0))
+    assert curve.stops[1].reason == "jump"
+    assert curve.stops[1].parameter == pytest.approx(0.4, abs=1e-6)
+    assert "no continuation" in curve.stops[1].sentence
+
+
+def test_an_end_within_a_step_is_come_to_closely() -> None:
+    def ends(here: Node, ahead: Node) -> Stop | None:
+        if ahead.parameter < 0.55:
+            return None
+        return Stop("over", here.parameter, here.state, "it is over", here)
+
+    curve = follow(line, [0.0], 0.0, scales=ONE, bounds=(0.0, 1.0), watch=ends)
+    assert curve.nodes[-1].parameter == pytest.approx(0.55, abs=1e-6)

@@ -215,6 +215,44 @@ def test_grazings_are_named_as_the_constant_grows(
         assert math.isfinite(found.value)
 
 
+@pytest.fixture(scope="module")
+def steep() -> Branch:
+    """A branch with doublings beside folds and grazings, within a ten-thousandth of its range."""
+    return ph.continuation(ph.load("hendriks-1983"), "period", ("1.1 ms", "1.33 ms"), period="1.25 ms")
+
+
+@pytest.mark.parametrize(
+    ("born", "ends", "doublings"),
+    [
+        # The branch through both of the first two is one, and so is that through the other two.
+        (1.1545156e-3, 1.2467185e-3, (1.1834217e-3, 1.2462172e-3)),
+        (1.2467185e-3, 1.1545156e-3, (1.1834217e-3, 1.2462172e-3)),
+        (1.2563104e-3, 1.3228613e-3, (1.2783385e-3, 1.3217745e-3)),
+        (1.3228613e-3, 1.2563104e-3, (1.2783385e-3, 1.3217745e-3)),
+    ],
+)
+def test_doubled_branches_lead_from_doubling_to_doubling(
+    steep: Branch, born: float, ends: float, doublings: tuple[float, float]
+) -> None:
+    event = next(e for e in steep.events if e.kind == "period doubling" and abs(e.value - born) < 1e-9)
+    doubled = steep.doubled(event, most=200)
+    assert [stop.reason for stop in doubled.stops] == ["period doubling", "period doubling"]
+    assert doubled.stops[1].parameter == pytest.approx(ends, abs=1e-10)
+    found = sorted(e.value for e in doubled.events if e.kind == "period doubling")
+    assert found == pytest.approx(list(doublings), abs=1e-10)
+    assert len(doubled) > 25
+    # No orbit has half the period, and no step leaps.
+    assert (np.abs(doubled.x[1:-1, 0] - doubled.x[1:-1, 1]) > 0.0).all()
+
+
+def test_a_doubling_among_grazings_has_its_branch(steep: Branch) -> None:
+    # It was sought too far off, at a negative period.
+    event = next(e for e in steep.events if abs(e.value - 1.1567165e-3) < 1e-9)
+    doubled = steep.doubled(event, most=40)
+    assert doubled.stops[0].reason == "period doubling"
+    assert any(abs(e.value - 1.1565279e-3) < 1e-9 for e in doubled.events)
+
+
 @pytest.mark.slow
 def test_regimes_follow_each_orbit_once(hammer: "ph.Hammer") -> None:
     rates = (1.0 / RANGE[1], 1.0 / RANGE[0])

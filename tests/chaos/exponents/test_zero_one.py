@@ -207,3 +207,11 @@ def test_a_run_that_stopped_is_undecided(hammer: "ph.Hammer") -> None:
 def test_bad_input(series: object, options: dict[str, object], said: str) -> None:
     with pytest.raises(ph.InputError, match=said):
         zero_one(series, **options)
+
+
+@pytest.mark.parametrize(("count", "noise"), [(200, 0.01), (1000, 0.01), (3000, 0.02)])
+def test_noise_on_a_cycle_is_no_chaos(count: int, noise: float) -> None:
+    cycle = np.tile([1.0, 0.3, -0.7, 0.2, -0.9], count // 5)
+    found = ph.zero_one(cycle + noise * np.random.default_rng(5).standard_normal(count))
+    assert found.verdict == "regular"
+    assert abs(found.k) < 0.2

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 from pathlib import Path
 
@@ -128,7 +129,11 @@ def test_the_search_does_not_depend_on_threads(found: Orbits, hammer: ph.Hammer)
 def test_every_guess_is_accounted_for(found: Orbits, fast: Orbits) -> None:
     for orbits in (found, fast):
         assert sum(orbits.guesses) == len(orbits) + orbits.repeats + sum(orbits.failures.values())
-        assert orbits.starts == 101
+        assert orbits.starts == 129
+        # What it is closed with in the end, and that at another section, may add to what a guess led to.
+        assert sum(orbits.hits) <= len(orbits) + orbits.repeats
+        assert len(orbits.hits) == len(orbits)
+        assert 0.0 <= orbits.coverage <= 1.0
         assert sum(orbits.counts.values()) == len(orbits)
         for count in orbits.failures.values():
             assert str(count) in orbits.message
@@ -140,8 +145,53 @@ def test_a_search_that_finds_nothing_says_so(hammer: ph.Hammer) -> None:
     found = ph.orbits(short, period="1.3 ms", longest=2, starts=20)
     assert len(found) == 0
     assert "no orbits of up to 2 firings" in found.message
-    assert "21 states" in found.message
+    assert "129 states" in found.message
+    assert np.isnan(found.coverage)
     assert len(found.to_dataset()["orbit"]) == 0
+
+
+def test_branches_lead_to_orbits_that_no_motion_comes_close_to() -> None:
+    # Saddles with multipliers of 89 and -4, partners in a fold, and one of period 2 between them with -315.
+    hammer = ph.load("hendriks-1983")
+    found = ph.orbits(hammer, period="1.05 ms", longest=2, starts=100)
+    half = found.regime.window.half_widths
+    for firings, x, v in ((1, 93.314e-6, -0.49619), (1, 95.380e-6, -0.48855), (2, 93.154e-6, -0.49431)):
+        gaps = [
+            np.abs(np.array([one.x[0] - x, one.v[0] - v]) / half).max()
+            for one in found
+            if one.firings == firings
+        ]
+        assert min(gaps) < 1e-4
+
+
+def test_more_effort_finds_no_fewer_orbits(hammer: ph.Hammer) -> None:
+    lists = {
+        (starts, guesses): ph.orbits(
+            hammer, period=0.6e-3, longest=2, starts=starts, guesses=guesses, follow=0
+        )
+        for starts, guesses in ((128, 8), (128, 48), (1024, 8), (1024, 48))
+    }
+    for (starts, guesses), few in lists.items():
+        for (more, others), many in lists.items():
+            if more >= starts and others >= guesses:
+                scales = few.regime.window.half_widths
+                for one in few:
+                    gaps = [
+                        np.maximum(
+                            abs(one.x[0] - other.x) / scales[0], abs(one.v[0] - other.v) / scales[1]
+                        ).min()
+                        for other in many
+                        if other.firings == one.firings
+                    ]
+                    assert min(gaps) < 1e-6
+                assert len(many) >= len(few)
+
+
+def test_how_sure_a_list_is_follows_from_how_often_its_orbits_were_met(found: Orbits) -> None:
+    known = dataclasses.replace(found, hits=(1, 1, 1, 2, 95))
+    assert known.coverage == pytest.approx(0.97)
+    assert known.unseen == pytest.approx(1.5)
+    assert "97.0 %" in known.message
 
 
 def test_from_a_strobe_point(hammer: ph.Hammer, found: Orbits) -> None:

@@ -237,3 +237,13 @@ def test_what_does_not_fit_together_is_refused(hammer: "ph.Hammer") -> None:
         strobes(hammer, [])
     with pytest.raises(ph.InputError, match=r"^firings"):
         strobes(hammer, [1e-3], firings=(5, 5))
+
+
+def test_near_a_doubling_a_verdict_rests_on_newtons_method() -> None:
+    # States two firings apart agree to 7e-8 of the window, those one firing apart to 7e-6 only.
+    hammer = ph.load("hendriks-1983")
+    assert ph.strobe(hammer, period=1.047408e-3, points=1).verdict.name == "period-1"
+    judged = ph.strobe(hammer, period=1.0482e-3, points=1).verdict
+    assert judged.name == "period-1"
+    assert judged.multiplier == pytest.approx(math.exp(judged.exponent), abs=1e-5)
+    assert "Newton's method" in judged.evidence

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from printhammer.chaos.bifurcation.columns import OK, Columns, cycles_of, run_columns
+from printhammer.chaos.orbits.settled import LIES_ON, approaches, noise_about, settled, shown
 from printhammer.chaos.strobe.train import exponents_onward
 from printhammer.chaos.strobe.verdict import is_positive
 from printhammer.results import Declared, part
@@ -32,13 +33,11 @@ REACH: Final = 0.99
 INSIDE: Final = 0.95
 """Share of the points of a train that must lie within reach for it to be on a strange attractor."""
 
-DECAY: Final = 0.999
-"""A train that seems to have an even period settles to half of it where the distance of states half a period
-apart falls below this part of itself while it is judged: near a doubling, where neighbours take turns about
-the orbit, states two firings apart agree long before those one firing apart."""
-
 ATTEMPTS: Final = 12
 """Trains without a period that are followed for long, at most, to find strange attractors."""
+
+POLISHED: Final = 12
+"""Trains of a piece that still move, at most, whose orbits are looked for by Newton's method."""
 
 
 class Attractor(Declared):
@@ -67,6 +66,7 @@ class Attractors:
         self.found: list[Attractor] = []
         self._trees: dict[int, tuple[cKDTree, float]] = {}
         self._attempts = 0
+        self._noise: dict[int, float] = {}
 
     def judge(self, columns: Columns) -> IntArray:
         """Return to which attractor trains have come: its place in `found`, -1 where that is not known."""
@@ -75,11 +75,9 @@ class Attractors:
         for q in np.unique(cycles[cycles > 0]).tolist():
             rows = np.flatnonzero(cycles == q)
             points = self._scaled(columns.x[rows], columns.v[rows])
-            settling = _settles(points, q)
-            places[rows[settling]] = self._known(points[settling, -(q // 2) :])
-            rows = rows[~settling]
-            orbits = self._scaled(columns.x[rows, -q:], columns.v[rows, -q:])
-            places[rows] = self._periodic(orbits)
+            clear = shown(points, q)
+            places[rows[clear]] = self._periodic(points[clear, -q:])
+            places[rows[~clear]] = self._settling(points[~clear], q)
         self._strange(columns, np.flatnonzero((cycles == 0) & (columns.status == OK)), places)
         return places
 
@@ -90,6 +88,31 @@ class Attractors:
 
     def _scaled(self, x: FloatArray, v: FloatArray) -> FloatArray:
         return np.stack([x, v], axis=-1) / self.scales[:2]
+
+    def _settling(self, points: FloatArray, q: int) -> IntArray:
+        """Return the places of the orbits that states approach which still move, -1 where that is not known.
+
+        They are of shape (n, points, 2) and repeat after q firings.
+        """
+        places = np.full(len(points), -1, np.int64)
+        left = list(range(len(points)))
+        for _ in range(POLISHED):
+            for place, attractor in enumerate(self.found):
+                if attractor.period is not None and q % attractor.period == 0:
+                    orbit = attractor.states / self.scales[:2]
+                    noise = self._noise.get(place, LIES_ON)
+                    near = [row for row in left if approaches(points[row], orbit, MATCH, noise)]
+                    places[near] = place
+            left = [row for row in left if places[row] < 0]
+            if not left:
+                break
+            row = left.pop(0)
+            ends_at = settled(self.regime, points[row] * self.scales[:2], q, self.scales[:2])
+            if ends_at.period is not None:
+                places[row] = self._periodic((ends_at.states / self.scales[:2])[np.newaxis])[0]
+                if not math.isnan(ends_at.multiplier):
+                    self._noise[int(places[row])] = noise_about(ends_at.multiplier)
+        return places
 
     def _periodic(self, orbits: FloatArray) -> IntArray:
         """Return the places of orbits of one period, shape (n, q, 2); those that are new are added."""
@@ -149,10 +172,11 @@ class Attractors:
             return None
         cycles, _ = self._cycles(longer)
         q = int(cycles[0])
-        if q and _settles(self._scaled(longer.x, longer.v), q)[0]:
-            return None
         if q:
-            return int(self._periodic(self._scaled(longer.x[:, -q:], longer.v[:, -q:]))[0])
+            points = self._scaled(longer.x, longer.v)
+            return int(
+                (self._periodic(points[:, -q:]) if shown(points, q)[0] else self._settling(points, q))[0]
+            )
         x, v, branch, _memory = longer.last[0].tolist()
         if branch >= 0.0:
             return None
@@ -166,15 +190,6 @@ class Attractors:
         states = np.column_stack([longer.x[0], longer.v[0]])
         self.found.append(Attractor("strange", None, states, exponent.value, exponent.standard_error))
         return len(self.found) - 1
-
-
-def _settles(points: FloatArray, q: int) -> BoolArray:
-    """Tell which trains of an even period q, states of shape (n, points, 2), still settle to half of it."""
-    if q % 2:
-        return np.zeros(len(points), np.bool_)
-    apart = np.abs(points[:, q // 2 :] - points[:, : -(q // 2)]).max(axis=2)
-    part = max(apart.shape[1] // 4, 1)
-    return np.asarray(apart[:, -part:].mean(axis=1) < DECAY * apart[:, :part].mean(axis=1))
 
 
 def _agree(orbits: FloatArray, known: FloatArray) -> BoolArray:

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Final, Literal, SupportsIndex, Unpack, get_arg
 import numpy as np
 
 from printhammer.chaos.bifurcation.builder import DiagramBuilder
-from printhammer.chaos.bifurcation.columns import FROM_REST, TOLERANCE
+from printhammer.chaos.bifurcation.columns import TOLERANCE
 from printhammer.chaos.bifurcation.diagram import Bifurcation
+from printhammer.chaos.strobe.handing import FROM_REST
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer

@@ -13,6 +13,7 @@ from printhammer.chaos.bifurcation.carry import Strand, Trains, carry, strands_o
 from printhammer.chaos.bifurcation.columns import (
     OK,
     blank_columns,
+    confirm,
     cycles_of,
     orbit_distance,
     put,
@@ -25,7 +26,7 @@ from printhammer.chaos.strobe.train import exponents_onward
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.chaos.bifurcation.columns import State
+    from printhammer.chaos.strobe.handing import State
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
     from printhammer.support.threads import Progress
@@ -143,7 +144,10 @@ class DiagramBuilder:
             progress=lambda part, _all: self.tell(done + part),
         )
         fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
-        return columns, *cycles_of(columns, fronts, self.table.scales[list(rows)])
+        scales = self.table.scales[list(rows)]
+        cycles, distances = cycles_of(columns, fronts, scales)
+        confirm(columns, cycles, distances, regimes, scales, self.threads)
+        return columns, cycles, distances
 
     def run(self, rows: Sequence[int], states: FloatArray) -> None:
         """Run trains from states and keep what is found."""

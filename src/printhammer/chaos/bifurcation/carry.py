@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.columns import OK, Columns, State, orbit_distance, put, state_or_rest
+from printhammer.chaos.bifurcation.columns import OK, Columns, orbit_distance, put, state_or_rest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from printhammer.chaos.strobe.handing import State
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.chaos.strobe.train import HELD_BRANCHES, pack_branches
+from printhammer.chaos.orbits.settled import Settled, settled, shown
+from printhammer.chaos.strobe.handing import FROM_REST, State, handed_on, pack_branches
 from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
 from printhammer.errors import InputError
 from printhammer.results import Declared, column, part
-from printhammer.run.ensemble import MODE_NAMES, Ensemble
+from printhammer.run.ensemble import Ensemble
 from printhammer.run.start import check_branch, initial_state
 from printhammer.run.window import window_of
-from printhammer.support.threads import Progress, shifted
+from printhammer.support.threads import Progress, mapped, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,15 +23,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray, IntArray, TextArray
-
-State = tuple[float, float, float, float]
-"""Displacement, m, velocity, m/s, branch of the pack or -1, and memory of the pack, m."""
-
-FROM_REST: Final[State] = (math.nan, math.nan, -1.0, 0.0)
-"""Row of a state that stands for a train that begins at rest, with nothing fired before."""
 
 TOLERANCE: Final = 1e-9
 """Tolerance of diagrams and basins unless told otherwise: noise far below what a period is judged by.
@@ -45,9 +39,6 @@ _STATUS: Final = "U16"
 
 MOST_STATES: Final = 1 << 19
 """States that are integrated in one piece; with it memory is bounded."""
-
-_PACK_BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
-_PACK_RELEASED: Final = MODE_NAMES.index("pack released")
 
 
 class Columns(Declared):
@@ -196,19 +187,6 @@ def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]
     return drive, regime.moments(drive, firings, 0.0)
 
 
-def handed_on(hammer: Hammer, x: float, v: float, mode: int, memory: float) -> State:
-    """Return the state with which another train goes on; `FROM_REST` where none can."""
-    branch = HELD_BRANCHES.get(mode, mode)
-    if mode == _PACK_RELEASED:
-        return FROM_REST
-    rigid = hammer.backstop is not None and hammer.backstop.law == "rigid"
-    if rigid and hammer.position is not None:
-        x = max(x, hammer.position)
-    if branch not in _PACK_BRANCHES:
-        return x, v, -1.0, 0.0
-    return x, v, float(branch), memory
-
-
 def state_or_rest(regime: Regime, state: State) -> State:
     """Return a state that was handed on, or `FROM_REST` where this hammer cannot begin with it."""
     if math.isnan(state[0]):
@@ -264,6 +242,35 @@ def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple
         distances[near[agree]] = apart[agree]
         left = left[cycles[left] == 0]
     return cycles, distances
+
+
+def confirm(
+    columns: Columns,
+    cycles: IntArray,
+    distances: FloatArray,
+    regimes: Sequence[Regime],
+    scales: FloatArray,
+    threads: int | None,
+) -> None:
+    """Put right the periods from `cycles_of`, and the distances, where the states alone do not show them.
+
+    See `printhammer.chaos.orbits.settled`; a period that is not confirmed becomes 0.
+    """
+    doubtful: list[int] = []
+    for q in np.unique(cycles[cycles > 0]).tolist():
+        rows = np.flatnonzero(cycles == q)
+        points = np.stack([columns.x[rows], columns.v[rows]], axis=2) / scales[rows, np.newaxis, :2]
+        doubtful += rows[~shown(points, q)].tolist()
+
+    def settled_of(row: int) -> Settled:
+        points = np.column_stack([columns.x[row], columns.v[row]])
+        return settled(regimes[row], points, int(cycles[row]), scales[row, :2])
+
+    for row, ends_at in zip(doubtful, mapped(settled_of, doubtful, threads), strict=True):
+        q = cycles[row] = ends_at.period or 0
+        x, v, memory = (part[row] for part in (columns.x, columns.v, columns.memory))
+        points = np.column_stack([x, v, memory]) / scales[row]
+        distances[row] = np.abs(points[q:] - points[:-q]).max() if q else math.nan
 
 
 def orbit_distance(one: FloatArray, other: FloatArray) -> float:

@@ -38,6 +38,8 @@ _LEAST_COSINE: Final = 0.97
 """Of the angle between successive tangents, below which a step is taken again with half its length."""
 _FARTHEST: Final = 0.4
 """Distance of a corrected point from its prediction, in steps, beyond which it may lie on another curve."""
+_LEAP: Final = 1.0
+"""Change of a multiplier in one step, in units of one more than its size, beyond which the step is halved."""
 _SAME: Final = 1e-6
 """Scaled distance below which two points are one."""
 
@@ -47,7 +49,8 @@ class Stop(Declared):
 
     reason: str = part(
         '"bound"; "closed"; "no value": the map has none beyond; "lost": Newton\'s method does not converge'
-        ' beyond; "length": the number of steps is used up; "not asked"; or what the caller\'s watch says'
+        ' beyond; "jump": what it converges to there is no continuation; "length": the number of steps is'
+        ' used up; "not asked"; or what the caller\'s watch says'
     )
     parameter: float = part("the parameter there")
     state: FloatArray = part("the state there")
@@ -191,7 +194,8 @@ def _half(
         z = follower.point(here)
         ahead = follower.correct(z + length * here.tangent, here.tangent, arc=here.arc + length)
         trouble, reached = follower.trouble, None
-        if ahead is not None and not _joined(follower, here, ahead, length):
+        jumped = ahead is not None and not _joined(follower, here, ahead, length)
+        if jumped:
             ahead = None
         if ahead is not None:
             ahead = replace(ahead, arc=here.arc + float(np.linalg.norm(follower.point(ahead) - z)))
@@ -201,13 +205,17 @@ def _half(
         if ahead is None:
             length *= 0.5
             if length < steps.smallest:
-                return nodes, _lost(here, trouble)
+                return nodes, _lost(here, trouble, jumped=jumped)
             continue
         if reached is None and len(nodes) > 2 and _passes(follower, here, ahead, home, start):
             nodes.append(replace(start, arc=here.arc + float(np.linalg.norm(home - z))))
             sentence = f"the curve closes upon itself at the parameter {start.parameter:.9g}"
             return nodes, Stop("closed", start.parameter, start.state, sentence)
         stop = watch(here, ahead) if watch is not None else None
+        if stop is not None and stop.node is here and 0.5 * length >= steps.smallest:
+            # The step leads beyond the end, which may lie anywhere in it.
+            length *= 0.5
+            continue
         if stop is None and reached is not None:
             stop = _bound_stop(ahead, reached)
         nodes.append(ahead if stop is None or stop.node is None else stop.node)
@@ -224,12 +232,23 @@ def _joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool
     """Return whether a corrected point lies on the same curve, as far as its distance and tangent tell."""
     predicted = follower.point(here) + length * here.tangent
     near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
-    return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE
+    return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _leaps(here, ahead)
 
 
-def _lost(node: Node, trouble: str) -> Stop:
+def _leaps(here: Node, ahead: Node) -> bool:
+    """Return whether the multipliers change by much between two points of the same kind of motion."""
+    if here.value.label != ahead.value.label:
+        return False
+    before, after = here.multipliers, ahead.multipliers
+    most = _LEAP * (1.0 + np.minimum(np.abs(before), np.abs(after)))
+    return bool((np.abs(after - before) > most).any() and (np.abs(after[::-1] - before) > most).any())
+
+
+def _lost(node: Node, trouble: str, *, jumped: bool = False) -> Stop:
     at = f"the parameter {node.parameter:.9g}"
     reason, sentence = "lost", f"the curve was lost at {at}: Newton's method does not converge beyond"
+    if jumped:
+        reason, sentence = "jump", f"the curve was lost at {at}: what lies beyond is no continuation of it"
     if trouble:
         reason, sentence = "no value", f"the map has no value beyond {at}: {trouble}"
     return Stop(reason, node.parameter, node.state, sentence)

@@ -39,7 +39,7 @@ class Branch(Result):
     Every array has one row for each orbit, in order along the curve; their values need not ascend. Reasons
     to stop are "bound"; "closed"; "period doubling": the orbit is born there; "grazing" of a rigid backstop;
     "merged" with an orbit of fewer firings; "no value": a run does not come through; "lost": Newton's method
-    does not converge; "length": the steps are used up.
+    does not converge; "jump": what it converges to is no continuation; "length": the steps are used up.
     """
 
     regime: Regime = part("hammer and periodic drive at the start, and phase of the section")
@@ -164,6 +164,8 @@ class Branch(Result):
             ("value", self.unit, self.parameter, np.nan, lambda event: event.value),
             ("after", "1", "number of the orbit that it follows", -1, lambda event: event.after),
             ("located", "1", "whether it was located", -1, lambda event: event.sharp),
+            ("x", "m", "displacement at the section there", np.nan, lambda event: event.state[0]),
+            ("v", "m/s", "velocity at the section there", np.nan, lambda event: event.state[1]),
             ("text", "", "what happens, in a few words", "", lambda event: event.message),
             ("contacts_before", "", "sequence of contacts before it", "", lambda event: event.contacts[0]),
             ("contacts_after", "", "sequence of contacts after it", "", lambda event: event.contacts[1]),
@@ -171,6 +173,11 @@ class Branch(Result):
             codes, dtype = KINDS if name == "kind" else (), np.int32 if missing == -1 else None
             note = Column(unit, meaning, ("event",), name=f"event_{name}", dtype=dtype, codes=codes)
             own[note.name] = note, np.array([missing if row is None else value(row) for row in rows])
+        there = np.array([np.full(2, np.nan) if row is None else row.multipliers for row in rows])
+        for name in ("real", "imag"):
+            meaning = f"{name} part of the multipliers there"
+            note = Column("1", meaning, ("event", "multiplier"), name=f"event_multiplier_{name}")
+            own[note.name] = note, getattr(there.astype(np.complex128), name)
         return own
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -28,6 +28,7 @@ import numpy as np
 
 from printhammer.chaos.continuation.arclength import Curve, Steps, Stop, Watch, follow
 from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, MapValue, Node, between
+from printhammer.errors import InputError
 from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
@@ -57,6 +58,12 @@ _NEAR: Final = 1e-4
 _BRACKET: Final = 1e-5
 """Share of a step within which a branching is not bracketed any closer."""
 _AMPLITUDE: Final = 1e-2
+_LEAST_AMPLITUDE: Final = 1e-6
+_CLOSER: Final = 4.0
+"""Least scaled distance from a doubling at which an orbit born there is sought; factor between two tries."""
+_ASIDE: Final = 0.5
+_NEW_MULTIPLIER: Final = 0.3
+"""Share of that distance by which it may lie aside, and distance of a multiplier of it from 1."""
 _HALF_NEAR: Final = 0.05
 """Scaled distance within which an orbit is close to one of half its period."""
 _HALF_DOUBLES: Final = 0.5
@@ -318,9 +325,10 @@ def follow_doubled(
     """Follow the orbits of twice the period that are born at a period doubling.
 
     The first one is sought at a scaled distance `amplitude` from the doubling `point`, in the direction of
-    the eigenvector whose multiplier is -1; its parameter is found with it, on whichever side it lies.
-    `doubled` is the map applied twice; the other arguments are those of `follow`. InputError where there is
-    no such orbit near the point.
+    the eigenvector whose multiplier is -1; its parameter is found with it, on whichever side it lies. It has
+    to lie as an orbit born there does: to first order in that direction, its parameter and its multipliers
+    as they are at the doubling. Where it does not, or there is none, it is sought closer by. `doubled` is the
+    map applied twice; the other arguments are those of `follow`. InputError where there is no such orbit.
     """
     widths = np.asarray(scales, dtype=np.float64)
     jacobian = point.node.value.jacobian
@@ -328,17 +336,34 @@ def follow_doubled(
     # The last right singular vector of J + I is the eigenvector of the multiplier -1.
     direction = np.linalg.svd(within + np.eye(len(within)))[2][-1]
     row = np.append(direction, 0.0)
+    corrector = Corrector(doubled, widths, steps.precision)
+    begin = corrector.point(point.node)
+    while amplitude >= _LEAST_AMPLITUDE:
+        first = corrector.correct(begin + amplitude * row, row)
+        if first is not None and _is_born(corrector.point(first) - begin, row, amplitude, first):
+            break
+        amplitude /= _CLOSER
+    else:
+        raise InputError(f"no orbit of twice the period is near the parameter {point.parameter:.9g}")
     return follow(
         doubled,
-        point.node.state + amplitude * direction * widths[:-1],
-        point.parameter,
+        first.state,
+        first.parameter,
         scales=widths,
         bounds=bounds,
-        steps=steps,
+        steps=replace(
+            steps, first=min(steps.first, amplitude), smallest=min(steps.smallest, 1e-3 * amplitude)
+        ),
         directions="up",
         row=row,
         watch=watch,
     )
+
+
+def _is_born(way: FloatArray, row: FloatArray, amplitude: float, node: Node) -> bool:
+    """Tell whether an orbit lies as one born at a doubling does, the way from there being known."""
+    aside = float(np.linalg.norm(way - amplitude * row))
+    return aside <= _ASIDE * amplitude and float(np.abs(node.multipliers - 1.0).min()) <= _NEW_MULTIPLIER
 
 
 def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:

@@ -23,8 +23,7 @@ from printhammer.chaos.continuation.continuation import continuation
 from printhammer.chaos.continuation.fixed_points import MapValue, Node
 from printhammer.chaos.continuation.tracer import read_bounds
 from printhammer.chaos.strobe.map import image_of
-from printhammer.chaos.strobe.train import Train, run_trains
-from printhammer.chaos.strobe.verdict import period_of
+from printhammer.chaos.strobe.train import States, Train, run_trains
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Column, Declared, Result, column, derived, part, provenance, scalar
@@ -365,7 +364,13 @@ def _grid(
         trains = [Train.of(regime.at_firings, _FIRINGS) for regime in regimes]
         every, _ = run_trains(trains, judged, _GRID_TOLERANCE, None, threads=threads)
         settled[row] = [
-            (period_of(states.distances(train)) or 0) if states.status == "ok" else -1
+            _period(states, train) if states.status == "ok" else -1
             for train, states in zip(trains, every, strict=True)
         ]
     return axes, settled
+
+
+def _period(states: States, train: Train) -> int:
+    """Return after how many firings a train repeats, 0 where that is not known."""
+    ends_at = states.settled(train, states.distances(train))
+    return 0 if ends_at is None or ends_at.period is None else ends_at.period

@@ -98,7 +98,7 @@ class Tracer:
             return curve
         stops = []
         for stop, nodes in zip(curve.stops, (curve.nodes, curve.nodes[::-1]), strict=True):
-            place = self.zero_margin(family, nodes) if stop.reason in ("lost", "no value") else None
+            place = self.zero_margin(family, nodes) if stop.reason in ("lost", "jump", "no value") else None
             sentence = "it grazes the rigid backstop, where the strobe map has no derivative"
             stops.append(stop if place is None else Stop("grazing", place, nodes[0].state, sentence))
         return Curve(curve.nodes, (stops[0], stops[1]))
@@ -267,6 +267,7 @@ class Tracer:
             "closed": f"the branch closes upon itself at {at}",
             "no value": f"beyond {at} there is no strobe map: {why}",
             "lost": f"beyond {at} Newton's method does not converge",
+            "jump": f"beyond {at} what Newton's method converges to is no continuation",
             "length": f"the number of steps was used up at {at}",
             "grazing": f"at {at} {why}",
             "merged": f"close to {at} {why}",

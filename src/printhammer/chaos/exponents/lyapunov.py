@@ -340,5 +340,7 @@ def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: 
     branch = np.where(np.isfinite(mode), np.nan_to_num(mode), -1).astype(np.int64)
     states = States(train.times(firing), x, v, branch, memory, exponent.status)
     stopped = "" if exponent.ok else exponent.status
-    judged = verdict(states.distances(train), (first, last), tolerance, exponent, stopped)
+    distances = states.distances(train)
+    ends_at = None if stopped else states.settled(train, distances)
+    judged = verdict(distances, (first, last), tolerance, exponent, stopped, ends_at)
     return strobe_of(train, firing, states, tolerance, judged)

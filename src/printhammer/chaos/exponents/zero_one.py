@@ -62,6 +62,9 @@ LONGEST_CYCLE: Final = 64
 CYCLES: Final = 5
 """Growth counts as chaos where it is seen over so many cycles q; within one, any path may go away."""
 
+FOLLOWS: Final = 0.7
+"""Numbers follow from those before where images of neighbours are closer than this share of any two."""
+
 _CUT: Final = 10
 _PASSES: Final = 4
 _TOGETHER: Final = 1 << 20
@@ -264,7 +267,8 @@ def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArr
 
     That is the number q, 1 for the mean alone, whose q means are worth their number by the criterion of G.
     Schwarz (Ann. Statist. 6 (1978) 461): n ln(variance left) + q ln(n) is least. Left is the series without
-    the means of every q-th number. Changes up to the resolution count as none.
+    the means of every q-th number. Changes up to the resolution count as none. Where what would be left does
+    not follow from itself, it is noise on a cycle: by itself that wanders like chaos, so it stays on it.
     """
     worth = []
     for q in range(1, min(LONGEST_CYCLE, numbers.size // _PASSES) + 1):
@@ -272,7 +276,31 @@ def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArr
         variance = max(float((rest**2).sum()) / numbers.size + resolution**2, np.finfo(np.float64).tiny)
         worth.append(numbers.size * math.log(variance) + q * math.log(numbers.size))
     cycle = int(np.argmin(worth)) + 1
-    return cycle, _less_means(numbers, cycle)
+    rest = _less_means(numbers, cycle)
+    if cycle > 1 and float(rest.std()) > resolution and not _follows_from_itself(rest, cycle):
+        return 1, _less_means(numbers, 1)
+    return cycle, rest
+
+
+def _follows_from_itself(rest: FloatArray, q: int) -> bool:
+    """Tell whether neighbours at the same place of a cycle of q numbers are neighbours one number later, too.
+
+    Neighbours are told by their numbers alone, or by the ones before as well.
+    """
+    shares = []
+    for before in (0, 1):
+        points = np.stack([rest[before - k : rest.size - 1 - k] for k in range(before + 1)], axis=1)
+        image = rest[before + 1 :]
+        near, any_two = 0.0, 0.0
+        for start in range(q):
+            own, later = points[start::q], image[start::q]
+            apart = np.abs(own[:, np.newaxis] - own).max(axis=2)
+            np.fill_diagonal(apart, np.inf)
+            between = np.abs(later[:, np.newaxis] - later)
+            near += float(between[np.arange(len(own)), apart.argmin(axis=1)].sum())
+            any_two += float(between.sum()) / max(len(own) - 1, 1)
+        shares.append(near / any_two if any_two else 0.0)
+    return min(shares) < FOLLOWS
 
 
 def _less_means(numbers: FloatArray, q: int) -> FloatArray:

@@ -20,7 +20,7 @@ from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import BoolArray, FloatArray
@@ -129,24 +129,27 @@ def first_state(regime: Regime) -> tuple[float, float]:
         return 0.5 * (window.x[0] + window.x[1]), 0.0
 
 
-def close_returns(records: Records, period: int, most: int, scales: FloatArray) -> list[Guess]:
-    """Return the closest returns of records after `period` firings that are not alike, `most` at most.
+def close_returns(
+    records: Records, period: int, most: int, scales: FloatArray
+) -> tuple[list[Guess], list[Guess]]:
+    """Return the closest returns of records after `period` firings that are not alike, half of `most` each.
 
-    The first half are the closest of all, the others the closest of those that begin early; distances are in
-    the scales, the half-widths of the window.
+    First the closest of all, then the closest of those that begin early; distances are in the scales, the
+    half-widths of the window. With a larger `most` both lists begin as they do with a smaller one.
     """
     scaled = records.states / scales
     count = scaled.shape[1] - period
     if count <= 0:
-        return []
+        return [], []
     gap = np.abs(scaled[:, period:] - scaled[:, :count]).max(axis=2)
     gap = np.where(records.usable[:, period:] & records.usable[:, :count], gap, np.inf)
     # Late returns lie close to what attracts, early ones everywhere.
     early = gap.copy()
     early[:, _EARLY:] = np.inf
-    guesses: list[Guess] = []
-    kept = np.empty((most, period, 2))
-    for among, up_to, apart in ((gap, most - most // 2, _ALIKE), (early, most, _EARLY_ALIKE)):
+    lists: list[list[Guess]] = []
+    for among, up_to, apart in ((gap, most - most // 2, _ALIKE), (early, most // 2, _EARLY_ALIKE)):
+        guesses: list[Guess] = []
+        kept = np.empty((up_to, period, 2))
         flat = among.reshape(-1)
         known = int(np.isfinite(flat).sum())
         for place in np.argsort(flat, kind="stable")[: min(known, _LOOKED_AT)]:
@@ -159,18 +162,22 @@ def close_returns(records: Records, period: int, most: int, scales: FloatArray) 
                 starts = np.flatnonzero(records.usable[member, first : first + period])
                 lengths = np.diff(np.append(starts, period)).astype(np.int64)
                 guesses.append(Guess(records.states[member, first + starts], lengths))
-    return guesses
+        lists.append(guesses)
+    return lists[0], lists[1]
 
 
-def joined(shorter: Sequence[Guess], period: int, most: int, scales: FloatArray) -> list[Guess]:
+def joined(
+    shorter: Sequence[Guess], period: int, most: int, scales: FloatArray, known: Collection[tuple[int, int]]
+) -> list[Guess]:
     """Return guesses of `period` firings made of two shorter orbits, one run through after the other.
 
-    `most` at most, those with the smallest jump from one orbit to the other first.
+    `most` at most, those with the smallest jump from one orbit to the other first; none of the pairs of
+    places that are known.
     """
     guesses: list[tuple[float, Guess]] = []
     for k, orbit in enumerate(shorter):
-        for other in shorter[:k]:
-            if int(orbit.firings.sum() + other.firings.sum()) != period:
+        for j, other in enumerate(shorter[:k]):
+            if (j, k) in known or int(orbit.firings.sum() + other.firings.sum()) != period:
                 continue
             gaps = np.abs((orbit.states[:, np.newaxis] - other.states) / scales).max(axis=2)
             here, there = (int(place) for place in np.unravel_index(np.argmin(gaps), gaps.shape))

@@ -4,7 +4,8 @@ Most trains settle within a few firings, and need not be followed to firing 2000
 train counts as periodic as soon as
 
 - its states q firings apart agree a hundred times closer than the verdict asks for, over a window of at least
-  2 q firings, and no smaller number of firings does as closely as the verdict asks for; and
+  2 q firings, no smaller number of firings does as closely as the verdict asks for, and the distance of
+  states a divisor of q apart does not shrink; and
 - a small change of the state dies out: the derivative of the state after q firings with respect to the state
   before them has no eigenvalue beyond 0.99 in absolute value.
 
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.chaos.orbits.settled import shown
 from printhammer.chaos.strobe.train import States, Train, exponents_of, exponents_onward, run_trains
 from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, Verdict, period_of, verdict
 from printhammer.run.problem import TOLERANCE
@@ -119,7 +121,8 @@ def _settled(
     periods: dict[int, int] = {}
     for i, row in enumerate(distances):
         period = period_of(row)
-        if period is not None and states[i].status == "ok" and row[period - 1] <= CLOSER * AGREEMENT:
+        close = period is not None and states[i].status == "ok" and row[period - 1] <= CLOSER * AGREEMENT
+        if period is not None and close and shown(states[i].scaled(trains[i])[np.newaxis], period)[0]:
             periods[i] = period
     candidates = list(periods)
     largest = mapped(
@@ -163,8 +166,13 @@ def _followed(
     states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), tolerance, None, threads=threads)
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
     stopped = ["" if own.status == "ok" else own.status for own in states]
+    ends_at = mapped(
+        lambda i: None if stopped[i] else states[i].settled(trains[i], distances[i]),
+        range(len(trains)),
+        threads,
+    )
     verdicts = {
-        i: verdict(row, judged, tolerance, None, why)
+        i: verdict(row, judged, tolerance, None, why, ends_at[i])
         for i, (row, why) in enumerate(zip(distances, stopped, strict=True))
         if why or not exponents or period_of(row) is not None
     }

@@ -4,32 +4,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 
+from printhammer.chaos.orbits.settled import Settled, settled
+from printhammer.chaos.strobe.handing import FROM_REST, STRETCH, forgets, handed_on, pack_branches
 from printhammer.chaos.strobe.verdict import Verdict, period_of, repeats, verdict
 from printhammer.results import Declared, part
-from printhammer.run.ensemble import MODE_NAMES, Ensemble
+from printhammer.run.ensemble import Ensemble
 from printhammer.run.window import window_of
 from printhammer.support.threads import Progress, mapped, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy.typing as npt
-
     from printhammer.derivatives.states import Exponent
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray, IntArray
-
-HELD_BRANCHES: Final = {
-    MODE_NAMES.index(f"held on the {branch} branch"): MODE_NAMES.index(branch)
-    for branch in ("loading", "unloading")
-}
-"""Branches of the pack on which the armature rests, and those that they are part of."""
 
 _BEFORE: Final = 100
 """Firings before an exponent counts."""
@@ -82,21 +76,29 @@ class States:
 
     def distances(self, train: Train) -> FloatArray:
         """Return how far the states are from repeating, see `printhammer.chaos.strobe.verdict.repeats`."""
-        width, speed = window_of(train.hammer, train.drive).half_widths
         front = math.inf if train.hammer.front is None else train.hammer.front
-        return repeats(
-            np.column_stack([self.x, self.v, self.memory]),
-            pack_branches(self.x, self.branch, front),
-            np.array([width, speed, width]),
-        )
+        return repeats(self.points, pack_branches(self.x, self.branch, front), _scales(train))
+
+    @property
+    def points(self) -> FloatArray:
+        """Displacement, velocity and memory, a row for each firing."""
+        return np.column_stack([self.x, self.v, self.memory])
+
+    def scaled(self, train: Train) -> FloatArray:
+        """Return the points in half-widths of the window."""
+        return np.asarray(self.points / _scales(train))
+
+    def settled(self, train: Train, distances: FloatArray) -> Settled | None:
+        """Return to what the train has settled, from successive states; None if they do not repeat."""
+        period = period_of(distances)
+        if period is None:
+            return None
+        return settled(train.regime.at_firings, self.points, period, _scales(train))
 
 
-def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray) -> IntArray:
-    """Return the branches of the pack on which states lie, 0 outside of it."""
-    branches = np.where(x > front, branch, 0).astype(np.int64)
-    for held, part_of in HELD_BRANCHES.items():
-        branches[branches == held] = part_of
-    return branches
+def _scales(train: Train) -> FloatArray:
+    width, speed = window_of(train.hammer, train.drive).half_widths
+    return np.array([width, speed, width])
 
 
 def run_trains(
@@ -123,31 +125,29 @@ def run_trains(
     every = [np.union1d(mine, other) for mine, other in zip(own, theirs, strict=True)]
     after = np.array([max(int(chosen.max(initial=1)), int(firings.max(initial=1))) + 1])
     ends = [float(train.times(after)[0]) for train in trains]
-    begun = [train.state for train in trains]
-    ensemble = Ensemble(
-        [train.hammer for train in trains],
-        [train.drive for train in trains],
-        ends,
-        states=None if None in begun else np.array(begun),
-        tolerance=tolerance,
-    )
     tell = shifted(progress, 0, total if judged is None else 2 * total)
-    result = ensemble.run(strobes=every, threads=threads, progress=tell)
-    table, names = result.strobes, result.status_names
-    assert table is not None
+    if all(forgets(train.regime) for train in trains):
+        x, v, branch, memory, names, reached = _in_stretches(trains, every, tolerance, threads, tell)
+    else:
+        result = _ensemble(trains, ends, tolerance).run(strobes=every, threads=threads, progress=tell)
+        table, names, reached = result.strobes, result.status_names, result.reached
+        assert table is not None
+        x, v, branch, memory = table.x, table.v, table.branch, table.memory
 
     def at(i: int, times: FloatArray) -> States:
         rows = np.searchsorted(every[i], times)
-        x, v, branch, memory = (
-            part[i, rows].copy() for part in (table.x, table.v, table.branch, table.memory)
-        )
-        return States(times, x, v, branch, memory, names[i])
+        own_x, own_v, own_branch, own_memory = (part[i, rows].copy() for part in (x, v, branch, memory))
+        return States(times, own_x, own_v, own_branch, own_memory, names[i])
 
     states = [at(i, times) for i, times in enumerate(own)]
     if judged is None:
         return states, [None] * total
-    stopped = [names[i] if result.reached[i] < theirs[i][-1] else "" for i in range(total)]
-    distances = [at(i, theirs[i]).distances(train) for i, train in enumerate(trains)]
+    stopped = [names[i] if reached[i] < theirs[i][-1] else "" for i in range(total)]
+    watched = [at(i, times) for i, times in enumerate(theirs)]
+    distances = [of_train.distances(train) for of_train, train in zip(watched, trains, strict=True)]
+    ends_at = mapped(
+        lambda i: None if stopped[i] else watched[i].settled(trains[i], distances[i]), range(total), threads
+    )
     open_cases = [
         i for i in range(total) if not stopped[i] and (every_exponent or period_of(distances[i]) is None)
     ]
@@ -156,7 +156,78 @@ def run_trains(
         [trains[i] for i in open_cases], judged, tolerance, threads=threads, progress=tell
     )
     growth = dict(zip(open_cases, exponents, strict=True))
-    return states, [verdict(distances[i], judged, tolerance, growth.get(i), stopped[i]) for i in range(total)]
+    return states, [
+        verdict(distances[i], judged, tolerance, growth.get(i), stopped[i], ends_at[i]) for i in range(total)
+    ]
+
+
+def _ensemble(
+    trains: Sequence[Train], ends: Sequence[float], tolerance: float, states: FloatArray | None = None
+) -> Ensemble:
+    """Return the runs of trains up to times, s, from states at time 0, by default their own."""
+    begun = [train.state for train in trains]
+    own = None if None in begun else np.array(begun)
+    return Ensemble(
+        [train.hammer for train in trains],
+        [train.drive for train in trains],
+        ends,
+        states=own if states is None else states,
+        tolerance=tolerance,
+    )
+
+
+def _in_stretches(
+    trains: Sequence[Train],
+    every: Sequence[FloatArray],
+    tolerance: float,
+    threads: int | None,
+    progress: Progress | None,
+) -> tuple[FloatArray, FloatArray, IntArray, FloatArray, list[str], FloatArray]:
+    """Return states of trains at times, s, a row each, how the runs ended, and up to when they got.
+
+    A few periods at a time, so that time is small and its rounding stays so.
+    """
+    shape = len(trains), max(len(times) for times in every)
+    x, v, memory = (np.full(shape, np.nan) for _ in range(3))
+    branch = np.full(shape, -1, np.int64)
+    names, reached = ["ok"] * len(trains), np.array([times[-1] for times in every])
+    turns = [
+        np.floor((times - train.drive.times[0]) / train.period + 1e-9).astype(np.int64)
+        for times, train in zip(every, trains, strict=True)
+    ]
+    last = max(int(turn[-1]) for turn in turns)
+    left = list(range(len(trains)))
+    states: FloatArray | None = None
+    for begin in range(0, last + 1, STRETCH):
+        columns = [np.flatnonzero((turns[i] >= begin) & (turns[i] < begin + STRETCH)) for i in left]
+        ends = [float(trains[i].drive.times[0]) + STRETCH * trains[i].period for i in left]
+        strobes = [
+            np.append(np.clip(every[i][some] - begin * trains[i].period, 0.0, end), end)
+            for i, some, end in zip(left, columns, ends, strict=True)
+        ]
+        result = _ensemble([trains[i] for i in left], ends, tolerance, states).run(
+            strobes=strobes, threads=threads
+        )
+        table = result.strobes
+        assert table is not None
+        onward = []
+        for row, (i, some) in enumerate(zip(left, columns, strict=True)):
+            for all_of, own in ((x, table.x), (v, table.v), (branch, table.branch), (memory, table.memory)):
+                all_of[i, some] = own[row, : len(some)]
+            end = len(some)
+            ended = result.status_names[row] != "ok"
+            last_x, last_v = float(table.x[row, end]), float(table.v[row, end])
+            onward.append(FROM_REST if ended else handed_on(trains[i].hammer, last_x, last_v, -1, 0.0))
+            if onward[-1] is FROM_REST:
+                names[i] = result.status_names[row]
+                reached[i] = begin * trains[i].period + result.reached[row]
+        going = [row for row, state in enumerate(onward) if state is not FROM_REST]
+        left, states = [left[row] for row in going], np.array([onward[row][:2] for row in going])
+        if progress is not None:
+            progress(min(len(trains) * (begin + STRETCH) // (last + 1), len(trains)), len(trains))
+        if not left:
+            break
+    return x, v, branch, memory, names, reached
 
 
 def exponents_onward(

@@ -1,6 +1,7 @@
 """Is a train periodic or strange? A verdict on strobe points, with its evidence.
 
-A train of period T has the period q if its states q firings apart agree, and q is the smallest such number.
+A train of period T has the period q if its states q firings apart agree, and q is the smallest such number;
+where they do but still move, Newton's method has to confirm it, see `printhammer.chaos.orbits.settled`.
 It is strange if there is no such q and neighbouring motions part: the largest exponent of the strobe map is
 positive by three standard errors. Everything else is undecided, with the reason.
 """
@@ -15,6 +16,7 @@ import numpy as np
 from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
+    from printhammer.chaos.orbits.settled import Settled
     from printhammer.derivatives.states import Exponent
     from printhammer.support.arrays import FloatArray, IntArray
 
@@ -55,6 +57,11 @@ class Verdict(Declared):
     last: int = part("last firing that was judged")
     tolerance: float = part("tolerance of the integration")
     reason: str = part('why the verdict is "undecided"; else empty', default="")
+    multiplier: float = part(
+        "largest absolute Floquet multiplier of the orbit by which Newton's method confirmed the period",
+        more="NaN where the states alone show it",
+        default=math.nan,
+    )
 
     @property
     def stopped(self) -> bool:
@@ -72,6 +79,9 @@ class Verdict(Declared):
         phrases = []
         if self.period is not None:
             phrases.append(f"states {_firings(self.period)} apart agree to {self.distance:.1e} of the window")
+            if not math.isnan(self.multiplier):
+                approached = "they approach an orbit that Newton's method finds"
+                phrases.append(f"{approached}, of largest multiplier {self.multiplier:.6g}")
         elif self.nearest is not None:
             phrases.append(
                 f"no period up to {LARGEST_PERIOD}: states {_firings(self.nearest)} apart come closest,"
@@ -101,6 +111,7 @@ class Verdict(Declared):
             "standard_error": _finite(self.standard_error),
             "firings": [self.first, self.last],
             "tolerance": self.tolerance,
+            "multiplier": _finite(self.multiplier),
             "reason": self.reason,
         }
 
@@ -150,11 +161,13 @@ def verdict(
     tolerance: float,
     exponent: Exponent | None,
     stopped: str = "",
+    settled: Settled | None = None,
 ) -> Verdict:
     """Judge a train by the distances from `repeats` between the first and the last of some firings.
 
     `exponent` is the largest one over these firings, None where it was not computed; `stopped` says how the
-    run ended if that was before the last of them.
+    run ended if that was before the last of them. `settled` is what became of the number after which the
+    states agree; without it that is the period.
     """
     period = None if stopped else period_of(distances)
     closest = period
@@ -163,6 +176,9 @@ def verdict(
     strange, reason = False, ""
     if stopped:
         reason = f"{_STOPPED} {firings[1]}: {stopped}"
+    elif period is not None and settled is not None:
+        period, reason = settled.period, settled.reason
+        closest = period or closest
     elif period is None:
         strange, reason = _strange(exponent)
     return Verdict(
@@ -176,6 +192,7 @@ def verdict(
         last=firings[1],
         tolerance=tolerance,
         reason=reason,
+        multiplier=math.nan if settled is None or stopped else settled.multiplier,
     )
 
 

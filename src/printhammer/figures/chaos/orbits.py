@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from printhammer.chaos.orbits.collection import Orbits
     from printhammer.chaos.orbits.orbit import Orbit
-    from printhammer.chaos.orbits.search import Orbits
     from printhammer.run.motion import Motion
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray

@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
+from printhammer.cli.firing import firing_of
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
 from printhammer.cli.screen import facts
 from printhammer.cli.units import Units, range_with_unit, with_unit
@@ -27,7 +28,7 @@ _count = partial(opt.whole, panel=_BASINS)
     "printhammer basins hendriks-1983 --period '1.05 ms' --x '30 um, 260 um, 24'"
     " --v '-1 m/s, 1 m/s, 20' --out basins.png",
     {
-        **opt.TRAIN,
+        **opt.FIRED_TRAIN,
         "x": opt.span("Displacements, such as '30 um, 260 um, 128' (the strobe window).", panel=_BASINS),
         "v": opt.span("Velocities, such as '-1 m/s, 1 m/s, 128' (the strobe window).", panel=_BASINS),
         "firings": _count("Firings of a round (200)."),
@@ -42,7 +43,7 @@ _count = partial(opt.whole, panel=_BASINS)
 )
 def basins(
     job: Job,
-    hammer: Hammer = opt.FIRED,
+    hammer: Hammer = opt.HAMMER,
     box: int | None = _count("Cells along the side of a box, for the entropy (4)."),
     quench: bool = opt.switch("Map two pulses from rest instead.", panel=_QUENCH),
     units: Units = opt.UNITS,
@@ -58,18 +59,18 @@ def basins(
 
     of_quench = {name: passed.get(name) for name in ("gaps", "widths", "tail")}
     if quench:
-        of_basins = {name: passed.get(name) for name in ("period", "rate", "overlap", "x", "v")}
+        of_basins = {name: passed.get(name) for name in ("period", "rate", "overlap", "drive", "x", "v")}
         more = {name: passed.get(name) for name in ("firings", "rounds")}
         opt.refuse({**of_basins, **more, "box": box}, "none beside --quench")
     else:
         opt.refuse(of_quench, "--quench beside it")
-        opt.need_one(passed, "--period '1.05 ms', or --quench")
+        firing = firing_of(job, hammer, passed, "--period '1.05 ms', or --quench")
     with job.counting("cells") as tell:
         if quench:
             mapped = quench_map(hammer, progress=tell, **passed)
             status, content, rows = mapped.status, Content.of(mapped), quenched(mapped, units)
         else:
-            planes = computed(hammer, progress=tell, **passed)
+            planes = computed(hammer, progress=tell, **firing, **passed)
             status, content, rows = planes.status, Content.of(planes), led(planes, box, units)
     return Answer(
         [facts(rows)],

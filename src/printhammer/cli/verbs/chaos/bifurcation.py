@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from printhammer.cli import options as opt
+from printhammer.cli.firing import firing_of
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
 from printhammer.cli.screen import Column, table
 from printhammer.errors import InputError
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from printhammer.chaos.bifurcation.diagram import Bifurcation
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing
 
 _RANGE: Final = ("0.8 ms", "1.35 ms")
 _PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
@@ -39,6 +41,7 @@ _of = partial(opt.text, panel=_PARAMETER)
         "transient": opt.whole("Firings left out at the beginning (all but 200; a third, if that is more)."),
         "refine": opt.whole("Halve the steps between neighbours that differ so often.", default=2),
         "overlap": opt.overlapping(_PARAMETER),
+        "drive": opt.source("A drive file: a force without end, or pulses.", panel=_PARAMETER),
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
@@ -46,7 +49,7 @@ _of = partial(opt.text, panel=_PARAMETER)
 )
 def bifurcation(
     job: Job,
-    hammer: Hammer = opt.FIRED,
+    hammer: Hammer = opt.HAMMER,
     parameter: str = _of("NAME", "period, rate, or any constant such as backstop.damping.", default="period"),
     lowest: str | None = opt.LOWEST,
     highest: str | None = opt.HIGHEST,
@@ -71,7 +74,14 @@ def bifurcation(
     from printhammer.chaos.bifurcation.bifurcation import bifurcation as computed
 
     start: Any = direction.replace("-", " ")
-    axis = _axis(hammer, parameter, (lowest, highest), values, period, rate)
+    timed = parameter in ("period", "rate")
+    if timed and (period is not None or rate is not None):
+        raise InputError(f"--period and --rate: expected none of them where the {parameter} is changed")
+    passed |= {"period": period, "rate": rate}
+    firing = firing_of(job, hammer, passed, "--period '1.05 ms'", timed=not timed)
+    if timed and "drive" not in firing:
+        firing["period"] = None
+    axis = _axis(hammer, parameter, (lowest, highest), values, firing)
     passed |= {"firings": firings, "exponents": exponents}
     # With few firings at first, trains that settle slowly pass for undecided.
     passed.setdefault("transient", max(firings - _JUDGED, firings // 3))
@@ -98,8 +108,7 @@ def _axis(
     parameter: str,
     ends: tuple[str | None, str | None],
     count: int,
-    period: str | None,
-    rate: str | None,
+    firing: Firing,
 ) -> dict[str, Any]:
     """Return the parameter and its values as arguments of `printhammer.bifurcation`."""
     import numpy as np
@@ -108,13 +117,13 @@ def _axis(
     from printhammer.run.regime import Regime
 
     timed = parameter in ("period", "rate")
-    if timed and (period is not None or rate is not None):
-        raise InputError(f"--period and --rate: expected none of them where the {parameter} is changed")
-    regime = Regime.of(hammer, period=_RANGE[0] if timed else period, rate=rate)
+    forced = firing.get("drive") is not None
+    at_first: Firing = {**firing, "period": _RANGE[0]} if timed and not forced else firing
+    regime = Regime.of(hammer, **at_first)
     regime.value(parameter)
     unit = regime.quantity(parameter).si
     first, last = ends
-    if parameter == "period":
+    if parameter == "period" and not forced:
         first, last = first or _RANGE[0], last or _RANGE[1]
     if first is None or last is None:
         raise InputError(f"--from and --to: expected both of them for {parameter}, in {unit}")
@@ -126,8 +135,8 @@ def _axis(
         )
     grid = np.linspace(low, high, count)
     if timed:
-        return {f"{parameter}s": grid}
-    return {"parameter": parameter, "values": grid, "period": period, "rate": rate}
+        return {f"{parameter}s": grid, **firing}
+    return {"parameter": parameter, "values": grid, **firing}
 
 
 def counted(result: Bifurcation) -> str:

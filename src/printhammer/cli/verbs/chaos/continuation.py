@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from printhammer.cli import options as opt
+from printhammer.cli.firing import firing_of
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, multiplier, table
 from printhammer.errors import InputError
@@ -42,13 +43,14 @@ def read_state(written: str, name: str) -> tuple[float, float]:
     {
         "most": opt.whole("Steps in either direction.", default=1000),
         "overlap": opt.overlapping(),
+        "drive": opt.DRIVE,
         "tolerance": opt.TOLERANCE,
     },
     out=opt.results("Branches"),
 )
 def continue_(
     job: Job,
-    hammer: Hammer = opt.FIRED,
+    hammer: Hammer = opt.HAMMER,
     parameter: str = opt.text(
         "NAME", "'rate', 'period' or a key such as 'backstop.damping'.", default="rate"
     ),
@@ -83,25 +85,35 @@ def continue_(
     from printhammer.chaos.continuation.regimes import InterruptedBranches
     from printhammer.chaos.continuation.regimes import regimes as all_regimes
     from printhammer.chaos.continuation.stability_chart import stability_chart
+    from printhammer.run.regime import Regime
 
     bounds = _both(lowest, highest, "--from", "--to", parameter)
     if regimes and (period, rate, firings, state, second) != (None,) * 5:
         raise InputError("--regimes: expected no --period, --rate, --firings, --state or --second beside it")
     if regimes and parameter != "rate":
         raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes")
-    if not regimes:
-        opt.need_one({"period": period, "rate": rate}, "--period '1.3 ms'")
+    passed |= {"period": period, "rate": rate}
+    firing = firing_of(job, hammer, passed, "--period '1.3 ms'", timed=not regimes)
     ends = None if second is None else _both(second_from, second_to, "--second-from", "--second-to", second)
     interrupted = False
     try:
         if regimes:
             with job.counting("regimes", remaining=False) as tell:
+                fired = Regime.of(hammer, **firing) if "drive" in firing else hammer
                 result = all_regimes(
-                    hammer, bounds, longest=longest, seeds=seeds, doublings=doublings, progress=tell, **passed
+                    fired,
+                    bounds,
+                    longest=longest,
+                    seeds=seeds,
+                    doublings=doublings,
+                    waveform=firing.get("waveform"),
+                    overlap=firing.get("overlap"),
+                    progress=tell,
+                    **passed,
                 )
         else:
-            start = {"period": period, "rate": rate, "firings": firings, "state": state, "phase": phase}
-            result = _followed(job, hammer, parameter, bounds, doublings, **start, **passed)
+            start = {"firings": firings, "state": state, "phase": phase}
+            result = _followed(job, hammer, parameter, bounds, doublings, **firing, **start, **passed)
     except InterruptedBranches as interrupt:
         interrupted, result = True, interrupt.branches
     job.show(*described(result))

@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
+from printhammer.cli.firing import firing_of
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
 from printhammer.cli.screen import Column, coloured, facts, table, train_line
 from printhammer.errors import InputError
@@ -29,6 +30,7 @@ _trains = partial(opt.text, panel=_TRAINS)
     "printhammer lyapunov hendriks-1983 --period '1.10 ms, 1.30 ms' --firings 300",
     {
         "overlap": opt.overlapping(_TRAINS),
+        "drive": opt.source("A drive file instead: a force without end, or pulses.", panel=_TRAINS),
         "firings": opt.whole("Firings over which growth is averaged.", default=1000),
         "transient": opt.whole("Firings left out before.", default=1000),
         "tolerance": opt.TOLERANCE,
@@ -37,7 +39,7 @@ _trains = partial(opt.text, panel=_TRAINS)
 )
 def lyapunov(
     job: Job,
-    hammer: Hammer = opt.FIRED,
+    hammer: Hammer = opt.HAMMER,
     period: str | None = _trains("TIMES", "Times between firings, such as '1.10 ms, 1.30 ms'."),
     rate: str | None = _trains("RATES", "Firings per second, such as '952 Hz'."),
     lowest: str | None = _trains(
@@ -55,14 +57,24 @@ def lyapunov(
     from printhammer.chaos import LyapunovChart, lyapunovs
     from printhammer.chaos import lyapunov as exponents_of
 
-    periods = _periods(period, rate, lowest, highest, steps)
-    if len(periods) == 1:
-        single = exponents_of(hammer, period=float(periods[0]), **passed)
+    if passed.get("drive") is None:
+        firing = firing_of(job, hammer, passed, timed=False)
+        periods = _periods(period, rate, lowest, highest, steps)
+    else:
+        more = {"period": period, "rate": rate, "from": lowest, "to": highest, "steps": steps}
+        opt.refuse(more, "none beside --drive")
+        firing, periods = firing_of(job, hammer, passed), None
+    if periods is None or len(periods) == 1:
+        if periods is not None:
+            firing["period"] = float(periods[0])
+        single = exponents_of(hammer, **firing, **passed)
         chart, plot = LyapunovChart.of([single]), single.plot
         shown: list[Table | str] = [facts(summary(single))]
     else:
         with job.counting("trains") as tell:
-            chart = lyapunovs(hammer, periods, threads=threads, progress=tell, **passed)
+            chart = lyapunovs(
+                hammer, periods, overlap=firing.get("overlap"), threads=threads, progress=tell, **passed
+            )
         plot = chart.plot
         shown = [table(_columns(chart), range(len(chart.period)), most=_MOST_ROWS)]
         shown += ["", tally(chart)]

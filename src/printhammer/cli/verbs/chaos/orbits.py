@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
+from printhammer.cli.firing import firing_of
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, multiplier, table, train_line
 
@@ -41,24 +42,25 @@ _COLUMNS: Final[tuple[Column[Orbit], ...]] = (
     "orbits",
     "printhammer orbits hendriks-1983 --period '1.05 ms' --longest 4 --out orbits.csv",
     {
-        **opt.TRAIN,
+        **opt.FIRED_TRAIN,
         "longest": _search("Most firings after which a motion repeats.", default=8),
         "starts": _search("States from which motions are followed.", default=1024),
         "guesses": _search("Guesses that are tried for each number of firings.", default=48),
+        "follow": _search("Most firings of orbits through which branches are followed.", default=2),
         "tolerance": opt.TOLERANCE,
     },
     out=opt.results("Orbits"),
 )
-def orbits(job: Job, hammer: Hammer = opt.FIRED, units: Units = opt.UNITS, **passed: Any) -> Answer:
+def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
     """Search for the motions that repeat after some firings, stable or not, and tell what they do.
 
     Ends with status 1 where none was found.
     """
     from printhammer.chaos.orbits.search import orbits as search
 
-    opt.need_one(passed, "--period '1.05 ms'")
+    firing = firing_of(job, hammer, passed, "--period '1.05 ms'")
     with job.counting("orbits", remaining=False) as tell:
-        result = search(hammer, progress=tell, **passed)
+        result = search(hammer, progress=tell, **firing, **passed)
     regime = result.regime
     shown: list[Table | str] = [table(_COLUMNS, result, units), ""] if len(result) else []
     missing = "no periodic orbit was found; more --starts or --guesses may find one"

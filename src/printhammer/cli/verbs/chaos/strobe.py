@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.cli import options as opt
-from printhammer.cli.runner import Answer, Content, verb
+from printhammer.cli.firing import firing_of
+from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import facts, repeated, train_line
 from printhammer.cli.units import Units, range_with_unit
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     "strobe",
     "printhammer strobe hendriks-1983 --period '1.10 ms' --points 200 --out points.csv",
     {
-        **opt.TRAIN,
+        **opt.FIRED_TRAIN,
         "points": opt.whole("Number of points.", default=200),
         "transient": opt.whole("Firings left out before the first.", default=0),
         "phase": opt.number("Part of the period between a firing and its point, from 0 to 1.", metavar="P"),
@@ -27,15 +28,15 @@ if TYPE_CHECKING:
     },
     out=opt.results("Points"),
 )
-def strobe(hammer: Hammer = opt.FIRED, units: Units = opt.UNITS, **passed: Any) -> Answer:
+def strobe(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
     """Fire a hammer without end and tell what its state is at each firing: periodic, or strange.
 
     Ends with status 1 where the run stopped before its end.
     """
     from printhammer.chaos import strobe as points_of
 
-    opt.need_one(passed, "--period '1.10 ms'")
-    result = points_of(hammer, **passed)
+    firing = firing_of(job, hammer, passed, "--period '1.10 ms'")
+    result = points_of(hammer, **firing, **passed)
     drive = result.drive
     return Answer(
         [facts(summary(result, units))],

@@ -1,0 +1,116 @@
+"""The periodic orbits that a search has found, and how sure it is that there are no others."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, orbits_table
+from printhammer.results import Column, Result, part, scalar
+from printhammer.results.stacking import stacked
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    import pandas as pd
+
+    from printhammer.run.regime import Regime
+
+
+class Orbits(Result):
+    """The periodic orbits that a search has found, and what became of the search.
+
+    That an orbit is not among them does not prove that there is none.
+    """
+
+    regime: Regime = part("hammer and periodic drive")
+    found: tuple[Orbit, ...] = part("the orbits, by number of firings, stable ones first")
+    longest: int = scalar("1", "largest number of firings that was looked for")
+    starts: int = scalar("1", "number of motions in which close returns were looked for")
+    guesses: tuple[int, ...] = scalar("1", "number of guesses for orbits of 1, 2, ... firings")
+    repeats: int = scalar("1", "how many guesses led to an orbit of another one, or to one of fewer firings")
+    hits: tuple[int, ...] = scalar("1", "how many guesses led to each orbit")
+    failures: Mapping[str, int] = part("how many guesses led nowhere, by reason")
+    tolerance: float = part("tolerance of the integration")
+
+    @property
+    def title(self) -> str:
+        """One line that says what the orbits are."""
+        return f"periodic orbits of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def __iter__(self) -> Iterator[Orbit]:
+        return iter(self.found)
+
+    def __getitem__(self, place: int) -> Orbit:
+        return self.found[place]
+
+    @property
+    def stable(self) -> tuple[Orbit, ...]:
+        """Those that are stable."""
+        return tuple(orbit for orbit in self.found if orbit.kind == STABLE)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of orbits of each kind that there is."""
+        counts = Counter(orbit.kind for orbit in self.found)
+        return {kind: counts[kind] for kind in KINDS if counts[kind]}
+
+    @property
+    def coverage(self) -> float:
+        """Estimated share of further guesses that close which would lead to one of the list; NaN without any.
+
+        One less the share of those that led to an orbit to which no other one did (I. J. Good, Biometrika 40
+        (1953) 237).
+        """
+        return 1.0 - self.hits.count(1) / sum(self.hits) if self.hits else math.nan
+
+    @property
+    def unseen(self) -> float:
+        """Estimated least number of orbits that are not in the list.
+
+        f1 (f1 - 1) / (2 (f2 + 1)), with f1 orbits to which one guess led and f2 to which two did (A. Chao,
+        Scand. J. Statist. 11 (1984) 265). Of orbits to which no guess leads it knows nothing.
+        """
+        once, twice = self.hits.count(1), self.hits.count(2)
+        return 0.5 * once * max(once - 1, 0) / (twice + 1)
+
+    @property
+    def message(self) -> str:
+        """What was found and what became of the other guesses, in one line."""
+        what = ", ".join(f"{number} {kind}" for kind, number in self.counts.items())
+        count = len(self.found)
+        most = "1 firing" if self.longest == 1 else f"up to {self.longest} firings"
+        head = f"{count or 'no'} orbit{'' if count == 1 else 's'} of {most}"
+        tried = f"{sum(self.guesses)} guesses in motions from {self.starts} states"
+        ends = [f"{self.repeats} led to one of these again"] if self.repeats else []
+        ends += [f"{number}: {reason}" for reason, number in sorted(self.failures.items())]
+        sure = (
+            f"; {100.0 * self.coverage:.1f} % of further guesses that close would lead to these again,"
+            f" {self.unseen:.1f} orbits or more are estimated to be missing"
+            if count
+            else ""
+        )
+        return f"{head}{f' ({what})' if what else ''}; {tried}{': ' if ends else ''}{'; '.join(ends)}{sure}"
+
+    def notes(self) -> dict[str, Any]:
+        """Return what became of the search, for the attributes of the Dataset."""
+        ends = "; ".join(f"{number}: {reason}" for reason, number in sorted(self.failures.items()))
+        return {"failures": ends, "search": self.message}
+
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return what is known of the orbits over `orbit`, `firing` and `multiplier`.
+
+        Beyond the last firing of an orbit numbers are NaN, and the mode is -1.
+        """
+        number = Column("1", "number of the orbit", ("orbit",), "coordinate", name="orbit", dtype=np.int32)
+        return {"orbit": (number, np.arange(len(self.found))), **stacked(self.found, "orbit", Orbit)}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each firing of each orbit."""
+        return orbits_table(self.found, self.attributes)

@@ -1,0 +1,323 @@
+"""The stages of a search for orbits: blocks of starts, batches of guesses, branches through orbits."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.orbits.along import crossings
+from printhammer.chaos.orbits.collection import Orbits
+from printhammer.chaos.orbits.guesses import (
+    PHASES,
+    Records,
+    close_returns,
+    first_state,
+    joined,
+    record,
+    spread,
+)
+from printhammer.chaos.orbits.maps import ExactMaps, FastMaps
+from printhammer.chaos.orbits.newton import Closing, Guess, close_orbits
+from printhammer.chaos.orbits.orbit import KINDS, Orbit, orbit_of
+from printhammer.run.problem import TOLERANCE
+from printhammer.support.threads import Progress, mapped
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+
+_LONG: Final = 400
+"""Firings of the train from rest in which close returns are looked for."""
+_BLOCKS: Final = (128, 1024)
+_BATCHES: Final = (8, 48)
+"""Numbers of starts and of guesses to which more are made up, the last doubled on and on."""
+_EVEN: Final = 8
+"""Firings up to which fewer of them have more guesses in proportion."""
+_JOINED: Final = 48
+"""Guesses made of two shorter orbits that a stage tries for each number of firings, at most."""
+_SAME: Final = 1e-6
+"""Distance, in half-widths of the window, up to which states of two orbits are one."""
+_FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
+_EXACT: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 8}
+LONE: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 60}
+
+
+def shortest(closing: Closing, scales: FloatArray) -> Closing:
+    """Return an orbit that is not the repeat of a shorter one."""
+    ends = np.cumsum(closing.firings)
+    total = int(ends[-1])
+    for k in range(1, len(closing.states)):
+        after = int(ends[k - 1])
+        gap = float(np.abs((closing.states[k] - closing.states[0]) / scales).max())
+        if total % after == 0 and gap <= _SAME:
+            parts = closing.states[:k], closing.firings[:k], closing.jacobians[:k]
+            return Closing(*parts, closing.residual, closing.smooth, closing.reason)
+    return closing
+
+
+@dataclass
+class _Known:
+    """An orbit that is known: how many guesses led to it, in which stages of the search."""
+
+    closing: Closing
+    stages: list[tuple[int, int]]
+    hits: int = 1
+
+    def visible(self, block: int, batch: int) -> bool:
+        """Tell whether it was found with no more starts and no more guesses than a stage has."""
+        return any(i <= block and j <= batch for i, j in self.stages)
+
+
+@dataclass
+class Search:
+    """A search that is under way.
+
+    It goes in stages: starts come in blocks and guesses in batches, and what a stage finds depends on stages
+    of no more starts and no more guesses alone. So with more of either no orbit is lost.
+    """
+
+    regime: Regime
+    longest: int
+    several: int
+    follow: int
+    tolerance: float
+    threads: int
+    progress: Progress | None
+
+    def __post_init__(self) -> None:
+        self.scales = self.regime.window.half_widths
+        self.failures: Counter[str] = Counter()
+        self.tried = [0] * self.longest
+        self.repeats = 0
+        self.done, self.all = 0, 1
+
+    def run(self, starts: int) -> Orbits:
+        """Search in motions from at least so many states."""
+        self.blocks, self.batches = _steps(_BLOCKS, starts), _steps(_BATCHES, self.several)
+        rest = np.array([first_state(self.regime)])
+        self.all = 3 + 2 * self.longest * len(self.blocks) * len(self.batches)
+        (settling, *_others) = record(self.regime, rest, 1, _LONG, self.threads)
+        begun = np.vstack([rest, spread(self.regime, self.blocks[-1], settling.states[0])])
+        records = record(self.regime, begun, 2 * self.longest, _LONG, self.threads)
+        self._tell(1)
+        known: list[tuple[Regime, _Known]] = []
+        for place, (phase, kept) in enumerate(zip(PHASES, records, strict=True)):
+            inside = np.isfinite(records[0].states).all(axis=2) & ~records[0].usable
+            if place and not inside.any():
+                continue
+            regime = replace(self.regime, phase=phase)
+            known += [(regime, orbit) for orbit in self._through(regime, kept)]
+        self._tell(self.all - self.done - 2)
+        described: list[tuple[Orbit, int]] = []
+        self._describe(described, known)
+        self._tell(1)
+        if self.follow:
+            self._along(described)
+        self._tell(1)
+        ordered = sorted(
+            described,
+            key=lambda pair: (pair[0].firings, KINDS.index(pair[0].kind), *pair[0].x, *pair[0].v),
+        )
+        return Orbits(
+            regime=self.regime,
+            found=tuple(orbit for orbit, _hits in ordered),
+            longest=self.longest,
+            starts=len(begun),
+            guesses=tuple(self.tried),
+            repeats=self.repeats,
+            hits=tuple(hits for _orbit, hits in ordered),
+            failures=dict(self.failures),
+            tolerance=self.tolerance,
+        )
+
+    def _tell(self, more: int) -> None:
+        self.done += more
+        if self.progress is not None:
+            self.progress(self.done, self.all)
+
+    def _through(self, regime: Regime, records: Records) -> list[_Known]:
+        """Return the different orbits through one section."""
+        fast = FastMaps(regime, TOLERANCE, self.longest, self.threads)
+        different: list[_Known] = []
+        ends = np.cumsum([1 + self.blocks[0], *np.diff(self.blocks)])
+        for block, (begin, end) in enumerate(itertools.pairwise([0, *ends.tolist()])):
+            part = Records(records.states[begin:end], records.usable[begin:end])
+            lists = [
+                close_returns(part, period, _share(self.batches[-1], period), self.scales)
+                for period in range(1, self.longest + 1)
+            ]
+            for batch in range(len(self.batches)):
+                for period, both in enumerate(lists, 1):
+                    tried = [guess for guesses in both for guess in self._batch(guesses, batch, period)]
+                    tried += self._joined(different, period, (block, batch))
+                    self._try(fast, different, tried, (block, batch))
+                    self._tell(1)
+        return self._refined(regime, different)
+
+    def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
+        """Return that part of some guesses that is new in a batch."""
+        begin, end = (_share(count, period) // 2 for count in (0, *self.batches)[batch : batch + 2])
+        return guesses[begin:end]
+
+    def _joined(self, different: list[_Known], period: int, stage: tuple[int, int]) -> list[Guess]:
+        """Return guesses from pairs of the orbits of a stage that no stage before has joined."""
+        block, batch = stage
+        seen = [orbit for orbit in different if orbit.visible(block, batch)]
+        before = [
+            {k for k, orbit in enumerate(seen) if orbit.visible(i, j)}
+            for i, j in ((block - 1, batch), (block, batch - 1))
+        ]
+        known = {pair for places in before for pair in itertools.combinations(sorted(places), 2)}
+        return joined([orbit.closing for orbit in seen], period, _JOINED, self.scales, known)
+
+    def _try(
+        self, maps: ExactMaps | FastMaps, different: list[_Known], tried: list[Guess], stage: tuple[int, int]
+    ) -> None:
+        """Close guesses, and add what is new."""
+        options = _FAST if isinstance(maps, FastMaps) else LONE
+        for guess in tried:
+            self.tried[int(guess.firings.sum()) - 1] += 1
+        for closing in _closed(maps, tried, self.scales, options):
+            self._add(different, _Known(closing, [stage]))
+
+    def _refined(self, regime: Regime, different: list[_Known]) -> list[_Known]:
+        """Return orbits closed with the tolerance that was asked for."""
+        exact = ExactMaps(regime, self.tolerance, self.threads)
+        refined: list[_Known] = []
+        closings = _closed(exact, [orbit.closing for orbit in different], self.scales, _EXACT)
+        for orbit, closing in zip(different, closings, strict=True):
+            self._add(refined, replace(orbit, closing=closing))
+        return refined
+
+    def _add(self, different: list[_Known], new: _Known) -> None:
+        """Add an orbit that closes unless it is among them: orbits that share a state are one."""
+        if not new.closing.closed:
+            self.failures[new.closing.reason] += 1
+            return
+        closing = shortest(new.closing, self.scales)
+        for other in different:
+            gaps = np.abs((other.closing.states[:, np.newaxis] - closing.states) / self.scales).max(axis=2)
+            if gaps.min() <= _SAME:
+                self.repeats += 1
+                other.hits += new.hits
+                other.stages += [stage for stage in new.stages if stage not in other.stages]
+                if closing.firings.sum() < other.closing.firings.sum():
+                    other.closing = closing
+                return
+        different.append(replace(new, closing=closing))
+
+    def _repeats(self, orbit: Orbit) -> bool:
+        """Tell whether an orbit that was closed as a whole repeats after a part of its firings."""
+        return any(
+            self._same(orbit, replace(orbit, x=orbit.x[[k]], v=orbit.v[[k]], memory=orbit.memory[[k]]))
+            for k in range(1, orbit.firings)
+            if orbit.firings % k == 0
+        )
+
+    def _describe(self, described: list[tuple[Orbit, int]], known: Sequence[tuple[Regime, _Known]]) -> None:
+        """Add all about orbits, without those that were found at another section too."""
+        orbits = mapped(lambda pair: orbit_of(pair[0], pair[1].closing, self.tolerance), known, self.threads)
+        for orbit, (_regime, own) in zip(orbits, known, strict=True):
+            if not orbit.ok:
+                self.failures[orbit.status] += 1
+                continue
+            if self._repeats(orbit):
+                self.repeats += 1
+                continue
+            for place, (other, hits) in enumerate(described):
+                if self._same(orbit, other):
+                    self.repeats += 1
+                    described[place] = other, hits + own.hits
+                    break
+            else:
+                described.append((orbit, own.hits))
+
+    def _along(self, described: list[tuple[Orbit, int]]) -> None:
+        """Add the orbits to which branches through the known ones lead, and what these are joined to."""
+        first = [orbit for orbit, _hits in described]
+        short = [orbit for orbit in first if orbit.firings <= self.follow and orbit.smooth]
+        states = mapped(crossings, short, self.threads)
+        for orbit, ways in zip(short, states, strict=True):
+            exact = ExactMaps(orbit.regime, self.tolerance, 1)
+            different: list[_Known] = []
+            firings = np.array([orbit.firings])
+            self._try(exact, different, [Guess(state[np.newaxis], firings) for state in ways], (0, 0))
+            self._describe(described, [(orbit.regime, known) for known in different])
+        by_phase: dict[float, list[Orbit]] = {}
+        for orbit, _hits in described:
+            by_phase.setdefault(orbit.phase, []).append(orbit)
+        for phase, every in by_phase.items():
+            # Pairs of the first ones have had their turn; they come first.
+            old = sum(orbit.phase == phase for orbit in first)
+            if old == len(every):
+                continue
+            known = set(itertools.combinations(range(old), 2))
+            exact = ExactMaps(every[0].regime, self.tolerance, self.threads)
+            closings = [_guess(orbit, exact) for orbit in every]
+            tried = [
+                guess
+                for period in range(2, self.longest + 1)
+                for guess in joined(closings, period, _JOINED, self.scales, known)
+            ]
+            different = []
+            self._try(exact, different, tried, (0, 0))
+            self._describe(described, [(every[0].regime, known) for known in different])
+
+    def _same(self, orbit: Orbit, other: Orbit) -> bool:
+        if orbit.firings != other.firings:
+            return False
+        gaps = np.maximum(
+            np.abs(orbit.x[0] - other.x) / self.scales[0], np.abs(orbit.v[0] - other.v) / self.scales[1]
+        )
+        nearest = int(np.argmin(gaps))
+        memory = abs(orbit.memory[0] - other.memory[nearest]) / self.scales[0]
+        return bool(max(gaps[nearest], memory) <= _SAME and orbit.branch[0] == other.branch[nearest])
+
+
+def _share(guesses: int, period: int) -> int:
+    """Return how many guesses are tried for a number of firings: as much work for each where few."""
+    return guesses * max(1, _EVEN // period)
+
+
+def _steps(ladder: Sequence[int], most: int) -> list[int]:
+    """Return the rungs of a ladder, doubled on from its last, up to the first that is at least `most`."""
+    rungs = list(ladder)
+    while rungs[-1] < most:
+        rungs.append(2 * rungs[-1])
+    return rungs[: 1 + next(k for k, rung in enumerate(rungs) if rung >= most)]
+
+
+def _guess(orbit: Orbit, maps: ExactMaps) -> Guess:
+    """Return the states of an orbit at its sections; its first alone where one falls into the pack."""
+    states = [orbit.section]
+    for _ in range(orbit.firings - 1):
+        images = maps(states[-1][np.newaxis], np.ones(1, np.int64))
+        if images.reasons[0]:
+            return Guess(orbit.section[np.newaxis], np.array([orbit.firings]))
+        states.append(images.states[0])
+    return Guess(np.array(states), np.ones(orbit.firings, np.int64))
+
+
+def _closed(
+    maps: ExactMaps | FastMaps,
+    tried: Sequence[Guess],
+    scales: FloatArray,
+    options: Mapping[str, Any],
+) -> list[Closing]:
+    """Return what becomes of guesses, in their order; those with as many segments are closed together."""
+    known: dict[int, Closing] = {}
+    counts = [len(guess.firings) for guess in tried]
+    for segments in sorted(set(counts)):
+        rows = [i for i, count in enumerate(counts) if count == segments]
+        states, firings = (
+            np.array([getattr(tried[i], name) for i in rows]) for name in ("states", "firings")
+        )
+        closings = close_orbits(maps, states, firings, scales, **options)
+        known |= dict(zip(rows, closings, strict=True))
+    return [known[i] for i in range(len(tried))]
