@@ -29,7 +29,7 @@ export function forcesView(body, studio) {
   return curveView(body, studio, {
     label: "Forces against time",
     series: () => FORCES.map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
-    scales: (frame) => ({ x: widened(...FORCES.slice(1).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
+    scales: (frame) => ({ x: widened(...FORCES.reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
     under: () => {},
   });
 }

@@ -28,5 +28,5 @@ function connect() {
   socket.onclose = (event) => studio.lost(event.reason, connect);
 }
 // So that the keys work from the start.
-studio.studio.parts.grid.focus();
+studio.studio.parts.grid.focus({ preventScroll: true });
 connect();

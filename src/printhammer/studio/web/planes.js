@@ -1,5 +1,5 @@
 // Phase plane, force-displacement loops and strobe section.
-import { axes, before, curve, dots, extent, inside, key, refusal, widened } from "./axes.js";
+import { axes, before, broken, curve, dots, extent, inside, key, refusal, widened } from "./axes.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { digits, unitOf } from "./units.js";
@@ -111,7 +111,10 @@ export function strobeView(body, studio) {
     const around = ([low, high], least) => (high - low < least ? [0.5 * (low + high - least), 0.5 * (low + high + least)] : [low, high]);
     const spread = studio.frames.motion ? [extent(studio.frames.motion.data.x), extent(studio.frames.motion.data.v)] : [[0, 1e-4], [0, 1]];
     const [xe, ve] = [around(extent(xs), 0.3 * (spread[0][1] - spread[0][0])), around(extent(vs), 0.3 * (spread[1][1] - spread[1][0]))];
-    const margin = { left: 46, right: 10, top: 22, bottom: 32 };
+    pen.font = FONT;
+    const told = strobeText(frame);
+    const lines = broken(pen, told, width - 12);
+    const margin = { left: 46, right: 10, top: 8 + 14 * lines.length, bottom: 32 };
     const plane = axes(pen, width, height, displacementAxis(...widened(...xe)), velocityAxis(...widened(...ve)), margin);
     inside(pen, plane);
     const settled = Math.min(SETTLING, xs.length);
@@ -126,8 +129,6 @@ export function strobeView(body, studio) {
     pen.fillStyle = c.ink;
     pen.textAlign = "left";
     pen.textBaseline = "top";
-    const told = strobeText(frame);
-    const lines = pen.measureText(told).width < width - 12 ? [told] : told.split(/, (?=exponent)/);
     lines.forEach((text, k) => pen.fillText(text, 6, 5 + 14 * k));
     pen.restore();
   }, () => {

@@ -4,7 +4,7 @@ export const VIEWS = ["motion", "sketch", "map", "forces", "phase", "strobe", "l
 const NUMBERS = ["rate", "pulses", "low", "high"];
 const TEXTS = ["hammer", "text", "pattern", "overlap", "line"];
 const JOINED = 700; // ms within which changes of one control are one step of the history
-const DEEPEST = 200;
+export const DEEPEST = 200; // steps of the history
 
 export const START = Object.freeze({
   hammer: "", text: "", constants: {}, waveform: null, rate: 1200, pulses: 9, pattern: "", overlap: "add",
