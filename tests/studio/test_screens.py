@@ -87,3 +87,37 @@ def test_controls_are_a_sheet_on_a_phone(page: Page) -> None:
     assert box["width"] >= 150
     assert 400 < box["y"] < 844
     assert page.run("document.querySelector('.sheet').getAttribute('aria-expanded')") == "true"
+
+
+@pytest.mark.slow
+def test_forced_colours_leave_everything_to_be_seen(page: Page, tmp_path: Path) -> None:
+    """With colours that a user forces, curves and pressed buttons are still apart from their ground."""
+    page.prefer(
+        {"forced-colors": "active", "prefers-color-scheme": "dark", "prefers-reduced-motion": "reduce"}
+    )
+    page.run(HELPERS)
+    page.run(DRAWN)
+    page.picture(tmp_path / "forced.png")
+    for view in ("motion", "forces", "phase", "map", "line"):
+        assert page.run(f"helpers.inked({view!r})") > 3, view
+    colours = (
+        "((each) => { const style = getComputedStyle(each); return [style.backgroundColor, style.color]; })"
+    )
+    pressed, other = (
+        page.run(f"{colours}(document.querySelector('{selector}'))")
+        for selector in (".chooser [aria-pressed=true]", ".pin")
+    )
+    assert pressed != other
+    assert pressed[0] != pressed[1]
+    assert page.complaints == []
+
+
+@pytest.mark.slow
+def test_what_is_outdated_is_dimmed_and_says_why(page: Page) -> None:
+    page.run("document.querySelector('.view-map').classList.add('outdated')")
+    page.run("document.querySelector('.view-map').dataset.why = 'this still belongs to what was set before'")
+    opacity = "getComputedStyle(document.querySelector('.view-map canvas')).opacity"
+    assert float(page.run(opacity)) < 0.5
+    said = "getComputedStyle(document.querySelector('.view-map'), '::after')"
+    assert "set before" in page.run(f"{said}.content")
+    assert page.run(f"{said}.display") != "none"

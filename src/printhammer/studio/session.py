@@ -18,6 +18,7 @@ from printhammer.studio.frames import frame
 from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, map_key, try_map
 from printhammer.studio.pictures.engine import dots_frame, motion_frame
 from printhammer.studio.pictures.printed import line_frame, line_key
+from printhammer.studio.pictures.questions import QUESTIONS
 from printhammer.studio.pictures.section import (
     AT_ONCE,
     LATER,
@@ -252,12 +253,19 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
     if isinstance(serial, bool) or not isinstance(serial, int) or not 0 < serial < 2**53:
         raise ProtocolError("serial is expected to be a positive whole number")
     contents = {"state": {"state"}, "hammer": {"name", "text"}, "texts": {"state"}, "drop": {"name", "text"}}
+    contents |= {kind: {"state"} for kind in QUESTIONS}
     if not isinstance(kind, str) or kind not in contents:
         raise ProtocolError(f"kind is expected to be one of {', '.join(contents)}")
     if set(message) != {"kind", "serial", *contents[kind]}:
         raise ProtocolError(
             f"a message of kind {kind} has the keys kind, serial, {', '.join(sorted(contents[kind]))}"
         )
+    if kind in QUESTIONS:
+        # A pin of a link may hold anything, and is no reason to end the connection.
+        try:
+            return kind, serial, read_state(message["state"], shelf)
+        except ProtocolError as error:
+            return kind, serial, str(error)
     if "state" in contents[kind]:
         return kind, serial, read_state(message["state"], shelf)
     pair = (message["name"], message["text"])
@@ -281,6 +289,8 @@ def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
             return frame("hammer", serial, hammer=describe(hammer), **heading)
         if kind == "drop":
             return dropped(serial, *content)
+        if kind in QUESTIONS:
+            return refusal(serial, content) if isinstance(content, str) else QUESTIONS[kind](content, serial)
         return frame("texts", serial, texts=texts_of(content))
     except InputError as error:
         return refusal(serial, str(error))

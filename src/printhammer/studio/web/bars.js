@@ -8,6 +8,7 @@ const SIDES = [52, 52]; // the margins of the motion, below which the dots lie
 
 /** Energy that each dot put into the pack, and what the pack kept. */
 export function energyView(body, studio) {
+  let where = null;
   const paint = (pen, width, height) => {
     const frame = studio.frames.dots;
     if (!frame) return;
@@ -20,6 +21,7 @@ export function energyView(body, studio) {
     const words = broken(pen, `coil ${of("coil_work")}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")} ${unit.name}`, width - 12);
     const margin = { left: 46, right: 10, top: 24 + 14 * words.length, bottom: 32 };
     const plane = axes(pen, width, height, { low: 0.5, high: dots.length + 0.5, label: "firing", factor: 1, space: 30, whole: true }, { low: 0, high: 1.08 * most, label: `energy, ${unit.name}`, factor: unit.factor }, margin);
+    where = plane;
     const wide = Math.min((plane.box.w / dots.length) * 0.36, 16);
     dots.forEach((dot, k) => {
       const middle = plane.X(k + 1);
@@ -47,7 +49,12 @@ export function energyView(body, studio) {
     }
     pen.restore();
   };
-  return barsOf(body, studio, "Energy of each dot", paint, () => dotTable(studio, { loading_work: "J", net_loss: "J" }));
+  const view = barsOf(body, studio, "Energy of each dot", paint, () => dotTable(studio, { loading_work: "J", net_loss: "J" }));
+  const timeAt = (x) => {
+    const dot = where && studio.frames.dots?.dots[Math.round(where.x(x)) - 1];
+    return dot ? dot.fired_at + (dot.flight_time ?? 0) : null;
+  };
+  return { ...view, timeAt };
 }
 
 /** The dots of the burst, each below its touch, and the text as it is printed. */
@@ -65,7 +72,14 @@ export function lineView(body, studio) {
     pen.restore();
   };
   const view = barsOf(body, studio, "The line as it is printed", paint, () => (studio.store.state.line.trim() ? lineTable(studio.frames.line) : dotTable(studio, { flight_time: "s", peak_force: "N" })));
-  return { ...view, cursor: view.draw };
+  const timeAt = (x) => {
+    const t = studio.frames.motion?.data.t;
+    if (!t) return null;
+    const [low, high] = studio.window ?? [t[0], t[t.length - 1]];
+    const part = (x - SIDES[0]) / (body.clientWidth - SIDES[0] - SIDES[1]);
+    return part >= 0 && part <= 1 ? low + part * (high - low) : null;
+  };
+  return { ...view, cursor: view.draw, timeAt };
 }
 
 /** The dots of a burst on the time axis of the motion: place by touch, area by force. */

@@ -2,7 +2,7 @@
 import uPlot from "./vendor/uPlot.js";
 import { axes, before, curve, extent, inside, key, line, MARGIN, ticks, widened } from "./axes.js";
 import { colours, FONT } from "./theme.js";
-import { digits, timeUnit, unitOf } from "./units.js";
+import { digits, shown, timeUnit, unitOf } from "./units.js";
 
 const FORCES = ["total", "magnet", "spring", "damping", "backstop", "pack"];
 const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
@@ -73,7 +73,21 @@ function places(pen, plane, box, frame) {
   pen.strokeStyle = c.drive;
   pen.lineWidth = 1;
   for (const fired of frame.fired) line(pen, plane.X(fired), box.y + box.h, plane.X(fired), box.y + box.h - 6);
+  spacing(pen, plane, box, frame.fired, c);
   pen.restore();
+}
+
+/** Write between the first two firings how far they are apart, where there is room. */
+function spacing(pen, plane, box, fired, c) {
+  if (fired.length < 2) return;
+  const [from, to] = [plane.X(fired[0]), plane.X(fired[1])];
+  const text = shown(fired[1] - fired[0], "s", 4);
+  if (to - from < pen.measureText(text).width + 12 || to > box.x + box.w || from < box.x) return;
+  pen.fillStyle = c.drive;
+  pen.textAlign = "center";
+  pen.textBaseline = "bottom";
+  pen.fillText(text, 0.5 * (from + to), box.y + box.h - 7);
+  line(pen, from + 1, box.y + box.h - 4, to - 1, box.y + box.h - 4);
 }
 
 function ghosts(pen, plane, studio) {

@@ -35,7 +35,7 @@ export function lostDots(frame) {
       const begin = Math.ceil((slot / rate / frame.end) * (columns - 1));
       const end = k + 1 < slots.length ? Math.ceil((slots[k + 1] / rate / frame.end) * (columns - 1)) : columns;
       for (let at = Math.max(begin, 1); at < end; at += 1) if (codes[from + at] >= border && codes[from + at - 1] < border) return;
-      found.list.push([row, begin]);
+      found.list.push([row, begin, k]);
       found.first ??= { rate, dot: k + 1 };
     });
   }
@@ -177,7 +177,7 @@ export function mapView(body, studio) {
   canvas.setAttribute("aria-label", "Frequency-time map: firing rate");
   canvas.setAttribute("aria-orientation", "vertical");
   const tip = body.appendChild(document.createElement("div"));
-  tip.className = "tip";
+  tip.className = "tip pointed";
 
   const choose = (event) => {
     if (!plane) return;
@@ -206,12 +206,19 @@ export function mapView(body, studio) {
     const bounds = canvas.getBoundingClientRect();
     if (!frame || !plane) return;
     const [time, rate] = [plane.x(event.clientX - bounds.left), plane.y(event.clientY - bounds.top)];
+    const x = valueAt(time, rate);
+    tip.textContent = x === null ? "" : `${shown(rate, "Hz")}, ${shown(time, "s")}: ${shown(x, "m")}`;
+  }
+
+  /** Return the displacement at a time and a rate, m, or null where the map does not know it. */
+  function valueAt(time, rate) {
+    const frame = studio.frames.map;
+    if (!frame || frame.reason) return null;
     const [rows, columns] = frame.data.codes.shape;
     const row = Math.round(((rate - frame.rates[0]) / (frame.rates[1] - frame.rates[0])) * (rows - 1));
     const column = Math.round((time / frame.end) * (columns - 1));
     const code = row >= 0 && row < rows && column >= 0 && column < columns ? frame.data.codes[row * columns + column] : GAP;
-    const x = frame.low + (code / (GAP - 1)) * (frame.high - frame.low);
-    tip.textContent = code === GAP ? "" : `${shown(rate, "Hz")}, ${shown(time, "s")}: ${shown(x, "m")}`;
+    return code === GAP ? null : frame.low + (code / (GAP - 1)) * (frame.high - frame.low);
   }
 
   let told = null;
@@ -234,6 +241,8 @@ export function mapView(body, studio) {
     cursor: area.draw,
     paint,
     lost: () => lost,
+    valueAt,
+    timeAt: (x) => (plane && x >= plane.box.x && x <= plane.box.x + plane.box.w ? plane.x(x) : null),
     table: () => {
       const frame = studio.frames.map;
       if (!frame || frame.reason) return null;

@@ -9,12 +9,11 @@ import { mapView } from "./map.js";
 import { layout } from "./panels.js";
 import { loopsView, phaseView, strobeView } from "./planes.js";
 import { sketchView } from "./sketch.js";
-import { fromText, START, Store, toText, VIEWS } from "./state.js";
+import { bare, fromText, START, Store, toText, VIEWS } from "./state.js";
 import { readColours } from "./theme.js";
 import { setSystem, setUnits } from "./units.js";
 
 const MAKERS = { motion: motionView, sketch: sketchView, map: mapView, forces: forcesView, phase: phaseView, strobe: strobeView, loops: loopsView, energy: energyView, line: lineView };
-const MOST_GHOSTS = 4;
 const QUICK = ["motion", "forces", "phase"];
 
 /**
@@ -29,6 +28,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   let follow = () => {};
   let writing = 0;
   let begun = false;
+  let before = null;
   let patience = 0;
   const asked = new Map();
 
@@ -47,7 +47,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     studio.busy = true;
     studio.stale = false;
     const now = studio.changedAt ?? performance.now();
-    studio.sentAt.set(message("state", { state: studio.store.state }), now);
+    studio.sentAt.set(message("state", { state: bare(studio.store.state) }), now);
     studio.changedAt = null;
     clearTimeout(patience);
     patience = setTimeout(() => { if (studio.busy) studio.say("computing; laws that are new to this machine are compiled once: some ten seconds before the curves, as many before the map"); }, 1200);
@@ -116,13 +116,6 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     channel.port2.postMessage(0);
   }
 
-  studio.pin = () => {
-    if (!studio.frames.motion) return;
-    studio.ghosts = [...studio.ghosts, { motion: studio.frames.motion, state: studio.store.state }].slice(-MOST_GHOSTS);
-    studio.say(`pinned, ${studio.ghosts.length} of ${MOST_GHOSTS}`);
-    redrawAll();
-  };
-  studio.unpin = () => { studio.ghosts = []; studio.overlay = null; redrawAll(); studio.say("pins taken away"); };
   const redrawAll = () => { for (const name of studio.store.state.views) studio.views[name]?.draw(); };
   studio.units = (system) => { setSystem(system); follow(); redrawAll(); };
   studio.theme = () => { readColours(element.querySelector(".studio")); redrawAll(); follow(); };
@@ -172,8 +165,13 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   studio.store.listeners.add((state) => {
     const wanted = state.text || state.hammer;
     if (wanted !== studio.loaded) { load(state, false); return; }
-    studio.changedAt ??= globalThis.event?.timeStamp ?? performance.now();
-    studio.sendState();
+    // Pins are the page's own.
+    const same = Boolean(before) && Object.keys(state).every((key) => key === "pins" || state[key] === before[key]);
+    before = state;
+    if (!same) {
+      studio.changedAt ??= globalThis.event?.timeStamp ?? performance.now();
+      studio.sendState();
+    }
     follow();
     for (const view of shownViews()) view.update("state");
     studio.layout.show(state.views);

@@ -2,8 +2,11 @@
 import { captionOf, pictureText } from "./captions.js";
 import { element as make } from "./dom.js";
 import { copy, csvOf, pngOf, save, svgOf } from "./exports.js";
+import { findRow } from "./finds.js";
 import { HELP } from "./keys.js";
-import { DEEPEST, VIEWS } from "./state.js";
+import { pinRow } from "./pins.js";
+import { readoutOf } from "./readout.js";
+import { bare, DEEPEST, VIEWS } from "./state.js";
 import { storyRow } from "./stories.js";
 import { tourOf } from "./tour.js";
 
@@ -25,7 +28,7 @@ export function layout(studio, makers) {
   const dialog = make("dialog", { "aria-label": "text" });
   const file = make("input", { type: "file", hidden: true, accept: ".toml,.csv", onchange: () => { for (const each of file.files) studio.drop(each); file.value = ""; } });
   const text = async (kind, action) => {
-    const frame = await studio.ask("texts", { state: studio.store.state });
+    const frame = await studio.ask("texts", { state: bare(studio.store.state) });
     if (frame.kind === "refusal") studio.say(frame.reason, true);
     else action(frame.texts[kind]);
   };
@@ -60,19 +63,20 @@ export function layout(studio, makers) {
   const chooser = make("div", { class: "chooser", role: "group", "aria-label": "views" });
   const bar = make("header", { class: "bar" },
     make("h1", {}, "printhammer studio"), hammers, presets, undo, redo,
-    button("pin", "Pin this run as a ghost (P)", studio.pin, { class: "pin" }), button("unpin", "unpin: take all pins away (U)", studio.unpin),
+    button("pin", "Pin this run, to compare others with it (P)", () => studio.pin(), { class: "pin" }), button("unpin", "unpin: take all pins away (U)", () => studio.unpin()),
     out, button("open", "Open a hammer file or a measured CSV", () => file.click()), make("span", { class: "space" }), chooser, units,
     button("◐", "Light or dark (T)", () => studio.toggleTheme(), { class: "theme" }), button("?", "Keys (?)", () => studio.help(), { class: "help" }), file);
   const sheet = make("button", { type: "button", class: "sheet", "aria-expanded": "false", onclick: () => sheet.setAttribute("aria-expanded", String(side.classList.toggle("open"))) }, "Controls");
   const side = make("aside", { class: "side", "aria-label": "controls" }, sheet, honesty, controls, hint);
   const stories = storyRow(studio);
   const tour = tourOf(studio, stories);
-  const strip = make("nav", { class: "strip", "aria-label": "stories from the paper" }, make("span", { class: "what" }, "From the paper"), ...stories.buttons, make("button", { type: "button", class: "story tour", onclick: tour.begin }, "Tour, two minutes"));
-  const stage = make("div", { class: "stage" }, stories.note, tour.element, grid);
+  const strip = make("nav", { class: "strip", "aria-label": "stories from the paper" }, make("span", { class: "what" }, "From the paper"), ...stories.buttons, make("button", { type: "button", class: "story tour", onclick: tour.begin }, "Tour, two minutes"), make("span", { class: "space" }), findRow(studio));
+  const stage = make("div", { class: "stage" }, stories.note, tour.element, pinRow(studio), grid);
   const page = make("div", { class: "studio" }, bar, strip, side, stage, status, dialog);
   studio.element.classList.add("studio-place");
   studio.element.replaceChildren(page);
   onRatio(() => studio.theme());
+  matchMedia("(forced-colors: active)").addEventListener("change", () => studio.theme());
 
   studio.search = () => {
     side.classList.add("open");
@@ -100,7 +104,7 @@ export function layout(studio, makers) {
       make("h2", {}, make("span", {}, TITLES[name]), leave, button("⤢", `Enlarge ${TITLES[name]}`, () => enlarge(name), { class: "enlarge" })), caption, body);
     (OPENING.includes(name) ? opening : grid).append(panel);
     panels[name] = panel;
-    studio.views[name] = makers[name](body, studio);
+    studio.views[name] = withReadout(name, makers[name](body, studio), body, studio);
     leave.addEventListener("change", () => { leaveView(name, leave.value, body); leave.value = ""; });
     chooser.append(make("button", { type: "button", "aria-pressed": "false", title: TITLES[name], "aria-label": `${VIEWS.indexOf(name) + 1} ${TITLES[name]}`, "data-view": name, onclick: () => toggle(name) }, String(VIEWS.indexOf(name) + 1)));
   }
@@ -167,6 +171,23 @@ export function layout(studio, makers) {
     keepFocus();
   };
   return { page, bar, controls, hint, status, grid, dialog, hammers, honesty, layout: { show, enlarge } };
+}
+
+/** Return a view that tells below its picture what is there at the time of the cursor. */
+function withReadout(name, view, body, studio) {
+  const tip = body.appendChild(make("div", { class: "tip readout" }));
+  const read = () => {
+    const text = readoutOf(name, studio, body.clientWidth > 440);
+    if (tip.textContent !== text) tip.textContent = text;
+  };
+  if (view.timeAt) {
+    body.addEventListener("pointermove", (event) => {
+      const bounds = body.querySelector("canvas").getBoundingClientRect();
+      const time = view.timeAt(event.clientX - bounds.left, event.clientY - bounds.top);
+      if (time !== null) studio.setCursor(time);
+    });
+  }
+  return { ...view, cursor: () => { view.cursor(); read(); }, update: (what) => { view.update(what); read(); } };
 }
 
 /** Do something whenever the screen has another pixel ratio, as on another monitor. */

@@ -6,6 +6,8 @@ const TEXTS = ["hammer", "text", "pattern", "overlap", "line"];
 const JOINED = 700; // ms within which changes of one control are one step of the history
 export const DEEPEST = 200; // steps of the history
 
+export const MOST_PINS = 4;
+
 export const START = Object.freeze({
   hammer: "", text: "", constants: {}, waveform: null, rate: 1200, pulses: 9, pattern: "", overlap: "add",
   low: 500, high: 2000, line: "HAMMER", views: VIEWS,
@@ -34,6 +36,12 @@ export class Store {
     this.tell();
   }
 
+  /** Change what is no step of the history, such as pins. */
+  keep(patch) {
+    this.state = Object.freeze({ ...this.state, ...patch });
+    this.tell();
+  }
+
   /** Begin with a state, without a past. */
   begin(state) {
     this.past = [];
@@ -48,7 +56,8 @@ export class Store {
   step(from, to) {
     if (!from.length) return;
     to.push(this.state);
-    this.state = from.pop();
+    const { pins } = this.state;
+    this.state = Object.freeze({ ...from.pop(), ...(pins ? { pins } : {}) });
     this.last = { control: null, at: 0 };
     this.tell();
   }
@@ -62,14 +71,29 @@ export function toText(state) {
   for (const name of [...TEXTS, ...NUMBERS]) if (state[name] !== START[name]) found.set(name, state[name]);
   for (const [key, value] of Object.entries(state.constants)) found.set(key, value);
   if (state.waveform) found.set("waveform", JSON.stringify(state.waveform));
+  if (state.pins?.length) found.set("pins", JSON.stringify(state.pins.map(({ name, state: pinned }) => ({ name, state: Object.fromEntries(Object.entries(pinned).filter(([key, value]) => JSON.stringify(value) !== JSON.stringify(START[key]))) }))));
   if (state.views.join() !== VIEWS.join()) found.set("views", state.views.join("-"));
   return found.toString();
 }
 
+/** Return a state without what only the page keeps: what the server is told. */
+export function bare({ pins: _pins, ...state }) { return state; }
+
+/** Return the pins of a text; what is none is left out. */
+export function pinsOf(text) {
+  let list = [];
+  try { list = JSON.parse(new URLSearchParams(text).get("pins") ?? "[]"); } catch { /* none */ }
+  if (!Array.isArray(list)) return [];
+  const fine = list.filter((pin) => typeof pin?.name === "string" && typeof pin.state === "object" && pin.state !== null && !Array.isArray(pin.state));
+  return fine.slice(0, MOST_PINS).map(({ name, state }) => ({ name: name.slice(0, 40), state: { ...bare(START), ...bare(state) } }));
+}
+
 /** Return the state that a text tells; what cannot be read stays as at the start. */
 export function fromText(text) {
-  const state = { ...START, constants: {} };
+  const pins = pinsOf(text);
+  const state = { ...START, constants: {}, ...(pins.length ? { pins } : {}) };
   for (const [key, value] of new URLSearchParams(text)) {
+    if (key === "pins") continue;
     if (NUMBERS.includes(key)) { if (Number.isFinite(Number(value))) state[key] = Number(value); }
     else if (TEXTS.includes(key)) state[key] = value;
     else if (key === "waveform") { try { state.waveform = JSON.parse(value); } catch { /* as the hammer's */ } }
