@@ -156,3 +156,19 @@ def test_questions_about_other_states_are_answered_or_refused(paper: Studio) -> 
         assert "state" in frames(socket, "refusal")[-1][0]["reason"]
         say(socket, "dots", 9, state=paper.state(hammer="hendriks-1983"))
         frames(socket, "dots")
+
+
+@pytest.mark.slow
+def test_the_actuator_reads_the_current_of_its_time(opened: Page) -> None:
+    """Points of a curve are not evenly spaced in time."""
+    hammer = ph.load("hendriks-1983")
+    drive = ph.PulseTrain(hammer.waveform, rate=1200, pulses=9)
+    for time in (1.1e-4, 9.6e-4, 6.002e-3):
+        drawn = opened.run(
+            "(() => { const texts = []; const pen = new Proxy({}, { get: (_t, name) => name === 'fillText' ?"
+            " (text) => texts.push(text) : () => ({ width: 10 }), set: () => true });"
+            f" window.studio.studio.cursor = {time}; window.studio.studio.views.sketch.paint(pen, 500, 200);"
+            " return texts.find((text) => / A$/.test(text)); })()"
+        )
+        current = float(drive.value([time])[0])
+        assert float(drawn.split()[-2]) == pytest.approx(current, rel=0.02, abs=2e-3)

@@ -146,3 +146,30 @@ def test_pictures_tell_their_result_to_those_who_do_not_see_them(page: Page) -> 
     assert "N at the backstop" in said["view-forces"]
     assert "lost" in said["view-map"]
     assert all(len(text) > 30 for text in said.values()), said
+
+
+def click(page: Page, selector: str) -> None:
+    """Click in the middle of an element with the mouse."""
+    box = page.box(selector)
+    page.drag((box["x"] + box["width"] / 2, box["y"] + box["height"] / 2))
+
+
+@pytest.mark.slow
+def test_figure_6_takes_two_clicks_and_the_lost_dot_one(opened_browser: Any) -> None:
+    """By the mouse alone, from an empty page."""
+    with studio("hendriks-1983") as running:
+        page = opened_browser()
+        page.size(1440, 900)
+        page.open(running.address)
+        page.wait("window.studio?.studio?.frames.map?.detail === 'full'")
+        struck = "window.studio.studio.frames.dots?.dots.map((dot) => Number(dot.struck)).join('')"
+        click(page, ".story:nth-of-type(2)")
+        page.wait(f"{struck} === '10'")
+        click(page, ".notice .switch:nth-of-type(2)")
+        page.wait(f"{struck} === '11'")
+        click(page, ".notice .shut")
+        click(page, ".find-lost")
+        page.wait(f"{struck}?.slice(0, 3) === '101'")
+        assert page.run(f"{STATE}.rate") == pytest.approx(1512, rel=3e-3)
+        assert page.complaints == []
+        page.call("Page.close")

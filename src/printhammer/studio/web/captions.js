@@ -95,5 +95,6 @@ export function pictureText(name, studio) {
 /** Return what a view tells of the frames that are there; nothing before there are any. */
 export function captionOf(name, studio) {
   const { frames } = studio;
-  return frames.motion ? TEXTS[name](frames, studio) : "";
+  // A number and its unit stay on one line.
+  return frames.motion ? TEXTS[name](frames, studio).replace(/(\d) (?=[%µA-Za-z]{1,3}\b|%)/g, "$1\u00a0") : "";
 }

@@ -246,10 +246,12 @@ function splitsOf(low, high, length, space, factor) { return ticks(low * factor,
 
 function shownIn(u, si) { return si === "s" ? timeUnit(u.scales.t.max - u.scales.t.min) : unitOf(si); }
 
-/** Return the displacement of a motion at a time, between the points next to it. */
-export function displacementAt(frame, time) {
-  const { t, x } = frame.data;
+/** Return a quantity of a motion at a time, between the points next to it. */
+export function valueAt(frame, values, time) {
+  const { t } = frame.data;
   const k = Math.min(before(t, time), t.length - 2);
   const part = t[k + 1] > t[k] ? Math.min(Math.max((time - t[k]) / (t[k + 1] - t[k]), 0), 1) : 0;
-  return x[k] + part * (x[k + 1] - x[k]);
+  return values[k] + part * (values[k + 1] - values[k]);
 }
+
+export const displacementAt = (frame, time) => valueAt(frame, frame.data.x, time);

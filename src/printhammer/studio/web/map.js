@@ -216,9 +216,12 @@ export function mapView(body, studio) {
     if (!frame || frame.reason) return null;
     const [rows, columns] = frame.data.codes.shape;
     const row = Math.round(((rate - frame.rates[0]) / (frame.rates[1] - frame.rates[0])) * (rows - 1));
-    const column = Math.round((time / frame.end) * (columns - 1));
-    const code = row >= 0 && row < rows && column >= 0 && column < columns ? frame.data.codes[row * columns + column] : GAP;
-    return code === GAP ? null : frame.low + (code / (GAP - 1)) * (frame.high - frame.low);
+    const place = (time / frame.end) * (columns - 1);
+    const column = Math.min(Math.floor(place), columns - 2);
+    if (row < 0 || row >= rows || place < 0 || place > columns - 1) return null;
+    const [from, to] = frame.data.codes.subarray(row * columns + column, row * columns + column + 2);
+    if (from === GAP || to === GAP) return null;
+    return frame.low + ((from + (place - column) * (to - from)) / (GAP - 1)) * (frame.high - frame.low);
   }
 
   let told = null;

@@ -1,24 +1,19 @@
 // Pins: runs that stay behind the next ones, by name, kept in the state; and how far two of them are apart.
-import { before } from "./axes.js";
+import { displacementAt } from "./curves.js";
 import { element as make } from "./dom.js";
 import { bare, MOST_PINS } from "./state.js";
 import { shown } from "./units.js";
 
 const NOW = "now";
 
-/** Return the largest distance of two motions, when it is, and what differs in their dots. */
+/** Return the largest distance of two motions, m, and when it is, s. */
 export function distance(one, other) {
   const [a, b] = [one.data, other.data];
   const last = Math.min(a.t.at(-1), b.t.at(-1));
-  const at = ({ t, x }, time) => {
-    const k = Math.min(before(t, time), t.length - 2);
-    const part = t[k + 1] > t[k] ? (time - t[k]) / (t[k + 1] - t[k]) : 0;
-    return x[k] + part * (x[k + 1] - x[k]);
-  };
   let found = { most: 0, when: 0 };
   for (const time of [...a.t, ...b.t]) {
     if (time > last) continue;
-    const away = Math.abs(at(a, time) - at(b, time));
+    const away = Math.abs(displacementAt(one, time) - displacementAt(other, time));
     if (away > found.most) found = { most: away, when: time };
   }
   return found;

@@ -1,13 +1,7 @@
 // What every view tells at the time of the cursor, which is the same in all.
-import { before } from "./axes.js";
-import { displacementAt } from "./curves.js";
+import { displacementAt, valueAt } from "./curves.js";
 import { shown, unitOf } from "./units.js";
 
-const at = ({ t }, values, time) => {
-  const k = Math.min(before(t, time), t.length - 2);
-  const part = t[k + 1] > t[k] ? (time - t[k]) / (t[k + 1] - t[k]) : 0;
-  return values[k] + part * (values[k + 1] - values[k]);
-};
 const small = (value, most) => (Math.abs(value) < 1e-4 * most ? 0 : value);
 
 /** The firing that was the last one before a time, or nothing. */
@@ -18,17 +12,18 @@ function firingAt(motion, time) {
 }
 
 const TEXTS = {
-  motion: ({ motion }, time) => `${shown(time, "s")}: ${shown(displacementAt(motion, time), "m")}, ${shown(at(motion.data, motion.data.v, time), "m/s", 3)}, ${shown(small(at(motion.data, motion.data.drive, time), motion.peak || 1), motion.quantity === "force" ? "N" : "A", 3)}`,
+  motion: ({ motion }, time) => `${shown(time, "s")}: ${shown(displacementAt(motion, time), "m")}, ${shown(valueAt(motion, motion.data.v, time), "m/s", 3)}, ${shown(small(valueAt(motion, motion.data.drive, time), motion.peak || 1), motion.quantity === "force" ? "N" : "A", 3)}`,
   forces: ({ motion }, time, _studio, wide) => {
     const unit = unitOf("N");
     const number = (force) => Number((force * unit.factor).toPrecision(3));
-    const parts = ["magnet", "spring", "pack", "backstop", "damping"].map((name) => [name, small(at(motion.data, motion.data[`F ${name}`], time), 100)]).filter(([, force]) => force).sort((one, other) => Math.abs(other[1]) - Math.abs(one[1]));
-    return `${parts.slice(0, wide ? 5 : 1).map(([name, force]) => `${name} ${number(force)}, `).join("")}total ${number(small(at(motion.data, motion.data["F total"], time), 100))} ${unit.name}`;
+    const parts = ["magnet", "spring", "pack", "backstop", "damping"].map((name) => [name, small(valueAt(motion, motion.data[`F ${name}`], time), 100)]).filter(([, force]) => force).sort((one, other) => Math.abs(other[1]) - Math.abs(one[1]));
+    return `${parts.slice(0, wide ? 5 : 1).map(([name, force]) => `${name} ${number(force)}, `).join("")}total ${number(small(valueAt(motion, motion.data["F total"], time), 100))} ${unit.name}`;
   },
-  phase: ({ motion }, time) => `${shown(displacementAt(motion, time), "m")}, ${shown(at(motion.data, motion.data.v, time), "m/s", 3)}`,
+  phase: ({ motion }, time) => `${shown(displacementAt(motion, time), "m")}, ${shown(valueAt(motion, motion.data.v, time), "m/s", 3)}`,
   loops: ({ motion }, time) => {
-    const [pack, stop] = [-at(motion.data, motion.data["F pack"], time), at(motion.data, motion.data["F backstop"], time) + at(motion.data, motion.data["F damping"], time)];
-    return `${shown(displacementAt(motion, time), "m")}: ${Math.abs(stop) > Math.abs(pack) ? `backstop ${shown(stop, "N", 3)}` : `pack ${shown(pack, "N", 3)}`}`;
+    const [pack, stop] = [-valueAt(motion, motion.data["F pack"], time), valueAt(motion, motion.data["F backstop"], time) + valueAt(motion, motion.data["F damping"], time)];
+    const nothing = Math.max(Math.abs(stop), Math.abs(pack)) < 1e-3;
+    return `${shown(displacementAt(motion, time), "m")}: ${nothing ? "no contact" : Math.abs(stop) > Math.abs(pack) ? `backstop ${shown(stop, "N", 3)}` : `pack ${shown(pack, "N", 3)}`}`;
   },
   map: ({ map }, time, studio) => {
     if (map?.reason !== "") return "";

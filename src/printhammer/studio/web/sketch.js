@@ -1,6 +1,6 @@
 // The actuator to scale along its stroke, with the armature moving: play, slow motion, scrub.
 import { line } from "./axes.js";
-import { displacementAt } from "./curves.js";
+import { displacementAt, valueAt } from "./curves.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { shown, unitOf } from "./units.js";
@@ -85,7 +85,7 @@ export function sketchView(body, studio) {
     const middle = 0.5 * (top + bottom);
     const tall = Math.min(Math.max((0.5 * (bottom - top) - 15) / 1.3, 8), 90);
     const x = displacementAt(frame, studio.cursor);
-    const driven = frame.data.drive[Math.min(Math.round((studio.cursor / (frame.data.t.at(-1) || 1)) * frame.data.t.length), frame.data.t.length - 1)];
+    const driven = valueAt(frame, frame.data.drive, studio.cursor);
     // What is left of an exponential decay is told as nothing.
     const current = Math.abs(driven) < 1e-4 * (frame.peak || 1) ? 0 : driven;
     pen.save();
