@@ -86,7 +86,12 @@ window.helpers = {
   /** Return the texts that the views draw outside their canvas, or one over another. */
   async drawn() {
     const found = [];
-    const { fillText } = CanvasRenderingContext2D.prototype;
+    const { clearRect, fillText } = CanvasRenderingContext2D.prototype;
+    // A picture that is drawn once more counts once.
+    CanvasRenderingContext2D.prototype.clearRect = function forget(...all) {
+      texts = texts.filter(({ canvas }) => canvas !== this.canvas);
+      return clearRect.apply(this, all);
+    };
     let texts = [];
     CanvasRenderingContext2D.prototype.fillText = function note(text, x, y, ...rest) {
       const size = this.measureText(text);
@@ -111,7 +116,7 @@ window.helpers = {
         }
       });
     }
-    CanvasRenderingContext2D.prototype.fillText = fillText;
+    Object.assign(CanvasRenderingContext2D.prototype, { clearRect, fillText });
     return found;
   },
 };

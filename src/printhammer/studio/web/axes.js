@@ -50,7 +50,9 @@ export function axes(pen, width, height, x, y, margin = MARGIN) {
     if (x.whole && !Number.isInteger(tick)) continue;
     const place = X(tick / x.factor);
     line(pen, place, box.y, place, box.y + box.h);
-    pen.fillText(digits(Number(tick.toPrecision(6))), place, box.y + box.h + 4);
+    const text = digits(Number(tick.toPrecision(6)));
+    // The last one ends within the picture.
+    pen.fillText(text, Math.min(place, width - 0.5 * pen.measureText(text).width - 1), box.y + box.h + 4);
   }
   pen.textAlign = "right";
   pen.textBaseline = "middle";

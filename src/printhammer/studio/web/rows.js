@@ -89,7 +89,7 @@ export function sliderRow(options, studio) {
   }
   reset.addEventListener("click", () => { words.clear(); studio.store.set(options.reset(), `reset ${id}`); });
   const row = element("div", { class: "row" }, element("label", { for: label, title: options.title ?? options.hint }, name), box, sign, reset, element("div", { class: "reach" }, ends[0], slider, ends[1]), words.element);
-  hinted(row, `${options.hint} Shift for fine steps, the wheel when it is in use, a double click to reset.`, studio);
+  hinted(row, `${options.hint.replace(/[^.]$/, "$&.")} Shift for fine steps, the wheel when it is in use, a double click to reset.`, studio);
   row.dataset.words = `${name} ${id} ${options.title ?? ""} ${options.hint}`.toLowerCase();
 
   function show() {

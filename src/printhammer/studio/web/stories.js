@@ -14,7 +14,7 @@ export const STORIES = [
   },
   {
     name: "Buzz printing", state: { rate: 1500, pulses: 12 },
-    notice: "Figure 7. Fired in step with the return from the paper, the armature turns round before the backstop: from the third dot on each is printed, with a third of the force.",
+    notice: "Figure 7. Fired in step with the return from the paper, the armature turns round before the backstop: every dot is printed, in the end with three tenths of the force.",
   },
   {
     name: "The second dot lost", state: { rate: 1520, pulses: 9, low: 1300, high: 1800 },
@@ -26,7 +26,7 @@ export const STORIES = [
   },
   {
     name: "Hung up", state: { rate: 2200, pulses: 9, low: 1400, high: 2600 },
-    notice: "At very high rates the armature never comes back to the backstop. It hovers before the paper, and dots are weak or lost.",
+    notice: "At very high rates the armature never comes back to the backstop. It hovers at the paper, and dots are weak or lost.",
   },
 ];
 
