@@ -43,12 +43,12 @@ export function pinRow(studio) {
     const pin = { name, state: bare(state) };
     // What is seen already need not be computed once more.
     if (!studio.busy && !studio.stale) motions.set(keyOf(pin), studio.frames.motion);
-    studio.store.keep({ pins: [...pinsOf(), pin] });
+    studio.store.amend({ pins: [...pinsOf(), pin] });
     studio.say(`pinned as ${name}, ${pinsOf().length} of ${MOST_PINS}`);
   };
   studio.unpin = () => {
     studio.overlay = null;
-    if (pinsOf().length) studio.store.keep({ pins: [] });
+    if (pinsOf().length) studio.store.amend({ pins: [] });
     studio.say("pins taken away");
     redraw();
   };
@@ -77,7 +77,7 @@ export function pinRow(studio) {
     holder.hidden = !pins.length;
     list.replaceChildren(...pins.map((pin, k) => {
       const name = make("input", { type: "text", value: pin.name, "aria-label": `name of pin ${k + 1}`, maxlength: 40, size: Math.max(pin.name.length, 6), spellcheck: "false" });
-      const change = (patch) => studio.store.keep({ pins: patch ? pins.map((each) => (each === pin ? { ...pin, ...patch } : each)) : pins.filter((each) => each !== pin) });
+      const change = (patch) => studio.store.amend({ pins: patch ? pins.map((each) => (each === pin ? { ...pin, ...patch } : each)) : pins.filter((each) => each !== pin) });
       name.addEventListener("change", () => { if (name.value.trim()) change({ name: name.value.trim() }); else name.value = pin.name; });
       return make("span", { class: `chip pin-${k + 1}` }, make("i", { "aria-hidden": "true" }), name,
         make("button", { type: "button", title: `take ${pin.name} up again`, "aria-label": `take ${pin.name} up again`, onclick: () => studio.store.set({ ...pin.state, views: studio.store.state.views }) }, "open"),

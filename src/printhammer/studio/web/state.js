@@ -37,7 +37,7 @@ export class Store {
   }
 
   /** Change what is no step of the history, such as pins. */
-  keep(patch) {
+  amend(patch) {
     this.state = Object.freeze({ ...this.state, ...patch });
     this.tell();
   }
